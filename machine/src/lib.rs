@@ -1,0 +1,13 @@
+//! What a machine is: the machine file, its mechanism, motors, transmissions and limits.
+//!
+//! Pure: no clock, no threads, and no file but the one it is asked to read. A machine file is
+//! parsed raw, with unknown keys refused, and then validated into the types here; whoever holds a
+//! [`Machine`] need not check it again.
+
+pub mod actuator;
+pub mod kinematics;
+pub mod limits;
+
+pub use actuator::{Axis, DcMotor, Encoder, Friction, LoopGains};
+pub use kinematics::{Mechanism, MechanismKind, Pose};
+pub use limits::{AxisLimits, PathLimits, WorkArea};

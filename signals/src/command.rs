@@ -1,0 +1,94 @@
+//! Controller to drives: what the motors and the laser shall do in the next cycle.
+
+use crate::{AxisArray, Cycle, Fault, LaserCycle, Nanoseconds, sample};
+
+/// Which of a command's targets drives shall follow. Discriminants are the values in samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u32)]
+pub enum CommandMode {
+    /// Power stage off; the motor coasts.
+    #[default]
+    Disabled = 0,
+    /// Cyclic synchronous position: the drive closes all loops on `position`.
+    Position = 1,
+    /// Cyclic synchronous velocity.
+    Velocity = 2,
+    /// Cyclic synchronous torque.
+    Effort = 3,
+    /// The controller closes the current loop too; the drive applies `voltage`.
+    Voltage = 4,
+    /// The drive brakes to rest at its own limit of deceleration and holds.
+    QuickStop = 5,
+}
+
+impl CommandMode {
+    /// The mode with this number in a sample; an unknown number reads as [`Self::QuickStop`].
+    pub fn from_wire(value: u32) -> Self {
+        match value {
+            0 => Self::Disabled,
+            1 => Self::Position,
+            2 => Self::Velocity,
+            3 => Self::Effort,
+            4 => Self::Voltage,
+            _ => Self::QuickStop,
+        }
+    }
+}
+
+sample! {
+    /// The answer to one feedback. Drives latches it and applies it at the next deadline, always.
+    Command = "graver.Command.v1" {
+        /// The feedback this answers; it takes effect at the deadline of `cycle + 1`.
+        cycle: Cycle,
+        /// The stream being played, 0 for none.
+        stream: u64,
+        /// Stroke being marked in the cycle in which this command acts, from 1; 0 for none.
+        stroke: u64,
+        /// When the controller read the feedback.
+        received: Nanoseconds,
+        /// When the controller published this.
+        published: Nanoseconds,
+        /// When the planner published the newest setpoint used here; 0 for none.
+        setpoint_published: Nanoseconds,
+        /// When the controller took that setpoint into its look-ahead; 0 for none.
+        setpoint_received: Nanoseconds,
+        /// A [`CommandMode`].
+        mode: u32,
+        /// A [`ControllerState`](crate::ControllerState).
+        state: u32,
+        /// Stream time at the instant of the feedback [s].
+        stream_time: f64,
+        /// Rate at which the stream is played, 1 as planned.
+        rate: f64,
+        /// Where the plan has the tool at the instant of the feedback, machine frame [m].
+        tool: [f64; 3],
+        /// Position reference at the instant of the feedback, motor side [rad].
+        reference: AxisArray,
+        /// Reference minus feedback [rad at the motor].
+        following_error: AxisArray,
+        /// Target position at the end of the cycle in which this acts [rad at the motor].
+        position: AxisArray,
+        /// Target velocity in the cycle in which this acts [rad/s at the motor].
+        velocity: AxisArray,
+        /// Target torque in the cycle in which this acts [N·m at the motor].
+        effort: AxisArray,
+        /// Motor voltage for the cycle in which this acts [V].
+        voltage: AxisArray,
+        /// The laser in the cycle in which this acts.
+        laser: LaserCycle,
+        /// The latched fault, if any.
+        fault: Fault,
+    }
+}
+
+impl Command {
+    /// The mode.
+    pub fn mode(&self) -> CommandMode {
+        CommandMode::from_wire(self.mode)
+    }
+
+    /// The controller's state.
+    pub fn state(&self) -> crate::ControllerState {
+        crate::ControllerState::from_wire(self.state)
+    }
+}

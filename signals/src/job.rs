@@ -1,0 +1,89 @@
+//! Domain to planner and back: which job to plan, and how that went.
+
+use crate::{Nanoseconds, sample};
+
+/// The longest path of a run folder that a job offer can carry [bytes].
+pub const MAX_PATH: usize = 1024;
+
+/// What the planner is doing. Discriminants are the values in samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u32)]
+pub enum PlannerPhase {
+    /// Nothing to do.
+    #[default]
+    Idle = 0,
+    /// Reading, planning and checking.
+    Planning = 1,
+    /// Sending setpoints.
+    Streaming = 2,
+    /// All setpoints of the stream have been sent.
+    Sent = 3,
+    /// The job was refused; `refused.json` in the run folder says why and where.
+    Refused = 4,
+}
+
+impl PlannerPhase {
+    /// The phase with this number in a sample; an unknown number reads as [`Self::Idle`].
+    pub fn from_wire(value: u32) -> Self {
+        match value {
+            1 => Self::Planning,
+            2 => Self::Streaming,
+            3 => Self::Sent,
+            4 => Self::Refused,
+            _ => Self::Idle,
+        }
+    }
+}
+
+sample! {
+    /// A job to plan and stream. The job itself is in `request.json` in the run folder.
+    JobOffer = "graver.JobOffer.v1" {
+        /// The stream number the job gets; each job of a domain a new one, from 1.
+        stream: u64,
+        /// Bytes of `folder` that count.
+        folder_length: u64,
+        /// Path of the run folder, UTF-8.
+        folder: [u8; MAX_PATH],
+    }
+}
+
+impl JobOffer {
+    /// An offer of the job in `folder`; `None` when the path is longer than [`MAX_PATH`].
+    pub fn new(stream: u64, folder: &str) -> Option<Self> {
+        let bytes = folder.as_bytes();
+        let mut offer = Self { stream, folder_length: bytes.len() as u64, ..Self::default() };
+        offer.folder.get_mut(..bytes.len())?.copy_from_slice(bytes);
+        Some(offer)
+    }
+
+    /// The run folder; `None` when the bytes are not a path.
+    pub fn folder(&self) -> Option<&str> {
+        core::str::from_utf8(self.folder.get(..self.folder_length as usize)?).ok()
+    }
+}
+
+sample! {
+    /// How planning and streaming go.
+    PlannerReport = "graver.PlannerReport.v1" {
+        /// When it was published.
+        published: Nanoseconds,
+        /// The stream it speaks of, 0 for none.
+        stream: u64,
+        /// Setpoints in the stream, 0 while unknown.
+        samples: u64,
+        /// Setpoints sent so far.
+        sent: u64,
+        /// Strokes to mark, 0 while unknown.
+        strokes: u64,
+        /// Time from offer to the first setpoint [s].
+        plan_time: f64,
+        /// Duration of the planned motion [s].
+        duration: f64,
+        /// Length to be marked [m].
+        length: f64,
+        /// A [`PlannerPhase`].
+        phase: u32,
+        /// Always 0; keeps the sample free of padding.
+        reserved: u32,
+    }
+}

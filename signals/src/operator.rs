@@ -1,0 +1,67 @@
+//! What a person asks of a running machine.
+
+use crate::sample;
+
+/// A request to the controller. Discriminants are the values in samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum OperatorVerb {
+    /// Power the motors at standstill.
+    Enable = 1,
+    /// Unpower the motors; only at rest.
+    Disable = 2,
+    /// Feed hold: laser off, to rest along the path.
+    Hold = 3,
+    /// Go on from a hold without losing or doubling a mark.
+    Resume = 4,
+    /// Give the stream up: laser off, to rest along the path.
+    Stop = 5,
+    /// Clear a latched fault; only at rest.
+    Reset = 6,
+    /// Play at another rate, `value` 0.1..=2.
+    Override = 7,
+}
+
+impl OperatorVerb {
+    /// The verb with this number in a sample.
+    pub fn from_wire(value: u32) -> Option<Self> {
+        Some(match value {
+            1 => Self::Enable,
+            2 => Self::Disable,
+            3 => Self::Hold,
+            4 => Self::Resume,
+            5 => Self::Stop,
+            6 => Self::Reset,
+            7 => Self::Override,
+            _ => return None,
+        })
+    }
+}
+
+sample! {
+    /// One request, from the domain holder to the controller.
+    OperatorRequest = "graver.OperatorRequest.v1" {
+        /// An [`OperatorVerb`].
+        verb: u32,
+        /// Numbers requests, so that an answer can be told from an older one.
+        ticket: u32,
+        /// The verb's argument, 0 without.
+        value: f64,
+    }
+}
+
+sample! {
+    /// The controller's answer, given after the request took effect or was refused.
+    OperatorReply = "graver.OperatorReply.v1" {
+        /// The request's ticket.
+        ticket: u32,
+        /// 1 when it was carried out, 0 when the state does not allow it.
+        accepted: u32,
+        /// The [`ControllerState`](crate::ControllerState) it met.
+        state: u32,
+        /// Always 0; keeps the sample free of padding.
+        reserved: u32,
+        /// The value now in force, for an override.
+        value: f64,
+    }
+}

@@ -1,0 +1,35 @@
+//! Controller to planner and operators: how far the stream has come.
+
+use crate::{Fault, Nanoseconds, sample};
+
+sample! {
+    /// Published every few cycles; the planner's licence to send more.
+    Progress = "graver.Progress.v1" {
+        /// When it was published.
+        published: Nanoseconds,
+        /// The stream in the look-ahead, 0 for none.
+        stream: u64,
+        /// Setpoints of this stream taken into the look-ahead so far: the acknowledged count.
+        accepted: u64,
+        /// Setpoints of this stream whose time has passed.
+        played: u64,
+        /// How many setpoints the look-ahead still has room for.
+        room: u64,
+        /// Stroke being marked, from 1; 0 for none.
+        stroke: u64,
+        /// Control cycles since start.
+        cycles: u64,
+        /// Streams finished or given up so far; the newest one's number.
+        finished: u64,
+        /// Rate at which the stream is played.
+        rate: f64,
+        /// Tool position the plan has now, machine frame [m].
+        tool: [f64; 3],
+        /// A [`ControllerState`](crate::ControllerState).
+        state: u32,
+        /// 1 if the newest finished stream was played to its end, else 0.
+        completed: u32,
+        /// The latched fault, if any.
+        fault: Fault,
+    }
+}

@@ -1,0 +1,81 @@
+//! Final reports: what each stage alone can know, sent when a stream ends and every second.
+
+use crate::{AxisArray, Cycle, Fault, sample};
+
+sample! {
+    /// Facts of a stage's real-time set-up.
+    RealtimeFacts = "graver.RealtimeFacts.v1" {
+        /// 1 when the thread runs under SCHED_FIFO, 0 otherwise.
+        fifo: u32,
+        /// Its priority, 0 without SCHED_FIFO.
+        priority: u32,
+        /// The CPU the thread is pinned to, or −1.
+        core: i32,
+        /// 1 when memory is locked.
+        locked: u32,
+    }
+}
+
+sample! {
+    /// What the controller counted over one stream.
+    ControllerReport = "graver.ControllerReport.v1" {
+        /// The stream it speaks of.
+        stream: u64,
+        /// 1 once the stream has ended and this is final, else 0.
+        last: u32,
+        /// 1 if it was played to its end, else 0.
+        completed: u32,
+        /// Cycles from the first setpoint to the last.
+        cycles: u64,
+        /// Hash over what the commands meant; see `controller::digest`.
+        digest: u64,
+        /// Samples behind the root mean squares.
+        count: u64,
+        /// Largest |reference − feedback| at the motor [rad].
+        following_error_max: AxisArray,
+        /// Sum of the squares of it [rad²].
+        following_error_squares: AxisArray,
+        /// Largest share of the limit used: joint velocity.
+        velocity_use: AxisArray,
+        /// Largest share of the limit used: joint acceleration.
+        acceleration_use: AxisArray,
+        /// Largest share of the limit used: joint jerk.
+        jerk_use: AxisArray,
+        /// Largest share of the current limit commanded.
+        effort_use: AxisArray,
+        /// Largest share of the limit used: acceleration along and across the path.
+        path_acceleration_use: f64,
+        /// Largest share of the limit used: jerk along and across the path.
+        path_jerk_use: f64,
+        /// The fault that ended the stream, if any.
+        fault: Fault,
+        /// Real-time set-up of the controller's thread.
+        realtime: RealtimeFacts,
+    }
+}
+
+sample! {
+    /// What drives counted since it started.
+    DrivesReport = "graver.DrivesReport.v1" {
+        /// The newest cycle.
+        cycle: Cycle,
+        /// Cycles whose work did not end before the next deadline, slips included.
+        overruns: u64,
+        /// Overruns that were waited for because the drives are simulated.
+        slips: u64,
+        /// Cycles without a fresh command.
+        missed: u64,
+        /// Times the watchdog closed an open gate.
+        gate_trips: u64,
+        /// Times drives stopped the axes by itself.
+        stops: u64,
+        /// 1 when the axes are at rest and the laser is off for good.
+        at_rest: u32,
+        /// 1 when the gate is open right now.
+        lit: u32,
+        /// The fault of the drives, if any.
+        fault: Fault,
+        /// Real-time set-up of the drives' thread.
+        realtime: RealtimeFacts,
+    }
+}

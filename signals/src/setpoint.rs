@@ -1,0 +1,54 @@
+//! Planner to controller: the trajectory, one sample a cycle, ahead of time.
+
+use crate::{AxisArray, LaserCycle, Nanoseconds, sample};
+
+sample! {
+    /// The planned motion at one instant of stream time, `sequence × CYCLE_TIME`.
+    ///
+    /// Joint quantities are on the load side of the transmission, in the joint's own unit
+    /// (metres of a carriage or belt, radians of an arm), and exact derivatives of the planned
+    /// path, not differences. Efforts are torques at the motor shaft without friction, which the
+    /// controller adds from the motor's own speed.
+    ///
+    /// Played at rate `r` (1 is as planned) and rate change `ṙ` [1/s], the effort is
+    /// `static_effort + (effort − static_effort)·r² + momentum·ṙ` and the lead `lead·r²`.
+    Setpoint = "graver.Setpoint.v1" {
+        /// The stream this sample belongs to; one job is one stream. Never 0.
+        stream: u64,
+        /// Position in the stream, from 0 without gaps.
+        sequence: u64,
+        /// When the planner published it.
+        published: Nanoseconds,
+        /// 1 on the last sample of the stream, at which everything is at rest, else 0.
+        last: u64,
+        /// The stroke being marked during the cycle that starts here, from 1; 0 for none.
+        stroke: u64,
+        /// Tool centre point in the machine frame [m].
+        tool: [f64; 3],
+        /// Speed of the tool along the path [m/s].
+        path_velocity: f64,
+        /// Norm of the tool's acceleration [m/s²].
+        path_acceleration: f64,
+        /// Norm of the tool's jerk [m/s³].
+        path_jerk: f64,
+        /// Joint position, load side [m or rad].
+        position: AxisArray,
+        /// Joint velocity, load side [m/s or rad/s].
+        velocity: AxisArray,
+        /// Joint acceleration, load side [m/s² or rad/s²].
+        acceleration: AxisArray,
+        /// Joint jerk, load side [m/s³ or rad/s³].
+        jerk: AxisArray,
+        /// How far the motor side is ahead of the load side through the elastic transmission, in
+        /// joint units [m or rad].
+        lead: AxisArray,
+        /// Torque of the motor for this motion, rotor included, friction excluded [N·m].
+        effort: AxisArray,
+        /// The part of `effort` that does not move with the rate: gravity [N·m].
+        static_effort: AxisArray,
+        /// Motor torque per unit of rate change [N·m·s].
+        momentum: AxisArray,
+        /// The laser in the cycle that starts here.
+        laser: LaserCycle,
+    }
+}
