@@ -1,1 +1,3 @@
-//! placeholder
+//! Job readers, paths, profiles, laser timing, sampling.
+
+pub mod drawing;

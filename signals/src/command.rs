@@ -56,6 +56,8 @@ sample! {
         mode: u32,
         /// A [`ControllerState`](crate::ControllerState).
         state: u32,
+        /// Digital outputs, one bit each; bit 0 is the air assist.
+        outputs: u64,
         /// Stream time at the instant of the feedback [s].
         stream_time: f64,
         /// Rate at which the stream is played, 1 as planned.

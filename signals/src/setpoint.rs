@@ -2,6 +2,14 @@
 
 use crate::{AxisArray, LaserCycle, Nanoseconds, sample};
 
+/// Bits of [`Setpoint::flags`].
+pub mod flags {
+    /// The last sample of the stream; everything is at rest.
+    pub const LAST: u64 = 1;
+    /// The program pauses here, at rest and in the dark, until a person resumes (M0).
+    pub const PAUSE: u64 = 1 << 1;
+}
+
 sample! {
     /// The planned motion at one instant of stream time, `sequence × CYCLE_TIME`.
     ///
@@ -19,8 +27,10 @@ sample! {
         sequence: u64,
         /// When the planner published it.
         published: Nanoseconds,
-        /// 1 on the last sample of the stream, at which everything is at rest, else 0.
-        last: u64,
+        /// Bits of [`flags`].
+        flags: u64,
+        /// Digital outputs, one bit each; bit 0 is the air assist.
+        outputs: u64,
         /// The stroke being marked during the cycle that starts here, from 1; 0 for none.
         stroke: u64,
         /// Tool centre point in the machine frame [m].
@@ -50,5 +60,12 @@ sample! {
         momentum: AxisArray,
         /// The laser in the cycle that starts here.
         laser: LaserCycle,
+    }
+}
+
+impl Setpoint {
+    /// Whether all the flags in `bits` are set.
+    pub fn has(&self, bits: u64) -> bool {
+        self.flags & bits == bits
     }
 }

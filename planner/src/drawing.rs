@@ -1,0 +1,140 @@
+//! What a job asks for, whatever language it was written in.
+//!
+//! Every reader (letters, points, G-code) ends here, and everything after starts here. Machine
+//! frame, SI units. Nothing is timed yet.
+
+use nalgebra::Vector3;
+use signals::math;
+
+/// A job as geometry: what to mark and how to get there, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drawing {
+    /// Name for summaries and run folders.
+    pub name: String,
+    /// Where the tool is at rest before the first step [m].
+    pub start: Vector3<f64>,
+    /// What to do, in order.
+    pub steps: Vec<Step>,
+    /// Things a person should know, each said once.
+    pub notes: Vec<Note>,
+}
+
+/// One remark on a job, such as a code that was accepted without effect.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Note {
+    /// Line of the job file from 1, 0 for none.
+    pub line: u64,
+    /// What to know.
+    pub text: String,
+}
+
+/// One step of a drawing and the line of the job file that asked for it (from 1, 0 for none).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// What to do.
+    pub action: Action,
+    /// Where it was asked for.
+    pub line: u64,
+}
+
+/// What a step does.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Action {
+    /// Mark along a curve that starts where the tool is.
+    Mark {
+        /// The line to mark.
+        curve: Curve,
+        /// Speed while the laser is on [m/s]; `None` leaves it to the job's policy.
+        speed: Option<f64>,
+        /// The laser.
+        power: Power,
+    },
+    /// Move straight in the dark, as fast as the limits allow.
+    Rapid {
+        /// Where to [m].
+        to: Vector3<f64>,
+    },
+    /// Follow a curve in the dark, at rest at both ends.
+    Feed {
+        /// The path.
+        curve: Curve,
+        /// Largest speed [m/s].
+        speed: f64,
+    },
+    /// Stand still.
+    Dwell {
+        /// How long [s].
+        time: f64,
+        /// Power of the laser meanwhile; `None` in the dark.
+        lit: Option<f64>,
+    },
+    /// Switch a digital output at rest.
+    Output {
+        /// Which bit of the outputs.
+        bit: u32,
+        /// On or off.
+        on: bool,
+    },
+    /// Wait, at rest and in the dark, for a person to resume.
+    Pause,
+}
+
+/// Laser power along a mark.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Power {
+    /// Fraction of full scale at the commanded speed, above 0 and up to 1.
+    pub level: f64,
+    /// Whether power follows the true speed (M4) or keeps its level (M3).
+    pub follows_speed: bool,
+}
+
+/// A smooth piece of a path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Curve {
+    /// A straight line.
+    Line {
+        /// Start [m].
+        from: Vector3<f64>,
+        /// End [m].
+        to: Vector3<f64>,
+    },
+    /// An arc of an ellipse or circle, possibly rising as a helix:
+    /// `p(φ) = centre + major·cos φ + minor·sin φ + rise·(φ − start)/sweep`.
+    Arc {
+        /// Centre [m].
+        centre: Vector3<f64>,
+        /// Semi-axis at φ = 0 [m].
+        major: Vector3<f64>,
+        /// Semi-axis at φ = π/2, perpendicular to `major` [m].
+        minor: Vector3<f64>,
+        /// φ at the start [rad].
+        start: f64,
+        /// Signed change of φ, not 0 [rad].
+        sweep: f64,
+        /// Displacement along the helix axis over the whole sweep [m].
+        rise: Vector3<f64>,
+    },
+}
+
+impl Curve {
+    /// The point at `parameter`, 0 at the start and 1 at the end [m].
+    pub fn point(&self, parameter: f64) -> Vector3<f64> {
+        match *self {
+            Self::Line { from, to } => from + (to - from) * parameter,
+            Self::Arc { centre, major, minor, start, sweep, rise } => {
+                let (sine, cosine) = math::sin_cos(start + sweep * parameter);
+                centre + major * cosine + minor * sine + rise * parameter
+            }
+        }
+    }
+
+    /// Where it starts [m].
+    pub fn from(&self) -> Vector3<f64> {
+        self.point(0.0)
+    }
+
+    /// Where it ends [m].
+    pub fn to(&self) -> Vector3<f64> {
+        self.point(1.0)
+    }
+}
