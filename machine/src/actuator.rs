@@ -11,12 +11,15 @@ pub struct DcMotor {
     pub inductance: f64,
     /// Torque constant [N·m/A], equal to the back-EMF constant [V·s/rad].
     pub torque_constant: f64,
-    /// Inertia of the rotor, with everything fixed to its shaft [kg·m²].
+    /// Inertia at the shaft on the motor's side of the transmission's spring [kg·m²]: the rotor,
+    /// and what turns with it stiffly, such as a screw through its gear (`J_screw/i²`).
     pub rotor_inertia: f64,
     /// Largest voltage that the supply can apply [V].
     pub voltage: f64,
     /// Largest current that the power stage may command [A].
     pub current: f64,
+    /// Current that the winding bears for ever [A]; `None` where the file does not say.
+    pub continuous_current: Option<f64>,
 }
 
 /// Friction at the motor shaft.
@@ -37,7 +40,7 @@ pub struct Encoder {
 
 /// Gains of the position/velocity/current cascade.
 ///
-/// Taken from motor and load data unless the machine file overrides the two bandwidths.
+/// Taken from motor and load data unless the machine file overrides a bandwidth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopGains {
     /// Bandwidth of the position loop [1/s].
@@ -58,7 +61,10 @@ pub struct Axis {
     /// Joint units moved per radian of the motor, gear and screw or pulley included; positive
     /// [m/rad or rad/rad].
     pub ratio: f64,
-    /// Share of the motor's torque that reaches the joint when it drives, 0..=1.
+    /// Share of the motor's torque that reaches the joint when it drives, above 0 and up to 1.
+    ///
+    /// For sizing only. In motion the losses are [`Friction`], for the plant and for the
+    /// feedforward alike; counting them here as well would count them twice.
     pub efficiency: f64,
     /// The motor.
     pub motor: DcMotor,

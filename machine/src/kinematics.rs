@@ -131,6 +131,21 @@ pub trait Mechanism<const N: usize>: Clone + Send + 'static {
     }
 }
 
-/// The mechanism of a machine file, matched once when a stage starts.
-#[derive(Debug, Clone, PartialEq)]
-pub enum MechanismKind {}
+/// How far from z = 0 a planar mechanism's tool may be asked to go [m]: rounding of a path that
+/// lies in the plane, far below any encoder's count.
+const PLANE_TOLERANCE: f64 = 1e-9;
+
+/// Refuses a position that a planar mechanism cannot take.
+pub(crate) fn in_plane(position: &Vector3<f64>) -> Result<(), KinematicsError> {
+    // Written so that a z that is not a number fails too.
+    if position.z.abs() <= PLANE_TOLERANCE {
+        return Ok(());
+    }
+    Err(KinematicsError {
+        code: "out_of_plane",
+        axis: None,
+        value: position.z,
+        limit: PLANE_TOLERANCE,
+        detail: "the mechanism moves in x and y only",
+    })
+}

@@ -7,7 +7,13 @@
 pub mod actuator;
 pub mod kinematics;
 pub mod limits;
+pub mod machine;
+pub mod mechanisms;
+pub mod process;
 
 pub use actuator::{Axis, DcMotor, Encoder, Friction, LoopGains};
-pub use kinematics::{Mechanism, MechanismKind, Pose};
+pub use kinematics::{Mechanism, Pose};
 pub use limits::{AxisLimits, PathLimits, WorkArea};
+pub use machine::{Machine, Warning};
+pub use mechanisms::{Cartesian, CoreXy, MechanismKind, MechanismVisitor};
+pub use process::{GcodeSettings, LaserSource, ZMeaning};

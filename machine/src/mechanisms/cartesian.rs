@@ -1,0 +1,98 @@
+//! Carriages on ball screws, one for each direction (source 003 ch. 3).
+//!
+//! The joint is the carriage's position [m]. Screw and gear are in the axis's ratio, so the
+//! equations here are those of masses on springs.
+
+use nalgebra::{SMatrix, SVector, Vector3};
+
+use super::transmission::Elasticity;
+use crate::kinematics::{
+    Jacobian, JointMotion, Joints, KinematicsError, Mechanism, Pose, ToolMotion, in_plane,
+};
+
+/// Gravity at the surface [m/s²], against the z axis.
+const STANDARD_GRAVITY: f64 = 9.806_65;
+
+/// Carriages in x, y and, with `N` = 3, z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cartesian<const N: usize> {
+    /// Mass that each axis moves [kg].
+    pub mass: [f64; N],
+    /// Spring and damper of each screw, seen at its nut; `None` when they are taken as rigid.
+    pub elasticity: Option<[Elasticity; N]>,
+}
+
+impl<const N: usize> Cartesian<N> {
+    /// The joints that belong to the first `N` directions of `vector`.
+    fn joints(vector: &Vector3<f64>) -> Joints<N> {
+        SVector::from_fn(|row, _| vector[row])
+    }
+
+    fn check_plane(position: &Vector3<f64>) -> Result<(), KinematicsError> {
+        if N < 3 { in_plane(position) } else { Ok(()) }
+    }
+}
+
+impl<const N: usize> Mechanism<N> for Cartesian<N> {
+    type Branch = ();
+
+    const NAME: &'static str = "cartesian";
+
+    fn forward(&self, q: &Joints<N>, _branch: ()) -> Result<Pose, KinematicsError> {
+        // Source 003 eq. 3.1, X = p·θ with p per radian and gear included.
+        Ok(Pose::at(Vector3::from_fn(|row, _| if row < N { q[row] } else { 0.0 })))
+    }
+
+    fn inverse(
+        &self,
+        pose: &Pose,
+        _branch: (),
+        _previous: &Joints<N>,
+    ) -> Result<Joints<N>, KinematicsError> {
+        Self::check_plane(&pose.position)?;
+        Ok(Self::joints(&pose.position))
+    }
+
+    fn jacobian(&self, _q: &Joints<N>) -> Jacobian<N> {
+        Jacobian::from_fn(|row, column| if row == column { 1.0 } else { 0.0 })
+    }
+
+    fn joint_motion(
+        &self,
+        tool: &ToolMotion,
+        _branch: (),
+        _previous: &Joints<N>,
+    ) -> Result<JointMotion<N>, KinematicsError> {
+        Self::check_plane(&tool.position)?;
+        Ok(JointMotion {
+            position: Self::joints(&tool.position),
+            velocity: Self::joints(&tool.velocity),
+            acceleration: Self::joints(&tool.acceleration),
+            jerk: Self::joints(&tool.jerk),
+        })
+    }
+
+    fn mass_matrix(&self, _q: &Joints<N>) -> SMatrix<f64, N, N> {
+        SMatrix::from_diagonal(&SVector::from(self.mass))
+    }
+
+    fn bias(&self, q: &Joints<N>, _velocity: &Joints<N>) -> Joints<N> {
+        self.gravity(q)
+    }
+
+    fn gravity(&self, _q: &Joints<N>) -> Joints<N> {
+        SVector::from_fn(|row, _| if row == 2 { self.mass[row] * STANDARD_GRAVITY } else { 0.0 })
+    }
+
+    fn stiffness(&self) -> Option<SMatrix<f64, N, N>> {
+        self.elasticity.map(|springs| {
+            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.stiffness)))
+        })
+    }
+
+    fn damping(&self) -> SMatrix<f64, N, N> {
+        self.elasticity.map_or_else(SMatrix::zeros, |springs| {
+            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.damping)))
+        })
+    }
+}

@@ -1,0 +1,72 @@
+//! The mechanisms, one file each, and the choice among them that a machine file makes.
+
+pub mod cartesian;
+pub mod corexy;
+pub mod transmission;
+
+pub use cartesian::Cartesian;
+pub use corexy::CoreXy;
+pub use transmission::Elasticity;
+
+use crate::kinematics::Mechanism;
+
+/// The mechanism of a machine file, matched once when a stage starts.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MechanismKind {
+    /// Ball screws in x and y.
+    Cartesian(Cartesian<2>),
+    /// Ball screws in x and y, and one that moves the head up and down.
+    CartesianLift(Cartesian<3>),
+    /// Two belts that move the head in x and y together.
+    CoreXy(CoreXy),
+}
+
+/// Work that is generic over the mechanism, such as a sampler or a plant.
+///
+/// ```
+/// use machine::{Machine, Mechanism, MechanismVisitor};
+///
+/// struct CountAxes;
+/// impl MechanismVisitor for CountAxes {
+///     type Output = usize;
+///     fn visit<const N: usize, M: Mechanism<N>>(self, _mechanism: M) -> usize {
+///         N
+///     }
+/// }
+/// assert_eq!(Machine::builtin().mechanism.visit(CountAxes), 2);
+/// ```
+pub trait MechanismVisitor {
+    /// What the visit gives back.
+    type Output;
+
+    /// Called once, with the mechanism of the machine.
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output;
+}
+
+impl MechanismKind {
+    /// Hands the mechanism to `visitor` as its own type.
+    pub fn visit<V: MechanismVisitor>(&self, visitor: V) -> V::Output {
+        match self {
+            Self::Cartesian(mechanism) => visitor.visit(*mechanism),
+            Self::CartesianLift(mechanism) => visitor.visit(*mechanism),
+            Self::CoreXy(mechanism) => visitor.visit(*mechanism),
+        }
+    }
+
+    /// The name in machine files and summaries.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Cartesian(_) => Cartesian::<2>::NAME,
+            Self::CartesianLift(_) => Cartesian::<3>::NAME,
+            Self::CoreXy(_) => CoreXy::NAME,
+        }
+    }
+
+    /// The number of actuated axes.
+    pub fn axes(&self) -> usize {
+        match self {
+            Self::Cartesian(_) | Self::CoreXy(_) => 2,
+            Self::CartesianLift(_) => 3,
+        }
+    }
+}
