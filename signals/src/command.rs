@@ -38,8 +38,13 @@ impl CommandMode {
 sample! {
     /// The answer to one feedback. Drives latches it and applies it at the next deadline, always.
     Command = "graver.Command.v1" {
+        /// The `Feedback::epoch` this answers: a command for another run of drives is not fresh.
+        epoch: u64,
         /// The feedback this answers; it takes effect at the deadline of `cycle + 1`.
         cycle: Cycle,
+        /// Ticket of the newest reset that a person asked for, 0 for none; drives clears its own
+        /// latched stop only when this changes.
+        reset: u64,
         /// The stream being played, 0 for none.
         stream: u64,
         /// Stroke being marked in the cycle in which this command acts, from 1; 0 for none.

@@ -37,6 +37,8 @@ pub enum FaultCode {
     DriveFault = 13,
     /// The motor current stayed above its rating for too long.
     Overload = 14,
+    /// The first setpoint of a stream is not where the axis stands; `value` is the distance.
+    StreamStart = 16,
     /// The domain's supervisor died; the machine is brought to rest.
     SupervisorLost = 15,
 }
@@ -60,6 +62,7 @@ impl FaultCode {
             12 => Self::DrivesLost,
             14 => Self::Overload,
             15 => Self::SupervisorLost,
+            16 => Self::StreamStart,
             _ => Self::DriveFault,
         }
     }
@@ -83,6 +86,7 @@ impl FaultCode {
             Self::DriveFault => "drive_fault",
             Self::Overload => "overload",
             Self::SupervisorLost => "supervisor_lost",
+            Self::StreamStart => "stream_start",
         }
     }
 }

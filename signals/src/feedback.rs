@@ -14,11 +14,15 @@ pub mod status {
     pub const STOPPED_ALONE: u32 = 1 << 3;
     /// The clock may slip for a live controller (simulated drives without `--strict`).
     pub const SLIPPING: u32 = 1 << 4;
+    /// A peer was found dead at this deadline: the gate is closed whatever the command says.
+    pub const GATE_INHIBITED: u32 = 1 << 5;
 }
 
 sample! {
     /// One measurement, taken at the deadline of `cycle`.
     Feedback = "graver.Feedback.v1" {
+        /// Identifies this run of drives: its start on the monotonic clock [ns].
+        epoch: u64,
         /// The cycle that starts with this measurement.
         cycle: Cycle,
         /// The absolute deadline of the cycle.

@@ -37,6 +37,8 @@ impl PlannerPhase {
 
 sample! {
     /// A job to plan and stream. The job itself is in `request.json` in the run folder.
+    ///
+    /// An offer without a folder cancels the stream of its number, planned or half sent.
     JobOffer = "graver.JobOffer.v1" {
         /// The stream number the job gets; each job of a domain a new one, from 1.
         stream: u64,

@@ -4,7 +4,7 @@ use crate::sample;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// The most gate edges one cycle can hold; the planner refuses a job that needs more.
-pub const MAX_EDGES: usize = 8;
+pub const MAX_EDGES: usize = 16;
 
 /// One change of the laser inside a cycle.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout)]
@@ -12,7 +12,7 @@ pub const MAX_EDGES: usize = 8;
 pub struct GateEdge {
     /// Time from the start of the cycle [ns], below the period.
     pub offset: u32,
-    /// The gate from here on: 1 open (light), 0 closed.
+    /// The gate from here on: 0 closed, otherwise open and marking the stroke with this number.
     pub gate: u32,
     /// Power from here on, as a fraction of full scale, 0..=1.
     pub power: f64,
@@ -21,7 +21,8 @@ pub struct GateEdge {
 sample! {
     /// What the laser does in one cycle.
     LaserCycle = "graver.LaserCycle.v1" {
-        /// The gate when the cycle starts: 1 open, 0 closed.
+        /// The gate when the cycle starts: 0 closed, otherwise open and marking the stroke with
+        /// this number (from 1, in the order of the artwork). Light always belongs to a stroke.
         gate: u32,
         /// How many of `edges` count, in order of their offset.
         edge_count: u32,
@@ -54,6 +55,18 @@ impl LaserCycle {
     /// Gate and power at the end of the cycle.
     pub fn last(&self) -> (u32, f64) {
         self.edges().last().map_or((self.gate, self.power), |edge| (edge.gate, edge.power))
+    }
+
+    /// Whether it makes sense: edges in order inside the cycle, power a fraction, count in range.
+    /// Drives keeps a cycle dark that does not.
+    pub fn is_valid(&self) -> bool {
+        let fraction = |power: f64| (0.0..=1.0).contains(&power);
+        self.edge_count as usize <= MAX_EDGES
+            && fraction(self.power)
+            && self.edges().iter().all(|edge| {
+                fraction(edge.power) && i64::from(edge.offset) < crate::time::CYCLE_PERIOD.0
+            })
+            && self.edges().windows(2).all(|pair| pair[0].offset <= pair[1].offset)
     }
 
     /// Adds a change; `false` when the cycle is full.

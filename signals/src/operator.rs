@@ -20,6 +20,8 @@ pub enum OperatorVerb {
     Reset = 6,
     /// Play at another rate, `value` 0.1..=2.
     Override = 7,
+    /// Play the stream whose number is `value`; no other stream is ever played.
+    Start = 8,
 }
 
 impl OperatorVerb {
@@ -33,6 +35,7 @@ impl OperatorVerb {
             5 => Self::Stop,
             6 => Self::Reset,
             7 => Self::Override,
+            8 => Self::Start,
             _ => return None,
         })
     }
@@ -51,7 +54,8 @@ sample! {
 }
 
 sample! {
-    /// The controller's answer, given after the request took effect or was refused.
+    /// The controller's answer, given as soon as the request is accepted or refused; its effect
+    /// shows in the progress.
     OperatorReply = "graver.OperatorReply.v1" {
         /// The request's ticket.
         ticket: u32,

@@ -19,12 +19,14 @@ sample! {
         stroke: u64,
         /// Control cycles since start.
         cycles: u64,
-        /// Streams finished or given up so far; the newest one's number.
-        finished: u64,
+        /// The newest stream that was finished or given up, 0 for none.
+        finished_stream: u64,
         /// Rate at which the stream is played.
         rate: f64,
         /// Tool position the plan has now, machine frame [m].
         tool: [f64; 3],
+        /// Joint reference now, load side [m or rad]: where a new stream must start.
+        position: crate::AxisArray,
         /// A [`ControllerState`](crate::ControllerState).
         state: u32,
         /// 1 if the newest finished stream was played to its end, else 0.

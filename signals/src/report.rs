@@ -22,11 +22,15 @@ sample! {
         /// The stream it speaks of.
         stream: u64,
         /// 1 once the stream has ended and this is final, else 0.
-        last: u32,
+        is_final: u32,
         /// 1 if it was played to its end, else 0.
         completed: u32,
         /// Cycles from the first setpoint to the last.
         cycles: u64,
+        /// The feedback cycle answered with the stream's first setpoint.
+        first_cycle: Cycle,
+        /// The feedback cycle answered with its last.
+        last_cycle: Cycle,
         /// Hash over what the commands meant; see `controller::digest`.
         digest: u64,
         /// Samples behind the root mean squares.

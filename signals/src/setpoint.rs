@@ -19,7 +19,8 @@ sample! {
     /// controller adds from the motor's own speed.
     ///
     /// Played at rate `r` (1 is as planned) and rate change `ṙ` [1/s], the effort is
-    /// `static_effort + (effort − static_effort)·r² + momentum·ṙ` and the lead `lead·r²`.
+    /// `static_effort + (effort − static_effort)·r² + momentum·ṙ`, and the lead is
+    /// `lead·r² + lead_momentum·ṙ` up to the small part of the transmission's damping.
     Setpoint = "graver.Setpoint.v1" {
         /// The stream this sample belongs to; one job is one stream. Never 0.
         stream: u64,
@@ -52,6 +53,8 @@ sample! {
         /// How far the motor side is ahead of the load side through the elastic transmission, in
         /// joint units [m or rad].
         lead: AxisArray,
+        /// The lead per unit of rate change [m·s or rad·s].
+        lead_momentum: AxisArray,
         /// Torque of the motor for this motion, rotor included, friction excluded [N·m].
         effort: AxisArray,
         /// The part of `effort` that does not move with the rate: gravity [N·m].
