@@ -1,0 +1,329 @@
+//! Words of a line: a letter and a number, and what may stand around them.
+//!
+//! Own rather than the crate `gcode` (0.7), which reads numbers as `f32`: seven digits cannot hold
+//! a coordinate to the nanometre, and its recovery from errors would skip what must be refused.
+
+use std::ops::Range;
+
+use super::error::Refusal;
+
+/// Largest magnitude of a number in a program: far beyond any machine, and small enough that no
+/// sum or product of such numbers overflows.
+const LARGEST: f64 = 1e9;
+
+/// Powers of ten that a double holds exactly.
+const POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
+    1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
+];
+
+/// A letter and its number.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Word {
+    /// The letter in upper case.
+    pub(super) letter: u8,
+    pub(super) number: f64,
+    /// Bytes in the text.
+    pub(super) span: Range<usize>,
+}
+
+/// What a line has next.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Token {
+    Word(Word),
+    /// `/` as the first thing of a line.
+    Delete,
+    /// `%`, with its place.
+    Tape(usize),
+}
+
+/// Reads the tokens of one line from left to right, without allocating.
+pub(super) struct Words<'a> {
+    text: &'a str,
+    at: usize,
+    end: usize,
+    /// Whether anything but blanks and comments has been read.
+    begun: bool,
+}
+
+impl<'a> Words<'a> {
+    /// Over the bytes of one line of `text`, without its line feed.
+    pub(super) fn new(text: &'a str, line: Range<usize>) -> Self {
+        Self { text, at: line.start, end: line.end, begun: false }
+    }
+
+    /// The next token, `None` at the end of the line.
+    pub(super) fn next(&mut self) -> Result<Option<Token>, Box<Refusal>> {
+        loop {
+            let Some(byte) = self.peek() else { return Ok(None) };
+            let first = !self.begun;
+            match byte {
+                b' ' | b'\t' | b'\r' => self.at += 1,
+                b'(' => self.comment()?,
+                b';' => self.at = self.end,
+                b'/' if first => {
+                    self.begun = true;
+                    return Ok(Some(Token::Delete));
+                }
+                b'%' => {
+                    self.begun = true;
+                    self.at += 1;
+                    return Ok(Some(Token::Tape(self.at - 1)));
+                }
+                _ if byte.is_ascii_alphabetic() => {
+                    self.begun = true;
+                    return self.word(byte.to_ascii_uppercase()).map(|word| Some(Token::Word(word)));
+                }
+                _ => return Err(self.stray()),
+            }
+        }
+    }
+
+    fn peek(&self) -> Option<u8> {
+        if self.at < self.end { self.text.as_bytes().get(self.at).copied() } else { None }
+    }
+
+    fn blanks(&mut self) {
+        while matches!(self.peek(), Some(b' ' | b'\t' | b'\r')) {
+            self.at += 1;
+        }
+    }
+
+    /// Passes over `( … )`.
+    fn comment(&mut self) -> Result<(), Box<Refusal>> {
+        let start = self.at;
+        self.at += 1;
+        while let Some(byte) = self.peek() {
+            match byte {
+                b')' => {
+                    self.at += 1;
+                    return Ok(());
+                }
+                b'(' => {
+                    return Err(Refusal::new(
+                        self.at..self.at + 1,
+                        "a comment begins inside a comment",
+                        "second (",
+                        "close the first comment with ) before, or use square brackets inside it",
+                    ));
+                }
+                _ => self.at += 1,
+            }
+        }
+        Err(Refusal::new(
+            start..start + 1,
+            "a comment is not closed on its line",
+            "opened here",
+            "close it with ) on the same line, or begin it with ;",
+        ))
+    }
+
+    fn word(&mut self, letter: u8) -> Result<Word, Box<Refusal>> {
+        let start = self.at;
+        self.at += 1;
+        self.blanks();
+        let name = char::from(letter);
+        if letter == b'O' {
+            return Err(Refusal::new(
+                start..self.at,
+                "O words (subroutines, loops, conditions, program numbers) are not supported",
+                "O word",
+                "write the moves out, or delete a mere program number",
+            ));
+        }
+        let digits = self.at;
+        let negative = self.peek() == Some(b'-');
+        if negative || self.peek() == Some(b'+') {
+            self.at += 1;
+            self.blanks();
+        }
+        let unsigned = self.at;
+        let mut mantissa = 0_u64;
+        let mut count = 0_usize;
+        let mut decimals = None;
+        loop {
+            match self.peek() {
+                Some(digit @ b'0'..=b'9') => {
+                    mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(digit - b'0'));
+                    count += 1;
+                    if let Some(places) = &mut decimals {
+                        *places += 1;
+                    }
+                }
+                Some(b'.') if decimals.is_none() => decimals = Some(0_usize),
+                _ => break,
+            }
+            self.at += 1;
+        }
+        if count == 0 {
+            return Err(self.no_number(name, start, digits));
+        }
+        // Up to 15 digits the mantissa and the power of ten are exact, and so their quotient is
+        // the correctly rounded number; a longer one takes the library's way to the same.
+        let places = decimals.unwrap_or(0);
+        let magnitude = if count <= 15 {
+            mantissa as f64 / POWERS[places]
+        } else {
+            self.text[unsigned..self.at].parse().unwrap_or(f64::INFINITY)
+        };
+        // Negated `<=`, so that it holds for NaN too.
+        if !(magnitude <= LARGEST) {
+            return Err(Refusal::new(
+                start..self.at,
+                format!("the number of {name} is too large"),
+                format!("beyond {LARGEST:e}"),
+                format!("numbers lie between -{LARGEST:e} and {LARGEST:e}"),
+            ));
+        }
+        let number = if negative { -magnitude } else { magnitude };
+        let span = start..self.at;
+        self.after_number(name)?;
+        Ok(Word { letter, number, span })
+    }
+
+    /// What stands where the number of a word was due.
+    fn no_number(&self, name: char, start: usize, digits: usize) -> Box<Refusal> {
+        let wanted = format!("write a decimal number after {name}, such as {name}10 or {name}-2.5");
+        match self.text.as_bytes()[..self.end].get(digits) {
+            Some(b'#') => Refusal::new(
+                digits..digits + 1,
+                "parameters (#) are not supported",
+                "parameter",
+                wanted,
+            ),
+            Some(b'[') => Refusal::new(
+                digits..digits + 1,
+                "expressions ([ ]) are not supported",
+                "expression",
+                wanted,
+            ),
+            _ => Refusal::new(
+                start..self.at.max(start + 1),
+                format!("{name} has no number"),
+                "no number",
+                wanted,
+            ),
+        }
+    }
+
+    /// Refuses what would read as part of the number that has just ended.
+    fn after_number(&mut self, name: char) -> Result<(), Box<Refusal>> {
+        self.blanks();
+        let at = self.at;
+        match self.peek() {
+            Some(b'0'..=b'9' | b'.' | b'+' | b'-') => Err(Refusal::new(
+                at..at + 1,
+                format!("{name} has more than one number"),
+                "second number",
+                "write one number after each letter, without blanks inside it",
+            )),
+            Some(b',') => Err(Refusal::new(
+                at..at + 1,
+                "a comma cannot stand in a number",
+                "comma",
+                "write the decimal sign as a point",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// What stands where a word was due.
+    fn stray(&self) -> Box<Refusal> {
+        let rest = &self.text[self.at..self.end];
+        let character = rest.chars().next().unwrap_or('\u{fffd}');
+        let span = self.at..self.at + character.len_utf8();
+        let (message, help) = match character {
+            '#' => ("parameters (#) are not supported".to_owned(), "write the numbers out"),
+            '[' | ']' => ("expressions ([ ]) are not supported".to_owned(), "write the number out"),
+            '*' => ("checksums (*) are not supported".to_owned(), "save the program without them"),
+            '/' => (
+                "/ stands inside a line".to_owned(),
+                "block delete (/) is the first character of a line",
+            ),
+            ')' => ("a comment is closed that was not opened".to_owned(), "open it with ("),
+            '0'..='9' | '.' | '+' | '-' => {
+                ("a number without a letter".to_owned(), "a word is a letter and a number: X10")
+            }
+            _ => (
+                format!("unexpected character {character:?}"),
+                "a line consists of words such as G1, X10 or F600, and of comments in ( ) or after ;",
+            ),
+        };
+        Refusal::new(span, message, "not a word", help)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    fn words(line: &str) -> Result<Vec<(char, f64)>, Box<Refusal>> {
+        let mut words = Words::new(line, 0..line.len());
+        let mut read = Vec::new();
+        while let Some(token) = words.next()? {
+            match token {
+                Token::Word(word) => read.push((char::from(word.letter), word.number)),
+                other => panic!("{other:?}"),
+            }
+        }
+        Ok(read)
+    }
+
+    #[test]
+    fn a_word_is_read_whatever_its_case_and_blanks() {
+        assert_eq!(words("g0x10 y 2").unwrap(), [('G', 0.0), ('X', 10.0), ('Y', 2.0)]);
+        assert_eq!(
+            words("N10 G01 X-.5 Y+5. Z - 0.25;end").unwrap(),
+            [('N', 10.0), ('G', 1.0), ('X', -0.5), ('Y', 5.0), ('Z', -0.25)]
+        );
+        assert_eq!(words("(a) X1 (b;c) Y2 (d)\r").unwrap(), [('X', 1.0), ('Y', 2.0)]);
+    }
+
+    #[test]
+    fn a_number_is_the_nearest_double() {
+        for text in [
+            "0.1",
+            "123.456",
+            "99999.9999999999",
+            "0.12345678901234567890123",
+            "1.00000000000000000000000000000001",
+            "000000000000000000000000000007.25",
+            "999999999.99999",
+            "0.30000000000000004",
+        ] {
+            let expected: f64 = text.parse().unwrap();
+            assert_eq!(words(&format!("X{text}")).unwrap(), [('X', expected)], "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_word_is_named_with_its_place() {
+        let check = |line: &str, start: usize, message: &str| {
+            let refusal = words(line).unwrap_err();
+            assert_eq!((refusal.span.start, refusal.message.as_str()), (start, message), "{line}");
+        };
+        check("G1 X", 3, "X has no number");
+        check("G1 X Y2", 3, "X has no number");
+        check("X-", 0, "X has no number");
+        check("X.", 0, "X has no number");
+        check("Xnan", 0, "X has no number");
+        check("X#1", 1, "parameters (#) are not supported");
+        check("X[1+2]", 1, "expressions ([ ]) are not supported");
+        check("#1=5", 0, "parameters (#) are not supported");
+        check("O100 sub", 0, "O words (subroutines, loops, conditions, program numbers) are not supported");
+        check("X1 2", 3, "X has more than one number");
+        check("X1.2.3", 4, "X has more than one number");
+        check("X1,5", 2, "a comma cannot stand in a number");
+        check("X2000000000", 0, "the number of X is too large");
+        check("G1 10", 3, "G has more than one number");
+        check("10", 0, "a number without a letter");
+        check("X1 (a", 3, "a comment is not closed on its line");
+        check("(a (b) c)", 3, "a comment begins inside a comment");
+        check("X1 )", 3, "a comment is closed that was not opened");
+        check("X1 é", 3, "unexpected character 'é'");
+        check("X1*71", 2, "checksums (*) are not supported");
+        check("X1 / Y", 3, "/ stands inside a line");
+    }
+}
