@@ -20,7 +20,7 @@ pub struct Drawing {
 }
 
 /// One remark on a job, such as a code that was accepted without effect.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 pub struct Note {
     /// Line of the job file from 1, 0 for none.
     pub line: u64,
