@@ -1,1 +1,31 @@
-//! placeholder
+//! What lies between the stages of Graver and the computer: shared-memory channels, the clock,
+//! real-time threads, and processes that watch each other.
+//!
+//! The only crate with `unsafe`, libc and iceoryx2. It knows how a sample travels and never what it
+//! means. A pipeline is one [`Domain`](domain::Domain): its holder creates every channel, the
+//! services join and only open them, and whoever leaves last removes what is left.
+//!
+//! Order in a service: join the domain, make all ports, helper threads and peers, then
+//! [`thread::enter_realtime`], then the cycle. After that nothing here allocates, except the one
+//! small block inside iceoryx2 for each [`Publisher::publish`](channel::Publisher::publish).
+
+pub mod allocation;
+pub mod channel;
+pub mod child;
+pub mod clock;
+pub mod domain;
+pub mod event_ring;
+pub mod instance;
+mod lock;
+mod membership;
+pub mod operator;
+pub mod peer;
+pub mod period;
+pub mod signal;
+pub mod socket;
+pub mod thread;
+pub mod wake;
+
+pub use channel::{Publisher, Reading, Subscriber};
+pub use domain::{Domain, DomainError, Role};
+pub use instance::Instance;

@@ -1,0 +1,350 @@
+//! Typed channels: which sample travels with which quality, and the ports at its two ends.
+//!
+//! Every sample is stamped with its publisher's serial number in the header, so that a reader
+//! counts what it lost without knowing what the sample means.
+
+use std::any::Any;
+use std::fmt::Debug;
+use std::marker::PhantomData;
+
+use iceoryx2::node::Node;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::{
+    AttributeSpecifier, AttributeVerifier, BackpressureStrategy, ZeroCopySend, ipc,
+};
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use signals::{
+    Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress, Sample,
+    Setpoint,
+};
+
+use crate::domain::{Domain, Keep};
+
+/// How long a reader of [`Reading::Every`] may be away from a 1 kHz channel without a loss, in
+/// samples.
+pub const DEEP: usize = 4096;
+
+/// Setpoints under way at most; the planner's own limit is the room that the controller reports.
+pub const SETPOINTS_UNDER_WAY: usize = 2048;
+
+/// Samples of a status channel that wait for a reader who looks a few times a second.
+const STATUS_DEPTH: usize = 64;
+
+/// How a channel treats a reader that does not keep up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quality {
+    /// The oldest sample makes room, and late joiners get the newest one.
+    Newest {
+        /// Samples that a reader of [`Reading::Every`] can have waiting.
+        depth: usize,
+    },
+    /// Nothing makes room: the publisher is told that the buffer is full.
+    Complete {
+        /// Samples that can be under way.
+        depth: usize,
+    },
+}
+
+/// A sample that has a channel in every domain.
+pub trait Channel: Sample {
+    /// The name of the channel.
+    const SERVICE: &'static str;
+    /// How it treats a reader that does not keep up.
+    const QUALITY: Quality;
+    /// How many readers there can be.
+    const READERS: usize = 4;
+}
+
+impl Channel for Feedback {
+    const SERVICE: &'static str = "feedback";
+    const QUALITY: Quality = Quality::Newest { depth: DEEP };
+}
+
+impl Channel for Command {
+    const SERVICE: &'static str = "commands";
+    const QUALITY: Quality = Quality::Newest { depth: DEEP };
+}
+
+impl Channel for Setpoint {
+    const SERVICE: &'static str = "setpoints";
+    const QUALITY: Quality = Quality::Complete { depth: SETPOINTS_UNDER_WAY };
+    // A second reader that stands still would hold the planner up.
+    const READERS: usize = 1;
+}
+
+impl Channel for Progress {
+    const SERVICE: &'static str = "progress";
+    const QUALITY: Quality = Quality::Newest { depth: STATUS_DEPTH };
+}
+
+impl Channel for ControllerReport {
+    const SERVICE: &'static str = "controller-reports";
+    const QUALITY: Quality = Quality::Newest { depth: STATUS_DEPTH };
+}
+
+impl Channel for DrivesReport {
+    const SERVICE: &'static str = "drives-reports";
+    const QUALITY: Quality = Quality::Newest { depth: STATUS_DEPTH };
+}
+
+impl Channel for PlannerReport {
+    const SERVICE: &'static str = "planner-reports";
+    const QUALITY: Quality = Quality::Newest { depth: STATUS_DEPTH };
+}
+
+impl Channel for JobOffer {
+    const SERVICE: &'static str = "job-offers";
+    const QUALITY: Quality = Quality::Newest { depth: STATUS_DEPTH };
+}
+
+/// Why a channel could not be opened or used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ChannelError {
+    /// Another build of Graver runs this domain.
+    #[error(
+        "channel {channel:?} carries another layout of {sample} than this build's: all processes \
+         of an instance must be the same build"
+    )]
+    Layout {
+        /// The channel.
+        channel: &'static str,
+        /// The type's name and version.
+        sample: &'static str,
+    },
+    /// iceoryx2 refused to create or open it.
+    #[error("channel {channel:?} could not be opened: {reason}")]
+    Refused {
+        /// The channel.
+        channel: &'static str,
+        /// What iceoryx2 said.
+        reason: String,
+    },
+    /// An open channel failed; the domain is damaged. Does not allocate.
+    #[error("channel {channel:?} failed")]
+    Lost {
+        /// The channel.
+        channel: &'static str,
+    },
+}
+
+/// Which samples a reader wants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reading {
+    /// Only the newest one, for a cycle.
+    Newest,
+    /// Every one, in order, losses counted.
+    Every,
+}
+
+/// A sample as iceoryx2 carries it.
+#[derive(Debug, Clone, Copy)]
+#[repr(transparent)]
+pub(crate) struct Wire<T: Sample>(pub(crate) T);
+
+// SAFETY: a `Sample` is fixed-size, has neither padding nor references (the zerocopy bounds prove
+// it), and any bit pattern is valid. The name has a version, and the layout hash is checked.
+#[allow(unsafe_code)]
+unsafe impl<T: Sample> ZeroCopySend for Wire<T> {
+    unsafe fn type_name() -> &'static str {
+        T::NAME
+    }
+}
+
+/// The publisher's count of samples, from 1, beside each sample.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(transparent)]
+struct Serial(u64);
+
+// SAFETY: a transparent u64.
+#[allow(unsafe_code)]
+unsafe impl ZeroCopySend for Serial {
+    unsafe fn type_name() -> &'static str {
+        "graver.Serial.v1"
+    }
+}
+
+type Factory<T> = PortFactory<ipc::Service, Wire<T>, Serial>;
+
+/// The service attribute that holds the layout hash.
+const LAYOUT_KEY: &str = "layout";
+
+fn refused<T: Channel>(reason: impl Debug) -> ChannelError {
+    ChannelError::Refused { channel: T::SERVICE, reason: format!("{reason:?}") }
+}
+
+fn lost<T: Channel>() -> ChannelError {
+    ChannelError::Lost { channel: T::SERVICE }
+}
+
+macro_rules! attribute {
+    ($set:expr, $define:ident, $sample:ty) => {{
+        let key = LAYOUT_KEY.try_into().map_err(refused::<$sample>)?;
+        let layout = format!("{:016x}", <$sample as Sample>::LAYOUT);
+        let value = layout.as_str().try_into().map_err(refused::<$sample>)?;
+        $set.$define(&key, &value).map_err(refused::<$sample>)?
+    }};
+}
+
+pub(crate) fn create<T: Channel>(
+    node: &Node<ipc::Service>,
+) -> Result<Box<dyn Any + Send + Sync>, ChannelError> {
+    let (overflow, history, depth) = match T::QUALITY {
+        Quality::Newest { depth } => (true, 1, depth),
+        Quality::Complete { depth } => (false, 0, depth),
+    };
+    let name = T::SERVICE.try_into().map_err(refused::<T>)?;
+    let factory = node
+        .service_builder(&name)
+        .publish_subscribe::<Wire<T>>()
+        .user_header::<Serial>()
+        .enable_safe_overflow(overflow)
+        .history_size(history)
+        .subscriber_max_buffer_size(depth)
+        .subscriber_max_borrowed_samples(2)
+        .max_publishers(1)
+        .max_subscribers(T::READERS)
+        .max_nodes(16)
+        .create_with_attributes(&attribute!(AttributeSpecifier::new(), define, T))
+        .map_err(refused::<T>)?;
+    Ok(Box::new(factory))
+}
+
+fn open<T: Channel>(domain: &Domain) -> Result<Factory<T>, ChannelError> {
+    use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as Error;
+    let name = T::SERVICE.try_into().map_err(refused::<T>)?;
+    domain
+        .node()
+        .service_builder(&name)
+        .publish_subscribe::<Wire<T>>()
+        .user_header::<Serial>()
+        .open_with_attributes(&attribute!(AttributeVerifier::new(), require, T))
+        .map_err(|error| match error {
+            Error::IncompatibleTypes | Error::IncompatibleAttributes => {
+                ChannelError::Layout { channel: T::SERVICE, sample: T::NAME }
+            }
+            other => refused::<T>(other),
+        })
+}
+
+/// The writing end of a channel.
+#[derive(Debug)]
+pub struct Publisher<T: Channel> {
+    port: iceoryx2::port::publisher::Publisher<ipc::Service, Wire<T>, Serial>,
+    serial: u64,
+    _keep: Keep,
+}
+
+impl<T: Channel> Publisher<T> {
+    pub(crate) fn open(domain: &Domain) -> Result<Self, ChannelError> {
+        let factory = open::<T>(domain)?;
+        let port = factory
+            .publisher_builder()
+            .max_loaned_samples(1)
+            // The default would wait for a reader that stands still.
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(refused::<T>)?;
+        Ok(Self { port, serial: 0, _keep: domain.keep() })
+    }
+
+    /// Publishes one sample; never waits.
+    ///
+    /// `false` when it reached no reader: on a [`Quality::Complete`] channel the buffer is full or
+    /// there is no reader yet, and the same sample must be published again. On the other channels
+    /// `false` only says that nobody listens now.
+    ///
+    /// Allocates once: iceoryx2 0.10 keeps 48 bytes for each loan and frees them here.
+    pub fn publish(&mut self, sample: &T) -> Result<bool, ChannelError> {
+        let mut loan = self.port.loan_uninit().map_err(|_| lost::<T>())?;
+        *loan.user_header_mut() = Serial(self.serial + 1);
+        let readers = loan.write_payload(Wire(*sample)).send().map_err(|_| lost::<T>())?;
+        if readers > 0 || matches!(T::QUALITY, Quality::Newest { .. }) {
+            self.serial += 1;
+        }
+        Ok(readers > 0)
+    }
+
+    /// Hands the newest sample to readers that came since the last publish; for channels that are
+    /// rarely published. Not for a cycle: attaching a reader takes up to half a millisecond.
+    pub fn refresh(&self) -> Result<(), ChannelError> {
+        self.port.update_connections().map_err(|_| lost::<T>())
+    }
+}
+
+/// The reading end of a channel.
+#[derive(Debug)]
+pub struct Subscriber<T: Channel> {
+    port: iceoryx2::port::subscriber::Subscriber<ipc::Service, Wire<T>, Serial>,
+    origin: Option<u128>,
+    serial: u64,
+    lost: u64,
+    epoch: u32,
+    _sample: PhantomData<T>,
+    _keep: Keep,
+}
+
+impl<T: Channel> Subscriber<T> {
+    pub(crate) fn open(domain: &Domain, reading: Reading) -> Result<Self, ChannelError> {
+        let factory = open::<T>(domain)?;
+        let (depth, history) = match T::QUALITY {
+            Quality::Newest { depth } => (depth, 1),
+            Quality::Complete { depth } => (depth, 0),
+        };
+        let size = match reading {
+            Reading::Newest => 1,
+            Reading::Every => depth,
+        };
+        let port = factory
+            .subscriber_builder()
+            .buffer_size(size)
+            .history_request(history)
+            .create()
+            .map_err(refused::<T>)?;
+        let keep = domain.keep();
+        Ok(Self {
+            port,
+            origin: None,
+            serial: 0,
+            lost: 0,
+            epoch: 0,
+            _sample: PhantomData,
+            _keep: keep,
+        })
+    }
+
+    /// The next sample, if one waits. Does not allocate.
+    pub fn next(&mut self) -> Result<Option<T>, ChannelError> {
+        let Some(sample) = self.port.receive().map_err(|_| lost::<T>())? else { return Ok(None) };
+        let serial = sample.user_header().0;
+        let origin = Some(sample.origin().value());
+        if origin == self.origin {
+            self.lost += serial.saturating_sub(self.serial + 1);
+        } else {
+            self.origin = origin;
+            self.epoch += 1;
+        }
+        self.serial = serial;
+        Ok(Some(sample.payload().0))
+    }
+
+    /// The newest sample that waits, all older ones dropped. Does not allocate.
+    pub fn newest(&mut self) -> Result<Option<T>, ChannelError> {
+        let mut newest = None;
+        while let Some(sample) = self.next()? {
+            newest = Some(sample);
+        }
+        Ok(newest)
+    }
+
+    /// Samples of the present publisher and its predecessors that this reader never saw, from its
+    /// first sample on.
+    pub fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// How many publishers this reader has heard: 0 before the first sample, and one more whenever
+    /// the publisher is a new one.
+    pub fn epoch(&self) -> u32 {
+        self.epoch
+    }
+}

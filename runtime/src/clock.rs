@@ -1,0 +1,115 @@
+//! The monotonic clock, sleeping until an absolute instant, and the deadlines of a cycle.
+
+use signals::Nanoseconds;
+
+const SECOND: i64 = 1_000_000_000;
+
+/// The monotonic clock, which every stamp in a sample is from.
+pub fn now() -> Nanoseconds {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `time` is a valid timespec for the kernel to fill; CLOCK_MONOTONIC always exists.
+    #[allow(unsafe_code)]
+    unsafe {
+        libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time)
+    };
+    Nanoseconds(time.tv_sec * SECOND + time.tv_nsec)
+}
+
+pub(crate) fn timespec(time: Nanoseconds) -> libc::timespec {
+    libc::timespec { tv_sec: time.0 / SECOND, tv_nsec: time.0 % SECOND }
+}
+
+/// Sleeps until `deadline` [monotonic ns]; at once when it has passed. Goes on sleeping after a
+/// signal.
+pub fn sleep_until(deadline: Nanoseconds) {
+    let until = timespec(Nanoseconds(deadline.0.max(0)));
+    loop {
+        // SAFETY: `until` is a normalised timespec; an absolute sleep writes no remainder.
+        #[allow(unsafe_code)]
+        let result = unsafe {
+            libc::clock_nanosleep(
+                libc::CLOCK_MONOTONIC,
+                libc::TIMER_ABSTIME,
+                &until,
+                std::ptr::null_mut(),
+            )
+        };
+        if result != libc::EINTR {
+            return;
+        }
+    }
+}
+
+/// Sleeps until `margin` before `deadline` and spins through the rest, for a wake-up that does not
+/// carry the timer's lateness. A margin of 0 only sleeps.
+pub fn sleep_then_spin_until(deadline: Nanoseconds, margin: Nanoseconds) {
+    sleep_until(deadline - margin);
+    while now() < deadline {
+        std::hint::spin_loop();
+    }
+}
+
+/// The absolute deadlines of a cycle: `start + n × period`, without drift.
+#[derive(Debug, Clone)]
+pub struct PeriodicClock {
+    period: Nanoseconds,
+    margin: Nanoseconds,
+    deadline: Nanoseconds,
+    cycle: u64,
+    overruns: u64,
+}
+
+impl PeriodicClock {
+    /// A clock whose cycle 0 has its deadline one period from now.
+    ///
+    /// `margin` [ns] is how long before a deadline the sleep ends and spinning begins, 0 for none.
+    pub fn new(period: Nanoseconds, margin: Nanoseconds) -> Self {
+        Self { period, margin, deadline: now() + period, cycle: 0, overruns: 0 }
+    }
+
+    /// The deadline that is next, or at which [`Self::wait`] returned last until
+    /// [`Self::advance`].
+    pub fn deadline(&self) -> Nanoseconds {
+        self.deadline
+    }
+
+    /// The cycle that begins at [`Self::deadline`].
+    pub fn cycle(&self) -> u64 {
+        self.cycle
+    }
+
+    /// The period.
+    pub fn period(&self) -> Nanoseconds {
+        self.period
+    }
+
+    /// Cycles so far whose work had not ended at the next deadline, slips included.
+    pub fn overruns(&self) -> u64 {
+        self.overruns
+    }
+
+    /// Sleeps until the deadline. One that has passed already counts as an overrun and is met at
+    /// once: cycles are late then, but none is left out.
+    pub fn wait(&mut self) {
+        if now() >= self.deadline {
+            self.overruns += 1;
+        } else {
+            sleep_then_spin_until(self.deadline, self.margin);
+        }
+    }
+
+    /// Goes on to the next cycle; returns its deadline.
+    pub fn advance(&mut self) -> Nanoseconds {
+        self.cycle += 1;
+        self.deadline = self.deadline + self.period;
+        self.deadline
+    }
+
+    /// Moves this and all later deadlines so that this one is not before now: for drives that can
+    /// wait. Returns by how much [ns], 0 when nothing had passed; does not count an overrun.
+    pub fn slip(&mut self) -> Nanoseconds {
+        let late = Nanoseconds((now() - self.deadline).0.max(0));
+        self.deadline = self.deadline + late;
+        late
+    }
+}

@@ -1,0 +1,66 @@
+//! Ctrl-C and SIGTERM as a flag that loops look at.
+
+use std::io;
+use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
+
+static COUNT: AtomicU32 = AtomicU32::new(0);
+static LAST: AtomicI32 = AtomicI32::new(0);
+
+/// A request to end that came as a signal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Termination {
+    /// The newest signal, `SIGINT` or `SIGTERM`.
+    pub signal: i32,
+    /// How many came so far; a second Ctrl-C means that the person is in a hurry.
+    pub count: u32,
+}
+
+extern "C" fn note(signal: libc::c_int) {
+    LAST.store(signal, Ordering::Relaxed);
+    COUNT.fetch_add(1, Ordering::Release);
+}
+
+/// Makes SIGINT and SIGTERM set the flag instead of ending the process. System calls that wait
+/// come back with `EINTR`, so that loops look at the flag at once.
+pub fn install() -> io::Result<()> {
+    for signal in [libc::SIGINT, libc::SIGTERM] {
+        // SAFETY: all zeros is a valid sigaction (no flags, empty mask), completed below.
+        #[allow(unsafe_code)]
+        let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
+        let handler: extern "C" fn(libc::c_int) = note;
+        action.sa_sigaction = handler as libc::sighandler_t;
+        // SAFETY: the handler only stores to atomics, which is async-signal-safe; the old action
+        // is not asked for.
+        #[allow(unsafe_code)]
+        if unsafe { libc::sigaction(signal, &action, std::ptr::null_mut()) } != 0 {
+            return Err(io::Error::last_os_error());
+        }
+    }
+    Ok(())
+}
+
+/// The request to end, if one came.
+pub fn termination() -> Option<Termination> {
+    match COUNT.load(Ordering::Acquire) {
+        0 => None,
+        count => Some(Termination { signal: LAST.load(Ordering::Relaxed), count }),
+    }
+}
+
+/// Keeps SIGINT and SIGTERM away from the calling thread; another thread of the process gets them.
+pub fn block() -> io::Result<()> {
+    // SAFETY: `set` is initialised by sigemptyset before anything reads it, and the old mask is
+    // not asked for.
+    #[allow(unsafe_code)]
+    let result = unsafe {
+        let mut set: libc::sigset_t = std::mem::zeroed();
+        libc::sigemptyset(&mut set);
+        libc::sigaddset(&mut set, libc::SIGINT);
+        libc::sigaddset(&mut set, libc::SIGTERM);
+        libc::pthread_sigmask(libc::SIG_BLOCK, &set, std::ptr::null_mut())
+    };
+    match result {
+        0 => Ok(()),
+        code => Err(io::Error::from_raw_os_error(code)),
+    }
+}

@@ -1,0 +1,219 @@
+//! Making the calling thread real-time, as far as this computer and user allow.
+//!
+//! Nothing here fails: without privileges the pipeline runs all the same, and what is missing is
+//! said once, with the way to get it.
+//!
+//! A SCHED_FIFO thread that never sleeps is stopped by the kernel for 50 ms every second (real-time
+//! throttling), so a cycle may spin only briefly before its deadline.
+
+use std::fs::File;
+use std::io::{self, Write};
+
+use core_affinity::CoreId;
+use signals::RealtimeFacts;
+
+/// Priority of the drives' cycle, above the controller on the same core.
+pub const DRIVES_PRIORITY: i32 = 85;
+
+/// Priority of the controller's cycle.
+pub const CONTROLLER_PRIORITY: i32 = 80;
+
+/// Stack that is touched ahead, so that a cycle meets no page fault there [bytes].
+const STACK: usize = 256 * 1024;
+
+/// What locked memory may grow by after the set-up [bytes].
+const HEADROOM: u64 = 64 << 20;
+
+/// Bits of the effective capabilities; capabilities(7).
+const CAP_IPC_LOCK: u32 = 14;
+
+/// Where a real-time thread runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Placement {
+    /// The last CPU that the process may use, and only with a real-time priority: without, the
+    /// scheduler finds better places than a fixed one.
+    #[default]
+    Automatic,
+    /// This CPU.
+    Core(usize),
+    /// Wherever the scheduler likes.
+    Anywhere,
+}
+
+/// What a thread asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RealtimeOptions {
+    /// SCHED_FIFO priority 1..=99; `None` for the ordinary scheduler.
+    pub priority: Option<i32>,
+    /// Where to run.
+    pub placement: Placement,
+    /// Whether to lock the process's memory.
+    pub lock_memory: bool,
+}
+
+/// What a thread got; keep it as long as the thread is real-time.
+#[derive(Debug)]
+pub struct Realtime {
+    /// The facts, as reports carry them.
+    pub facts: RealtimeFacts,
+    /// What is missing and how to get it, one sentence each.
+    pub warnings: Vec<String>,
+    /// While open, the CPUs stay out of deep sleep states.
+    _awake: Option<File>,
+}
+
+/// The last CPU that this process may use. Ask before pinning: afterwards only the pinned one is
+/// allowed.
+pub fn last_core() -> usize {
+    core_affinity::get_core_ids()
+        .and_then(|cores| cores.iter().map(|core| core.id).max())
+        .unwrap_or(0)
+}
+
+/// Makes the calling thread real-time. All ports, helper threads and peers must be there already:
+/// threads made later share its core, and memory mapped later is locked page by page.
+pub fn enter_realtime(options: &RealtimeOptions) -> Realtime {
+    let mut warnings = Vec::new();
+    let mut facts = RealtimeFacts { core: -1, ..RealtimeFacts::default() };
+
+    if options.lock_memory {
+        keep_heap();
+        match lock_memory() {
+            Ok(()) => facts.locked = 1,
+            Err(reason) => warnings.push(reason),
+        }
+        touch_stack();
+    }
+    if let Some(priority) = options.priority {
+        match set_fifo(priority) {
+            Ok(()) => {
+                facts.fifo = 1;
+                facts.priority = priority as u32;
+            }
+            Err(error) => warnings.push(format!(
+                "no real-time priority (SCHED_FIFO {priority}: {error}): expect late cycles under \
+                 load; allow it with `LimitRTPRIO=99` in the unit, or the line `USER - rtprio 99` \
+                 in /etc/security/limits.conf and a new login"
+            )),
+        }
+    }
+    let core = match options.placement {
+        Placement::Automatic => (facts.fifo == 1).then(last_core),
+        Placement::Core(core) => Some(core),
+        Placement::Anywhere => None,
+    };
+    if let Some(core) = core {
+        if core_affinity::set_for_current(CoreId { id: core }) {
+            facts.core = core as i32;
+        } else {
+            warnings.push(format!(
+                "not pinned to CPU {core}: this process may use CPUs up to {}; name another core, \
+                 or widen the unit's CPUAffinity",
+                last_core()
+            ));
+        }
+    }
+    tighten_timers();
+    let awake = (facts.fifo == 1).then(forbid_deep_sleep).and_then(Result::ok);
+    Realtime { facts, warnings, _awake: awake }
+}
+
+/// SCHED_FIFO for the calling thread; threads and processes that it starts are ordinary again.
+fn set_fifo(priority: i32) -> io::Result<()> {
+    let parameters = libc::sched_param { sched_priority: priority };
+    let policy = libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK;
+    // SAFETY: pid 0 is the calling thread; `parameters` is valid and only read.
+    #[allow(unsafe_code)]
+    match unsafe { libc::sched_setscheduler(0, policy, &parameters) } {
+        -1 => Err(io::Error::last_os_error()),
+        _ => Ok(()),
+    }
+}
+
+/// Locks the memory, unless the limit says that a later allocation would be refused for it.
+fn lock_memory() -> Result<(), String> {
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // SAFETY: `limit` is a valid rlimit for the kernel to fill.
+    #[allow(unsafe_code)]
+    let known = unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &mut limit) } == 0;
+    let needed = virtual_memory() + HEADROOM;
+    let unlimited = limit.rlim_cur == libc::RLIM_INFINITY || capable(CAP_IPC_LOCK);
+    if known && !unlimited && limit.rlim_cur < needed {
+        return Err(format!(
+            "memory is not locked: the limit is {} MiB and this process needs {} MiB: expect page \
+             faults in a cycle; raise it with `LimitMEMLOCK=infinity` in the unit, or the line \
+             `USER - memlock unlimited` in /etc/security/limits.conf and a new login",
+            limit.rlim_cur >> 20,
+            needed >> 20,
+        ));
+    }
+    // SAFETY: mlockall takes only flags.
+    #[allow(unsafe_code)]
+    match unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } {
+        0 => Ok(()),
+        _ => Err(format!(
+            "memory is not locked: {}; expect page faults in a cycle",
+            io::Error::last_os_error()
+        )),
+    }
+}
+
+/// The address space of this process [bytes], which is what the lock limit is compared with.
+fn virtual_memory() -> u64 {
+    let pages = std::fs::read_to_string("/proc/self/statm")
+        .ok()
+        .and_then(|text| text.split_whitespace().next()?.parse::<u64>().ok());
+    // SAFETY: sysconf takes a constant and has no other preconditions.
+    #[allow(unsafe_code)]
+    let page = unsafe { libc::sysconf(libc::_SC_PAGESIZE) };
+    pages.unwrap_or(0) * page.max(4096) as u64
+}
+
+/// Whether the process has an effective capability.
+fn capable(capability: u32) -> bool {
+    std::fs::read_to_string("/proc/self/status")
+        .ok()
+        .and_then(|text| {
+            let line = text.lines().find_map(|line| line.strip_prefix("CapEff:"))?;
+            u64::from_str_radix(line.trim(), 16).ok()
+        })
+        .is_some_and(|bits| bits >> capability & 1 == 1)
+}
+
+/// Keeps freed memory in the process, so that a block once used is there without a page fault.
+fn keep_heap() {
+    #[cfg(target_env = "gnu")]
+    {
+        // SAFETY: mallopt takes two numbers.
+        #[allow(unsafe_code)]
+        unsafe {
+            libc::mallopt(libc::M_MMAP_MAX, 0);
+            libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
+        }
+    }
+}
+
+#[inline(never)]
+fn touch_stack() {
+    let mut stack = [0u8; STACK];
+    for byte in stack.iter_mut().step_by(4096) {
+        *byte = 1;
+    }
+    std::hint::black_box(&stack);
+}
+
+/// Without it an ordinary thread's sleeps end up to 50 µs late on purpose; timers(7).
+fn tighten_timers() {
+    // SAFETY: PR_SET_TIMERSLACK takes one number and concerns the calling thread only.
+    #[allow(unsafe_code)]
+    unsafe {
+        libc::prctl(libc::PR_SET_TIMERSLACK, 1)
+    };
+}
+
+/// Asks for a wake-up latency of 0 µs as long as the file is open; Linux PM QoS.
+fn forbid_deep_sleep() -> io::Result<File> {
+    let mut file = File::options().write(true).open("/dev/cpu_dma_latency")?;
+    file.write_all(&0i32.to_ne_bytes())?;
+    Ok(file)
+}
