@@ -1,0 +1,319 @@
+//! The judge on synthetic recordings, with numbers worked out by hand.
+#![allow(clippy::unwrap_used)]
+
+use super::*;
+use signals::artwork::Stroke;
+use signals::feedback::status;
+use signals::{Command, Cycle, Feedback, GateEdge, LaserCycle};
+
+type Point = [f64; 3];
+
+const SPEED: f64 = 0.25;
+
+/// A plan by time [s]: where the tool is, which stroke has light, if any.
+struct Plan<'a> {
+    tool: &'a dyn Fn(f64) -> Point,
+    /// `(stroke, from, to)` [s].
+    light: &'a [(u64, f64, f64)],
+    duration: f64,
+}
+
+/// Plays a plan: what the true tool and the true gate edges do is `truth`'s business.
+fn play(
+    plan: &Plan<'_>,
+    truth: impl Fn(f64, Point) -> Point,
+    delay: impl Fn(usize, f64) -> f64,
+) -> Vec<CycleRecord> {
+    let cycles = (plan.duration / CYCLE_TIME).round() as u64;
+    let true_light: Vec<(f64, f64)> = (plan.light.iter().enumerate())
+        .map(|(index, &(_, from, to))| (from + delay(index, from), to + delay(index, to)))
+        .collect();
+    let stroke_in = |from: f64| {
+        let overlaps =
+            plan.light.iter().find(|(_, on, off)| *on < from + CYCLE_TIME && *off > from);
+        overlaps.map_or(0, |(stroke, _, _)| *stroke)
+    };
+    (0..cycles)
+        .map(|cycle| {
+            // The record's own time: a few cycles in, so that stroke times may begin at 0.
+            let time = cycle as f64 * CYCLE_TIME - START;
+            let planned = (plan.tool)(time);
+            CycleRecord {
+                feedback: Feedback {
+                    cycle: Cycle(cycle + FIRST),
+                    command_cycle: Cycle((cycle + FIRST).saturating_sub(1)),
+                    status: status::TOOL_KNOWN,
+                    tool: truth(time, planned),
+                    laser: laser(&true_light, time - CYCLE_TIME),
+                    ..Feedback::default()
+                },
+                command: Command {
+                    cycle: Cycle(cycle + FIRST),
+                    stroke: stroke_in(time + CYCLE_TIME),
+                    mode: 4,
+                    tool: planned,
+                    ..Command::default()
+                },
+            }
+        })
+        .collect()
+}
+
+const FIRST: u64 = 1234;
+const START: f64 = 0.02;
+
+/// The laser in the cycle from `start` [s], for light in these spans [s].
+fn laser(light: &[(f64, f64)], start: f64) -> LaserCycle {
+    let mut edges: Vec<(i64, u32)> = Vec::new();
+    let mut cycle = LaserCycle::OFF;
+    for &(from, to) in light {
+        for (at, gate) in [(from, 1), (to, 0)] {
+            let offset = ((at - start) * 1e9).round() as i64;
+            if offset <= 0 {
+                cycle.gate = gate;
+                cycle.power = f64::from(gate);
+            } else if offset < 1_000_000 {
+                edges.push((offset, gate));
+            }
+        }
+    }
+    edges.sort_unstable();
+    for (offset, gate) in edges {
+        assert!(cycle.push(GateEdge { offset: offset as u32, gate, power: f64::from(gate) }));
+    }
+    cycle
+}
+
+fn straight(from: Point, to: Point) -> Stroke {
+    Stroke { points: vec![from, to], line: 0 }
+}
+
+fn artwork(strokes: Vec<Stroke>) -> Artwork {
+    Artwork { strokes }
+}
+
+/// 20 mm along x at 0.25 m/s from time 0, run-in and run-out going straight on.
+fn along_x(time: f64) -> Point {
+    [SPEED * time, 0.0, 0.0]
+}
+
+const STROKE_TIME: f64 = 0.0801234;
+
+fn one_line() -> Artwork {
+    artwork(vec![straight([0.0; 3], [SPEED * STROKE_TIME, 0.0, 0.0])])
+}
+
+fn one_plan() -> Plan<'static> {
+    Plan { tool: &along_x, light: &[(1, 0.0, STROKE_TIME)], duration: 0.15 }
+}
+
+fn near(value: f64, expected: f64, tolerance: f64, what: &str) {
+    assert!((value - expected).abs() <= tolerance, "{what}: {value:e}, expected {expected:e}");
+}
+
+/// Rounding of gate edges to nanoseconds: 0.25 nm at this speed, at both ends.
+const ROUNDING: f64 = 1e-9;
+
+#[test]
+fn a_perfect_mark_has_no_error() {
+    let marks = judge(&one_line(), &play(&one_plan(), |_, tool| tool, |_, _| 0.0)).unwrap();
+    near(marks.length, SPEED * STROKE_TIME, ROUNDING, "length");
+    for (value, what) in [
+        (marks.missing, "missing"),
+        (marks.double, "double"),
+        (marks.error_max, "error_max"),
+        (marks.tracking_max, "tracking_max"),
+        (marks.missing_end_max, "missing_end_max"),
+        (marks.double_end_max, "double_end_max"),
+        (marks.stray, "stray"),
+    ] {
+        near(value, 0.0, ROUNDING, what);
+    }
+    near(marks.speed_min, SPEED, 1e-12, "speed_min");
+    near(marks.speed_max, SPEED, 1e-12, "speed_max");
+    assert_eq!((marks.strokes_lost, marks.source), (0, Source::Plant));
+}
+
+#[test]
+fn an_offset_is_split_into_contour_and_tracking() {
+    let truth = |_, [x, y, z]: Point| [x - 4e-6, y + 3e-6, z];
+    let marks = judge(&one_line(), &play(&one_plan(), truth, |_, _| 0.0)).unwrap();
+    near(marks.error_max, 3e-6, 1e-12, "error_max");
+    near(marks.error_rms, 3e-6, 1e-12, "error_rms");
+    near(marks.tracking_max, 5e-6, 1e-12, "tracking_max");
+    near(marks.tracking_rms, 5e-6, 1e-12, "tracking_rms");
+    // 4 µm behind the plan: begins before the stroke, ends before its end.
+    near(marks.double_end_max, 4e-6, ROUNDING, "double_end_max");
+    near(marks.missing_end_max, 4e-6, ROUNDING, "missing_end_max");
+}
+
+#[test]
+fn a_gate_0_2_ms_late_costs_50_um_at_each_end() {
+    let marks = judge(&one_line(), &play(&one_plan(), |_, tool| tool, |_, _| 2e-4)).unwrap();
+    near(marks.missing_end_max, 5e-5, ROUNDING, "missing_end_max");
+    near(marks.double_end_max, 5e-5, ROUNDING, "double_end_max");
+    near(marks.missing, 5e-5, ROUNDING, "missing");
+    near(marks.double, 5e-5, ROUNDING, "double");
+    near(marks.error_max, 0.0, ROUNDING, "error_max");
+}
+
+#[test]
+fn a_gate_cycles_early_or_late_is_measured_all_the_same() {
+    for cycles in [-2.0_f64, 3.0] {
+        let delay = cycles * CYCLE_TIME;
+        let marks = judge(&one_line(), &play(&one_plan(), |_, tool| tool, |_, _| delay)).unwrap();
+        let expected = SPEED * delay.abs();
+        near(marks.missing, expected, ROUNDING, "missing");
+        near(marks.double_end_max, expected, ROUNDING, "double_end_max");
+    }
+}
+
+#[test]
+fn a_hold_and_resume_merge_into_one_stroke() {
+    // Closed at 10 mm, on to 12 mm, back to 8 mm, and forward: lit again at `relit`.
+    for (relit, missing, double) in [(0.01, 0.0, 0.0), (0.0107, 7e-4, 0.0), (0.0094, 0.0, 6e-4)] {
+        let tool = |time: f64| {
+            let x = match time {
+                t if t < 0.048 => SPEED * t,
+                t if t < 0.064 => 0.012 - SPEED * (t - 0.048),
+                t => 0.008 + SPEED * (t - 0.064),
+            };
+            [x, 0.0, 0.0]
+        };
+        let on = 0.064 + (relit - 0.008) / SPEED;
+        let end = 0.064 + (SPEED * STROKE_TIME - 0.008) / SPEED;
+        let plan = Plan { tool: &tool, light: &[(1, 0.0, 0.04), (1, on, end)], duration: 0.2 };
+        let marks = judge(&one_line(), &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+        near(marks.missing, missing, ROUNDING, "missing");
+        near(marks.double, double, ROUNDING, "double");
+        near(marks.missing_end_max, 0.0, ROUNDING, "missing_end_max");
+        near(marks.double_end_max, 0.0, ROUNDING, "double_end_max");
+        near(marks.error_max, 0.0, ROUNDING, "error_max");
+    }
+}
+
+/// A V there and back over the same line: two strokes, one place.
+#[test]
+fn strokes_that_touch_do_not_hide_each_other() {
+    let length = 0.01;
+    let art = artwork(vec![
+        straight([0.0; 3], [length, 0.0, 0.0]),
+        straight([length, 0.0, 0.0], [0.0; 3]),
+    ]);
+    let tool =
+        |time: f64| [if time < 0.05 { SPEED * time } else { SPEED * (0.1 - time) }, 0.0, 0.0];
+    let light = [(1, 0.0, 0.04), (2, 0.06, 0.1)];
+    let plan = Plan { tool: &tool, light: &light, duration: 0.15 };
+    let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+    near(marks.missing, 0.0, ROUNDING, "missing");
+    near(marks.double, 0.0, ROUNDING, "double");
+
+    // The second one late by 1 ms: hidden in a picture, not here.
+    let late = |index: usize, _| if index == 1 { 1e-3 } else { 0.0 };
+    let marks = judge(&art, &play(&plan, |_, tool| tool, late)).unwrap();
+    near(marks.missing_end_max, 2.5e-4, ROUNDING, "missing_end_max");
+    near(marks.double_end_max, 2.5e-4, ROUNDING, "double_end_max");
+}
+
+#[test]
+fn a_lost_stroke_is_missing_whole() {
+    let length = SPEED * 0.04;
+    let art = artwork(vec![
+        straight([0.0; 3], [length, 0.0, 0.0]),
+        straight([0.02, 0.0, 0.0], [0.02 + length, 0.0, 0.0]),
+    ]);
+    let light = [(1, 0.0, 0.04)];
+    let plan = Plan { tool: &along_x, light: &light, duration: 0.16 };
+    let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+    near(marks.missing, length, ROUNDING, "missing");
+    near(marks.missing_end_max, length, ROUNDING, "missing_end_max");
+    assert_eq!(marks.strokes_lost, 1);
+}
+
+#[test]
+fn a_closed_circle_starts_and_ends_in_one_place() {
+    let radius = 0.005;
+    let turn = std::f64::consts::TAU * radius / SPEED;
+    let on_circle = |angle: f64| {
+        let (sine, cosine) = signals::math::sin_cos(angle);
+        [radius * cosine, radius * sine, 0.0]
+    };
+    let sides = 1000;
+    let points = (0..=sides)
+        .map(|index| on_circle(std::f64::consts::TAU * f64::from(index) / f64::from(sides)))
+        .collect();
+    let art = artwork(vec![Stroke { points, line: 0 }]);
+    let tool = |time: f64| on_circle(SPEED * time / radius);
+    let light = [(1, 0.0, turn)];
+    let plan = Plan { tool: &tool, light: &light, duration: turn + 0.08 };
+
+    // The chord error of 1000 sides is r(1 − cos(π/1000)) = 25 nm; the cubic's is below 1 nm.
+    let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+    near(marks.error_max, 0.0, 2.6e-8, "error_max");
+    near(marks.missing, 0.0, 2.6e-8, "missing");
+    near(marks.double, 0.0, 2.6e-8, "double");
+    near(marks.length, std::f64::consts::TAU * radius, 3e-6, "length");
+    near(marks.speed_min, SPEED, 1e-6, "speed_min");
+    near(marks.speed_max, SPEED, 1e-6, "speed_max");
+
+    // Late: misses 50 µm of the start and marks them at the end, which is the same place.
+    let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| 2e-4)).unwrap();
+    near(marks.missing_end_max, 5e-5, 2e-8, "missing_end_max");
+    near(marks.double_end_max, 5e-5, 2e-8, "double_end_max");
+    // Early: the other way round.
+    let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| -2e-4)).unwrap();
+    near(marks.missing_end_max, 5e-5, 2e-8, "missing_end_max");
+    near(marks.double_end_max, 5e-5, 2e-8, "double_end_max");
+}
+
+#[test]
+fn a_dot_is_judged_by_distance() {
+    let art = artwork(vec![
+        Stroke { points: vec![[0.01, 0.0, 0.0]], line: 0 },
+        Stroke { points: vec![[0.03, 0.0, 0.0]], line: 0 },
+    ]);
+    let tool = |_: f64| [0.01, 0.0, 0.0];
+    let plan = Plan { tool: &tool, light: &[(1, 0.01, 0.0213)], duration: 0.1 };
+    let truth = |_, [x, y, z]: Point| [x + 3e-6, y - 4e-6, z];
+    let marks = judge(&art, &play(&plan, truth, |_, _| 0.0)).unwrap();
+    near(marks.error_max, 5e-6, 1e-15, "error_max");
+    near(marks.error_rms, 5e-6, 1e-15, "error_rms");
+    assert_eq!((marks.missing, marks.double, marks.double_end_max), (0.0, 0.0, 0.0));
+    assert_eq!((marks.strokes_lost, marks.speed_max), (1, 0.0));
+}
+
+#[test]
+fn light_without_a_stroke_is_stray() {
+    let mut records = play(&one_plan(), |_, tool| tool, |_, _| 0.0);
+    records.iter_mut().for_each(|record| record.command.stroke = 0);
+    let marks = judge(&one_line(), &records).unwrap();
+    near(marks.stray, SPEED * STROKE_TIME, ROUNDING, "stray");
+    near(marks.double, SPEED * STROKE_TIME, ROUNDING, "double");
+    near(marks.missing, SPEED * STROKE_TIME, ROUNDING, "missing");
+}
+
+#[test]
+fn rather_no_judgement_than_a_wrong_one() {
+    let records = play(&one_plan(), |_, tool| tool, |_, _| 0.0);
+    let mut gap = records.clone();
+    gap.drain(50..53);
+    assert_eq!(judge(&one_line(), &gap), Err(Unjudged::SamplesLost { count: 3 }));
+
+    let mut blind = records;
+    blind[60].feedback.status = 0;
+    assert_eq!(judge(&one_line(), &blind), Err(Unjudged::ToolUnknown { cycle: FIRST + 60 }));
+}
+
+#[test]
+fn kinematics_can_tell_where_the_tool_was() {
+    let art = one_line();
+    let mut judge = Judge::new(&art, Source::Feedback);
+    for record in play(&one_plan(), |_, tool| tool, |_, _| 0.0) {
+        let mut blind = record;
+        blind.feedback.status = 0;
+        judge.push_at(&blind, Some(record.feedback.tool));
+    }
+    let marks = judge.finish().unwrap();
+    near(marks.missing, 0.0, ROUNDING, "missing");
+    assert_eq!(marks.source, Source::Feedback);
+}

@@ -1,0 +1,251 @@
+//! `samples.bin`: the records as they stand in memory, behind a header that says what they are.
+
+use super::CycleRecord;
+use signals::{Command, Feedback, Sample, sample};
+use std::io::{self, Read, Write};
+use zerocopy::{FromBytes, FromZeros, IntoBytes};
+
+/// Bytes for a sample's name in the header, unused ones zero.
+const NAME_LENGTH: usize = 32;
+
+sample! {
+    /// The header of `samples.bin`; numbers are little-endian, as in the records.
+    Header = "graver.Recording.v1" {
+        /// [`Header::MAGIC`].
+        magic: u64,
+        /// Hash over this header's own layout.
+        layout: u64,
+        /// Bytes of one record.
+        record_size: u64,
+        /// Layout hash of the feedback.
+        feedback_layout: u64,
+        /// Layout hash of the command.
+        command_layout: u64,
+        /// Name and version of the feedback, UTF-8.
+        feedback: [u8; NAME_LENGTH],
+        /// Name and version of the command, UTF-8.
+        command: [u8; NAME_LENGTH],
+    }
+}
+
+impl Header {
+    /// The file's first eight bytes: `GRAVERec`.
+    pub const MAGIC: u64 = u64::from_le_bytes(*b"GRAVERec");
+
+    /// The header that this build writes.
+    pub fn current() -> Self {
+        Self {
+            magic: Self::MAGIC,
+            layout: Self::LAYOUT,
+            record_size: size_of::<CycleRecord>() as u64,
+            feedback_layout: Feedback::LAYOUT,
+            command_layout: Command::LAYOUT,
+            feedback: name_bytes(Feedback::NAME),
+            command: name_bytes(Command::NAME),
+        }
+    }
+}
+
+fn name_bytes(name: &str) -> [u8; NAME_LENGTH] {
+    let mut bytes = [0; NAME_LENGTH];
+    for (to, from) in bytes.iter_mut().zip(name.bytes()) {
+        *to = from;
+    }
+    bytes
+}
+
+fn name_text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned()
+}
+
+/// Why a recording cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The operating system refused.
+    #[error("cannot read the recording: {0}")]
+    Io(#[from] io::Error),
+    /// The file does not begin like a recording.
+    #[error("not a recording: a samples.bin of Graver begins with \"GRAVERec\"")]
+    NotARecording,
+    /// The file was written by a build with other samples.
+    #[error(
+        "recorded with {recorded} (layout {recorded_layout:016x}), but this build has {expected} \
+         (layout {expected_layout:016x}): read it with the build that wrote it"
+    )]
+    OtherLayout {
+        /// The sample in the file.
+        recorded: String,
+        /// Its layout hash.
+        recorded_layout: u64,
+        /// The sample of this build.
+        expected: String,
+        /// Its layout hash.
+        expected_layout: u64,
+    },
+    /// The file ends inside a record: whoever wrote it was stopped.
+    #[error("the recording ends inside record {record}: whoever wrote it was stopped")]
+    Truncated {
+        /// The incomplete record, from 0.
+        record: u64,
+    },
+}
+
+/// Writes a recording, record by record.
+#[derive(Debug)]
+pub struct RecordingWriter<W: Write> {
+    writer: W,
+}
+
+impl<W: Write> RecordingWriter<W> {
+    /// Writes the header to `writer`, which should be buffered.
+    ///
+    /// # Errors
+    /// Whatever the writer reports.
+    pub fn new(mut writer: W) -> io::Result<Self> {
+        writer.write_all(Header::current().as_bytes())?;
+        Ok(Self { writer })
+    }
+
+    /// Appends records.
+    ///
+    /// # Errors
+    /// Whatever the writer reports.
+    pub fn write(&mut self, records: &[CycleRecord]) -> io::Result<()> {
+        self.writer.write_all(records.as_bytes())
+    }
+
+    /// Flushes, and gives the writer back.
+    ///
+    /// # Errors
+    /// Whatever the writer reports.
+    pub fn finish(mut self) -> io::Result<W> {
+        self.writer.flush()?;
+        Ok(self.writer)
+    }
+}
+
+/// Reads a recording, record by record, as an iterator that ends at the first error.
+#[derive(Debug)]
+pub struct RecordingReader<R: Read> {
+    reader: R,
+    count: u64,
+    ended: bool,
+}
+
+impl<R: Read> RecordingReader<R> {
+    /// Reads and checks the header; `reader` should be buffered.
+    ///
+    /// # Errors
+    /// [`RecordingError`] when this is no recording, or one of a build with other samples.
+    pub fn new(mut reader: R) -> Result<Self, RecordingError> {
+        let mut header = Header::zeroed();
+        match reader.read_exact(header.as_mut_bytes()) {
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+                return Err(RecordingError::NotARecording);
+            }
+            other => other?,
+        }
+        let expected = Header::current();
+        if header.magic != expected.magic {
+            return Err(RecordingError::NotARecording);
+        }
+        let parts = [
+            ("graver.Recording", header.layout, Header::NAME, expected.layout),
+            (
+                &name_text(&header.feedback),
+                header.feedback_layout,
+                Feedback::NAME,
+                Feedback::LAYOUT,
+            ),
+            (&name_text(&header.command), header.command_layout, Command::NAME, Command::LAYOUT),
+        ];
+        for (recorded, recorded_layout, name, expected_layout) in parts {
+            if recorded_layout != expected_layout {
+                return Err(RecordingError::OtherLayout {
+                    recorded: recorded.to_owned(),
+                    recorded_layout,
+                    expected: name.to_owned(),
+                    expected_layout,
+                });
+            }
+        }
+        Ok(Self { reader, count: 0, ended: false })
+    }
+
+    fn read(&mut self) -> Result<Option<CycleRecord>, RecordingError> {
+        let mut bytes = [0_u8; size_of::<CycleRecord>()];
+        let mut filled = 0;
+        while let Some(rest) = bytes.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+            match self.reader.read(rest) {
+                Ok(0) if filled == 0 => return Ok(None),
+                Ok(0) => return Err(RecordingError::Truncated { record: self.count }),
+                Ok(read) => filled += read,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
+        self.count += 1;
+        Ok(Some(CycleRecord::read_from_bytes(&bytes).unwrap_or_else(|_| CycleRecord::new_zeroed())))
+    }
+}
+
+impl<R: Read> Iterator for RecordingReader<R> {
+    type Item = Result<CycleRecord, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended {
+            return None;
+        }
+        let record = self.read().transpose();
+        self.ended = !matches!(record, Some(Ok(_)));
+        record
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use signals::Cycle;
+
+    fn written(count: u64) -> Vec<u8> {
+        let mut writer = RecordingWriter::new(Vec::new()).unwrap();
+        for cycle in 0..count {
+            let mut record = CycleRecord::new_zeroed();
+            record.feedback.cycle = Cycle(cycle);
+            record.feedback.tool = [0.25 * cycle as f64, -1e-9, f64::MAX];
+            record.command.cycle = Cycle(cycle);
+            writer.write(&[record]).unwrap();
+        }
+        writer.finish().unwrap()
+    }
+
+    #[test]
+    fn what_was_written_is_read_back() {
+        let bytes = written(10);
+        assert_eq!(&bytes[..8], b"GRAVERec");
+        let records: Vec<_> =
+            RecordingReader::new(&bytes[..]).unwrap().collect::<Result<_, _>>().unwrap();
+        assert_eq!(records.len(), 10);
+        assert_eq!(records[7].feedback.tool, [1.75, -1e-9, f64::MAX]);
+    }
+
+    #[test]
+    fn a_file_cut_short_gives_its_whole_records_then_says_so() {
+        let bytes = written(3);
+        let results: Vec<_> = RecordingReader::new(&bytes[..bytes.len() - 1]).unwrap().collect();
+        assert_eq!(results.len(), 3);
+        assert!(matches!(results[2], Err(RecordingError::Truncated { record: 2 })));
+    }
+
+    #[test]
+    fn strangers_are_refused() {
+        let mut bytes = written(1);
+        assert!(matches!(RecordingReader::new(&bytes[..5]), Err(RecordingError::NotARecording)));
+        bytes[24] ^= 1; // the feedback's layout hash
+        let error = RecordingReader::new(&bytes[..]).unwrap_err();
+        assert!(error.to_string().contains("graver.Feedback.v1"), "{error}");
+        bytes[0] = b'X';
+        assert!(matches!(RecordingReader::new(&bytes[..]), Err(RecordingError::NotARecording)));
+    }
+}

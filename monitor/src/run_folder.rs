@@ -1,0 +1,139 @@
+//! The run folder: `runs/DATE-TIME-JOB` and the files in it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// The summary, `docs/schema/summary.json` is its schema.
+pub const SUMMARY: &str = "summary.json";
+/// The report as one self-contained page.
+pub const REPORT: &str = "report.html";
+/// The picture of planned and marked path.
+pub const PICTURE: &str = "path.svg";
+/// Latencies as HdrHistogram interval log.
+pub const LATENCY: &str = "latency.hlog";
+/// The recorded samples.
+pub const SAMPLES: &str = "samples.bin";
+/// What was to be marked; written by the planner.
+pub const ARTWORK: &str = "artwork.json";
+
+/// The longest part of a job's name that goes into the folder's name [characters].
+const LONGEST_NAME: usize = 40;
+
+/// A folder that exists.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunFolder {
+    path: PathBuf,
+}
+
+impl RunFolder {
+    /// Creates `runs/DATE-TIME-JOB` below `below`, with the local time now. A second run of the
+    /// job in the same second gets `-2` and so on.
+    ///
+    /// # Errors
+    /// Whatever the operating system reports.
+    pub fn create_below(below: &Path, job: &str) -> io::Result<Self> {
+        let now = jiff::Zoned::now().strftime("%Y%m%d-%H%M%S").to_string();
+        Self::create_named(&below.join("runs"), &format!("{now}-{}", file_name(job)))
+    }
+
+    /// Uses the folder that the user named; it is created where it does not exist.
+    ///
+    /// # Errors
+    /// Whatever the operating system reports.
+    pub fn create_at(path: &Path) -> io::Result<Self> {
+        fs::create_dir_all(path)?;
+        Ok(Self { path: path.to_owned() })
+    }
+
+    fn create_named(runs: &Path, name: &str) -> io::Result<Self> {
+        fs::create_dir_all(runs)?;
+        let mut path = runs.join(name);
+        let mut number = 1;
+        loop {
+            match fs::create_dir(&path) {
+                Ok(()) => return Ok(Self { path }),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                    number += 1;
+                    path = runs.join(format!("{name}-{number}"));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where one of its files is.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// Writes one of its files whole: a reader sees the old content or the new.
+    ///
+    /// # Errors
+    /// Whatever the operating system reports.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> io::Result<()> {
+        let unfinished = self.file(&format!(".{name}.part"));
+        fs::write(&unfinished, content)?;
+        fs::rename(&unfinished, self.file(name))
+    }
+}
+
+/// A job's name as part of a file name: letters, digits, points, dashes.
+fn file_name(job: &str) -> String {
+    let mut name = String::new();
+    for character in job.chars().take(LONGEST_NAME) {
+        if character.is_alphanumeric() || character == '.' || character == '_' {
+            name.push(character);
+        } else if !name.is_empty() && !name.ends_with('-') {
+            name.push('-');
+        }
+    }
+    let name = name.trim_matches(['-', '.']);
+    if name.is_empty() { "job".to_owned() } else { name.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn names_are_safe_for_files() {
+        for (job, expect) in [
+            ("letters NASO 20 mm", "letters-NASO-20-mm"),
+            ("../../etc/passwd", "etc-passwd"),
+            ("a//b", "a-b"),
+            ("Prüfteil_1.ngc", "Prüfteil_1.ngc"),
+            ("…", "job"),
+        ] {
+            assert_eq!(file_name(job), expect, "{job}");
+        }
+    }
+
+    #[test]
+    fn two_runs_in_one_second_get_two_folders() {
+        let below = tempfile::tempdir().unwrap();
+        let first = RunFolder::create_named(below.path(), "20260101-120000-N").unwrap();
+        let second = RunFolder::create_named(below.path(), "20260101-120000-N").unwrap();
+        assert_ne!(first, second);
+        assert!(second.path().ends_with("20260101-120000-N-2"));
+        second.write(SUMMARY, "{}").unwrap();
+        assert_eq!(fs::read_to_string(second.file(SUMMARY)).unwrap(), "{}");
+        assert_eq!(fs::read_dir(second.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn the_name_has_date_time_and_job() {
+        let below = tempfile::tempdir().unwrap();
+        let folder = RunFolder::create_below(below.path(), "letters").unwrap();
+        let name = folder.path().file_name().unwrap().to_str().unwrap();
+        let (stamp, job) = name.split_at(15);
+        assert!(stamp.chars().all(|c| c.is_ascii_digit() || c == '-'), "{name}");
+        assert_eq!(job, "-letters");
+    }
+}
