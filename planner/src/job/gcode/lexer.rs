@@ -72,7 +72,9 @@ impl<'a> Words<'a> {
                 }
                 _ if byte.is_ascii_alphabetic() => {
                     self.begun = true;
-                    return self.word(byte.to_ascii_uppercase()).map(|word| Some(Token::Word(word)));
+                    return self
+                        .word(byte.to_ascii_uppercase())
+                        .map(|word| Some(Token::Word(word)));
                 }
                 _ => return Err(self.stray()),
             }
@@ -166,8 +168,7 @@ impl<'a> Words<'a> {
         } else {
             self.text[unsigned..self.at].parse().unwrap_or(f64::INFINITY)
         };
-        // Negated `<=`, so that it holds for NaN too.
-        if !(magnitude <= LARGEST) {
+        if magnitude > LARGEST {
             return Err(Refusal::new(
                 start..self.at,
                 format!("the number of {name} is too large"),
@@ -312,7 +313,11 @@ mod tests {
         check("X#1", 1, "parameters (#) are not supported");
         check("X[1+2]", 1, "expressions ([ ]) are not supported");
         check("#1=5", 0, "parameters (#) are not supported");
-        check("O100 sub", 0, "O words (subroutines, loops, conditions, program numbers) are not supported");
+        check(
+            "O100 sub",
+            0,
+            "O words (subroutines, loops, conditions, program numbers) are not supported",
+        );
         check("X1 2", 3, "X has more than one number");
         check("X1.2.3", 4, "X has more than one number");
         check("X1,5", 2, "a comma cannot stand in a number");

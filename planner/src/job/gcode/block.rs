@@ -1,0 +1,183 @@
+//! One line of a program: its codes and its numbers, checked for what cannot stand together.
+
+use std::ops::Range;
+
+use super::codes::{Codes, spell};
+use super::error::Refusal;
+use super::lexer::Word;
+
+/// A line, gathered word by word.
+#[derive(Debug, Clone)]
+pub(super) struct Block {
+    /// Which letters but G and M the line has, a bit for each.
+    present: u32,
+    /// Letters whose number something on the line has used.
+    used: u32,
+    numbers: [f64; 26],
+    spans: [Range<usize>; 26],
+    /// Its G and M codes.
+    pub(super) codes: Codes,
+    /// Whether it has any word.
+    pub(super) begun: bool,
+}
+
+impl Block {
+    pub(super) fn new() -> Self {
+        Self {
+            present: 0,
+            used: 0,
+            numbers: [0.0; 26],
+            spans: std::array::from_fn(|_| 0..0),
+            codes: Codes::default(),
+            begun: false,
+        }
+    }
+
+    /// Empties it for the next line.
+    pub(super) fn clear(&mut self) {
+        self.present = 0;
+        self.used = 0;
+        self.codes = Codes::default();
+        self.begun = false;
+    }
+
+    /// Takes one word.
+    pub(super) fn take(&mut self, text: &str, word: Word) -> Result<(), Box<Refusal>> {
+        let first = !std::mem::replace(&mut self.begun, true);
+        let name = char::from(word.letter);
+        match word.letter {
+            b'G' | b'M' => return self.codes.take(text, word),
+            b'N' => {
+                if !first {
+                    return Err(Refusal::new(
+                        word.span,
+                        "N stands inside a line",
+                        "line number",
+                        "a line number is the first word of its line",
+                    ));
+                }
+                return whole(&word).map(|_| ());
+            }
+            b'F' | b'I' | b'J' | b'K' | b'P' | b'Q' | b'R' | b'S' | b'X' | b'Y' | b'Z' => {}
+            b'T' => {
+                whole(&word)?;
+            }
+            b'A' | b'B' | b'C' | b'U' | b'V' | b'W' => {
+                return Err(Refusal::new(
+                    word.span,
+                    format!("{name} is not an axis of this machine"),
+                    "unknown axis",
+                    "a program moves X, Y and Z",
+                ));
+            }
+            b'E' => {
+                return Err(Refusal::new(
+                    word.span,
+                    "E words are not supported",
+                    "E word",
+                    "a number has no exponent, and a marking machine no extruder",
+                ));
+            }
+            _ => {
+                return Err(Refusal::new(
+                    word.span,
+                    format!("{name} words are not supported"),
+                    "unsupported word",
+                    "words begin with F G I J K M N P Q R S T X Y or Z",
+                ));
+            }
+        }
+        let index = usize::from(word.letter - b'A');
+        if self.present & (1 << index) != 0 {
+            let first = spell(text, &self.spans[index]);
+            let second = spell(text, &word.span);
+            return Err(Refusal::new(
+                word.span,
+                format!("{name} is on this line twice: {first} and {second}"),
+                format!("second {name}"),
+                format!("a line can have one {name}: is a line break missing?"),
+            ));
+        }
+        self.present |= 1 << index;
+        self.numbers[index] = word.number;
+        self.spans[index] = word.span;
+        Ok(())
+    }
+
+    /// Whether the line has `letter`.
+    pub(super) fn has(&self, letter: u8) -> bool {
+        self.present & bit(letter) != 0
+    }
+
+    /// Whether the line has any of the axes.
+    pub(super) fn has_axes(&self) -> bool {
+        self.present & (bit(b'X') | bit(b'Y') | bit(b'Z')) != 0
+    }
+
+    /// Whether the line has any offset to the centre of an arc.
+    pub(super) fn has_offsets(&self) -> bool {
+        self.present & (bit(b'I') | bit(b'J') | bit(b'K')) != 0
+    }
+
+    /// Whether the number of `letter` is used already.
+    pub(super) fn is_used(&self, letter: u8) -> bool {
+        self.used & bit(letter) != 0
+    }
+
+    /// The number of `letter`, which counts as used from here.
+    pub(super) fn number(&mut self, letter: u8) -> Option<f64> {
+        if !self.has(letter) {
+            return None;
+        }
+        self.used |= bit(letter);
+        Some(self.numbers[usize::from(letter - b'A')])
+    }
+
+    /// Where `letter` stands.
+    pub(super) fn span(&self, letter: u8) -> Range<usize> {
+        self.spans[usize::from(letter - b'A')].clone()
+    }
+
+    /// Refuses the first word that nothing on the line has used.
+    pub(super) fn check_used(&self) -> Result<(), Box<Refusal>> {
+        let left = self.present & !self.used;
+        if left == 0 {
+            return Ok(());
+        }
+        let letters = (b'A'..=b'Z').filter(|&letter| left & bit(letter) != 0);
+        let Some(letter) = letters.min_by_key(|&letter| self.span(letter).start) else {
+            return Ok(());
+        };
+        let name = char::from(letter);
+        let help = match letter {
+            b'X' | b'Y' | b'Z' => "coordinates need G0, G1, G2 or G3, on this line or before",
+            b'I' | b'J' | b'K' | b'R' => "I, J, K and R belong to G2 and G3",
+            b'P' => "P belongs to G2, G3, G4 and G64",
+            _ => "Q belongs to G64",
+        };
+        Err(Refusal::new(
+            self.span(letter),
+            format!("nothing on this line uses {name}"),
+            "unused word",
+            help,
+        ))
+    }
+}
+
+fn bit(letter: u8) -> u32 {
+    1 << (letter - b'A')
+}
+
+/// Refuses a word whose number is not 0, 1, 2 …
+pub(super) fn whole(word: &Word) -> Result<(), Box<Refusal>> {
+    if word.number >= 0.0 && word.number.floor() == word.number {
+        return Ok(());
+    }
+    let name = char::from(word.letter);
+    Err(Refusal::new(
+        word.span.clone(),
+        format!("{name} needs a whole number"),
+        "not a whole number",
+        format!("write {name} with 0, 1, 2 and so on"),
+    ))
+}

@@ -1,0 +1,294 @@
+//! The G and M codes that are understood, by modal group, and what to say of the others.
+
+use std::ops::Range;
+
+use super::error::Refusal;
+use super::lexer::Word;
+
+/// Group 1: what coordinates mean from here on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Motion {
+    /// G0.
+    Rapid,
+    /// G1.
+    Line,
+    /// G2.
+    Clockwise,
+    /// G3.
+    Counterclockwise,
+    /// G80.
+    Cancelled,
+}
+
+/// Group 0: in force on its own line only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Once {
+    /// G4.
+    Dwell,
+    /// G28.
+    Home,
+    /// G53.
+    MachineFrame,
+    /// G92.
+    Shift,
+    /// G92.1.
+    ClearShift,
+    /// G92.2.
+    SuspendShift,
+    /// G92.3.
+    RestoreShift,
+}
+
+/// Group 2: the plane of arcs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Plane {
+    /// G17.
+    Xy,
+    /// G18.
+    Zx,
+    /// G19.
+    Yz,
+}
+
+/// Groups 3 and 4: what coordinates, and centres of arcs, are measured from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Reference {
+    /// Program zero (G90, G90.1).
+    Absolute,
+    /// Where the tool is (G91, G91.1).
+    Incremental,
+}
+
+/// Group 5: what F means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FeedMode {
+    /// G93, one over the minutes of the move.
+    InverseTime,
+    /// G94, units per minute.
+    PerMinute,
+}
+
+/// Group 13.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PathControl {
+    /// G61.
+    Exact,
+    /// G64.
+    Blend,
+}
+
+/// Group 7 of the M codes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Laser {
+    /// M5.
+    Off,
+    /// M3.
+    Constant,
+    /// M4.
+    FollowsSpeed,
+}
+
+/// Group 4 of the M codes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stop {
+    /// M0.
+    Pause,
+    /// M1.
+    Optional,
+    /// M2, M30.
+    End,
+}
+
+/// A code of a line and where it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Chosen<T> {
+    pub(super) code: T,
+    pub(super) span: Range<usize>,
+}
+
+/// The codes of one line, at most one of each modal group.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Codes {
+    pub(super) motion: Option<Chosen<Motion>>,
+    pub(super) once: Option<Chosen<Once>>,
+    pub(super) plane: Option<Chosen<Plane>>,
+    pub(super) distance: Option<Chosen<Reference>>,
+    pub(super) arc_distance: Option<Chosen<Reference>>,
+    pub(super) feed_mode: Option<Chosen<FeedMode>>,
+    /// Metres per unit.
+    pub(super) unit: Option<Chosen<f64>>,
+    /// Index into the machine file's origins.
+    pub(super) origin: Option<Chosen<usize>>,
+    pub(super) path_control: Option<Chosen<PathControl>>,
+    pub(super) laser: Option<Chosen<Laser>>,
+    pub(super) air_assist: Option<Chosen<bool>>,
+    pub(super) stop: Option<Chosen<Stop>>,
+    cutter_radius: Option<Chosen<()>>,
+    tool_length: Option<Chosen<()>>,
+    cycle_return: Option<Chosen<()>>,
+    spindle_mode: Option<Chosen<()>>,
+}
+
+/// Metres in an inch.
+pub(super) const INCH: f64 = 0.0254;
+/// Metres in a millimetre.
+pub(super) const MILLIMETRE: f64 = 1e-3;
+
+const SUPPORTED_G: &str = "G0 G1 G2 G3 G4 G17 G18 G19 G20 G21 G28 G53 G54-G59 G59.1-G59.3 G61 G64 \
+                           G90 G91 G90.1 G91.1 G92 G92.1-G92.3 G93 G94, and without effect G40 G49 \
+                           G80 G97 G98 G99";
+const SUPPORTED_M: &str = "M0 M1 M2 M3 M4 M5 M7 M8 M9 M30";
+
+impl Codes {
+    /// Takes the G or M `word` into its group.
+    pub(super) fn take(&mut self, text: &str, word: Word) -> Result<(), Box<Refusal>> {
+        let tenths = word.number * 10.0;
+        let code = tenths.round();
+        // Codes have one decimal at most; ten times a decimal is off by rounding alone.
+        let known = (tenths - code).abs() < 1e-9 && (0.0..65_536.0).contains(&code);
+        if !known {
+            return Err(unsupported(text, &word, 65_535));
+        }
+        if word.letter == b'G' {
+            self.general(text, word, code as u16)
+        } else {
+            self.miscellaneous(text, word, code as u16)
+        }
+    }
+
+    fn general(&mut self, text: &str, word: Word, tenths: u16) -> Result<(), Box<Refusal>> {
+        let span = word.span.clone();
+        match tenths {
+            0 => choose(&mut self.motion, Motion::Rapid, span, text, "motion"),
+            10 => choose(&mut self.motion, Motion::Line, span, text, "motion"),
+            20 => choose(&mut self.motion, Motion::Clockwise, span, text, "motion"),
+            30 => choose(&mut self.motion, Motion::Counterclockwise, span, text, "motion"),
+            800 => choose(&mut self.motion, Motion::Cancelled, span, text, "motion"),
+            40 => choose(&mut self.once, Once::Dwell, span, text, "non-modal"),
+            280 => choose(&mut self.once, Once::Home, span, text, "non-modal"),
+            530 => choose(&mut self.once, Once::MachineFrame, span, text, "non-modal"),
+            920 => choose(&mut self.once, Once::Shift, span, text, "non-modal"),
+            921 => choose(&mut self.once, Once::ClearShift, span, text, "non-modal"),
+            922 => choose(&mut self.once, Once::SuspendShift, span, text, "non-modal"),
+            923 => choose(&mut self.once, Once::RestoreShift, span, text, "non-modal"),
+            170 => choose(&mut self.plane, Plane::Xy, span, text, "plane"),
+            180 => choose(&mut self.plane, Plane::Zx, span, text, "plane"),
+            190 => choose(&mut self.plane, Plane::Yz, span, text, "plane"),
+            200 => choose(&mut self.unit, INCH, span, text, "units"),
+            210 => choose(&mut self.unit, MILLIMETRE, span, text, "units"),
+            400 => choose(&mut self.cutter_radius, (), span, text, "cutter radius"),
+            490 => choose(&mut self.tool_length, (), span, text, "tool length"),
+            540 | 550 | 560 | 570 | 580 | 590 => {
+                let origin = usize::from((tenths - 540) / 10);
+                choose(&mut self.origin, origin, span, text, "work coordinate system")
+            }
+            591..=593 => {
+                let origin = usize::from(tenths - 591) + 6;
+                choose(&mut self.origin, origin, span, text, "work coordinate system")
+            }
+            610 => choose(&mut self.path_control, PathControl::Exact, span, text, "path control"),
+            640 => choose(&mut self.path_control, PathControl::Blend, span, text, "path control"),
+            900 => choose(&mut self.distance, Reference::Absolute, span, text, "distance"),
+            910 => choose(&mut self.distance, Reference::Incremental, span, text, "distance"),
+            901 => choose(&mut self.arc_distance, Reference::Absolute, span, text, "arc distance"),
+            911 => {
+                choose(&mut self.arc_distance, Reference::Incremental, span, text, "arc distance")
+            }
+            930 => choose(&mut self.feed_mode, FeedMode::InverseTime, span, text, "feed"),
+            940 => choose(&mut self.feed_mode, FeedMode::PerMinute, span, text, "feed"),
+            970 => choose(&mut self.spindle_mode, (), span, text, "spindle speed"),
+            980 | 990 => choose(&mut self.cycle_return, (), span, text, "cycle return"),
+            _ => Err(unsupported(text, &word, tenths)),
+        }
+    }
+
+    fn miscellaneous(&mut self, text: &str, word: Word, tenths: u16) -> Result<(), Box<Refusal>> {
+        let span = word.span.clone();
+        match tenths {
+            0 => choose(&mut self.stop, Stop::Pause, span, text, "stopping"),
+            10 => choose(&mut self.stop, Stop::Optional, span, text, "stopping"),
+            20 | 300 => choose(&mut self.stop, Stop::End, span, text, "stopping"),
+            30 => choose(&mut self.laser, Laser::Constant, span, text, "laser"),
+            40 => choose(&mut self.laser, Laser::FollowsSpeed, span, text, "laser"),
+            50 => choose(&mut self.laser, Laser::Off, span, text, "laser"),
+            70 | 80 => choose(&mut self.air_assist, true, span, text, "air assist"),
+            90 => choose(&mut self.air_assist, false, span, text, "air assist"),
+            _ => Err(unsupported(text, &word, tenths)),
+        }
+    }
+}
+
+/// Puts `code` into its group unless the line has one of that group already.
+fn choose<T>(
+    group: &mut Option<Chosen<T>>,
+    code: T,
+    span: Range<usize>,
+    text: &str,
+    name: &str,
+) -> Result<(), Box<Refusal>> {
+    if let Some(first) = group {
+        let (one, other) = (spell(text, &first.span), spell(text, &span));
+        return Err(Refusal::new(
+            span,
+            format!("{one} and {other} are both of the {name} group"),
+            format!("second code of the {name} group"),
+            "a line can have one code of each modal group: put them on lines of their own",
+        ));
+    }
+    *group = Some(Chosen { code, span });
+    Ok(())
+}
+
+/// The word at `span` as a person would write it.
+pub(super) fn spell(text: &str, span: &Range<usize>) -> String {
+    text[span.clone()]
+        .chars()
+        .filter(|character| !character.is_whitespace())
+        .collect::<String>()
+        .to_ascii_uppercase()
+}
+
+/// Refuses a code, and says what to do about those that real files have.
+fn unsupported(text: &str, word: &Word, tenths: u16) -> Box<Refusal> {
+    let name = spell(text, &word.span);
+    let advice = if word.letter == b'G' { general_advice(tenths) } else { tool_advice(tenths) };
+    let supported = if word.letter == b'G' { SUPPORTED_G } else { SUPPORTED_M };
+    let help = match advice {
+        Some(advice) => format!("{advice}; supported are {supported}"),
+        None => format!("supported are {supported}"),
+    };
+    Refusal::new(word.span.clone(), format!("{name} is not supported"), "unsupported code", help)
+}
+
+fn general_advice(tenths: u16) -> Option<&'static str> {
+    Some(match tenths {
+        50..=53 => "splines: let the post-processor write lines and arcs",
+        100 => "write origins into the machine file, or shift with G92",
+        281 | 300 | 301 => "use G28, whose point is the machine file's home",
+        330..=339 | 760 => "a marking machine does not cut threads",
+        382..=385 => "a marking machine has no probe",
+        410..=421 => {
+            "let the post-processor offset the path by the width of the line, and write G40"
+        }
+        430..=432 => "a marking machine has no tool lengths: delete it or write G49",
+        611 => "write G61",
+        730..=739 | 810..=899 => "canned cycles: let the post-processor write the moves out",
+        950 => "a marking machine has no spindle: use G94",
+        960 => "a marking machine has no spindle: delete it or write G97",
+        _ => return None,
+    })
+}
+
+fn tool_advice(tenths: u16) -> Option<&'static str> {
+    Some(match tenths {
+        60 => "a marking head has no tool to change: delete it, or write M0 to wait for a person",
+        190 => "a marking machine has no spindle to orient: delete it",
+        480..=530 => "delete it: override and feed hold are always at hand",
+        600 => "write M0 to wait for a person",
+        620..=680 => "switch air assist with M8 and M9, and set the laser's power with S",
+        980 | 990 => "subroutines: write the moves out",
+        1060 | 1070 => "switch the laser with M3 or M4 and S, and off with M5",
+        1000..=1990 => "user-defined commands do not exist here: delete it",
+        _ => return None,
+    })
+}

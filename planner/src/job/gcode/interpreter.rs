@@ -1,0 +1,591 @@
+//! What the words of a line do, in the order that RS-274 gives them, and what stays in force.
+
+use std::ops::Range;
+
+use machine::Machine;
+use machine::process::{GcodeSettings, ZMeaning};
+use nalgebra::Vector3;
+
+use super::arc::{Arc, Form, NoArc, axes};
+use super::block::Block;
+use super::codes::{
+    Chosen, FeedMode, Laser, MILLIMETRE, Motion, Once, PathControl, Plane, Reference, Stop, spell,
+};
+use super::error::Refusal;
+use super::tracer::{Feed, Pace, Tracer};
+use crate::drawing::{Action, Note, Power};
+
+/// Seconds in a minute.
+const MINUTE: f64 = 60.0;
+/// Longest dwell of one G4 [s]: a day.
+const LONGEST_DWELL: f64 = 86_400.0;
+/// Most turns of one arc.
+const MOST_TURNS: f64 = 10_000.0;
+/// The output bit of the air assist.
+const AIR_ASSIST: u32 = 0;
+
+/// What stays in force from line to line.
+#[derive(Debug)]
+struct Modal {
+    motion: Option<Motion>,
+    plane: Plane,
+    distance: Reference,
+    arc_distance: Reference,
+    feed_mode: FeedMode,
+    /// Metres per unit.
+    unit: f64,
+    /// Program zero of the work coordinate system, machine frame [m].
+    origin: Vector3<f64>,
+    /// What G92 adds to it [m].
+    shift: Vector3<f64>,
+    /// What G92.3 brings back [m].
+    kept_shift: Vector3<f64>,
+    /// Feed of G94 [m/s], `None` before any.
+    feed: Option<f64>,
+    laser: Laser,
+    /// Fraction of full scale, `None` before any S.
+    level: Option<f64>,
+    air_assist: bool,
+}
+
+/// Notes, each made once.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Remark {
+    BlockDelete,
+    Corners,
+    Tool,
+    OptionalStop,
+    NoAirAssist,
+    Height,
+    Folded,
+    NoPower,
+}
+
+/// Runs a program line by line.
+#[derive(Debug)]
+pub(super) struct Interpreter<'a> {
+    text: &'a str,
+    settings: &'a GcodeSettings,
+    home: Vector3<f64>,
+    modal: Modal,
+    said: u32,
+    pub(super) notes: Vec<Note>,
+    pub(super) tracer: Tracer,
+}
+
+impl<'a> Interpreter<'a> {
+    pub(super) fn new(text: &'a str, machine: &'a Machine) -> Self {
+        let home = Vector3::from(machine.home);
+        let settings = &machine.gcode;
+        Self {
+            text,
+            settings,
+            home,
+            modal: Modal {
+                motion: None,
+                plane: Plane::Xy,
+                distance: Reference::Absolute,
+                arc_distance: Reference::Incremental,
+                feed_mode: FeedMode::PerMinute,
+                unit: MILLIMETRE,
+                origin: Vector3::from(settings.origins[0]),
+                shift: Vector3::zeros(),
+                kept_shift: Vector3::zeros(),
+                feed: None,
+                laser: Laser::Off,
+                level: None,
+                air_assist: false,
+            },
+            said: 0,
+            notes: Vec::new(),
+            tracer: Tracer::new(home, settings.z == ZMeaning::Ignored),
+        }
+    }
+
+    /// Makes a note unless it was made before.
+    pub(super) fn remark(&mut self, remark: Remark) {
+        let bit = 1 << remark as u32;
+        if self.said & bit != 0 {
+            return;
+        }
+        self.said |= bit;
+        let text = match remark {
+            Remark::BlockDelete => "lines that begin with / are left out (block delete)",
+            Remark::Corners => "G64 is accepted, but corners stay exact: there is no blending yet",
+            Remark::Tool => "T has no effect: a marking head has no tools",
+            Remark::OptionalStop => "M1 has no effect: there is no optional stop; M0 waits",
+            Remark::NoAirAssist => "M7 and M8 have no effect: this machine has no air assist",
+            Remark::Height => "moves along Z are left out: this machine ignores Z",
+            Remark::Folded => "an arc in an upright plane is marked as seen along Z, to and fro",
+            Remark::NoPower => "the laser is on without S: it stays dark until S says its power",
+        };
+        self.notes.push(Note { line: self.tracer.line, text: text.to_owned() });
+    }
+
+    /// Does what `block` says. Gives back whether it ends the program.
+    pub(super) fn execute(&mut self, block: &mut Block) -> Result<bool, Box<Refusal>> {
+        self.tracer.facts.blocks += 1;
+        self.settle_feed(block)?;
+        self.settle_laser(block)?;
+        let codes = &block.codes;
+        self.modal.plane = codes.plane.as_ref().map_or(self.modal.plane, |chosen| chosen.code);
+        if let Some(chosen) = &codes.origin {
+            self.modal.origin = Vector3::from(self.settings.origins[chosen.code]);
+        }
+        let once = codes.once.clone();
+        if let Some(Chosen { code: Once::Dwell, span }) = &once {
+            self.dwell(block, span.clone())?;
+        }
+        self.path_control(block)?;
+        let codes = &block.codes;
+        if let Some(chosen) = &codes.distance {
+            self.modal.distance = chosen.code;
+        }
+        if let Some(chosen) = &codes.arc_distance {
+            self.modal.arc_distance = chosen.code;
+        }
+        let motion = codes.motion.clone();
+        if let Some(chosen) = &motion {
+            self.modal.motion = Some(chosen.code);
+        }
+        self.shift_or_home(block, once.as_ref(), motion.as_ref())?;
+        self.motion(block, once.as_ref(), motion.as_ref())?;
+        block.check_used()?;
+        self.stop(block)
+    }
+
+    /// Puts what a program left on out, and completes its facts.
+    pub(super) fn finish(&mut self) {
+        if std::mem::take(&mut self.modal.air_assist) {
+            self.tracer.push(Action::Output { bit: AIR_ASSIST, on: false });
+        }
+        let end = self.tracer.position - self.modal.origin - self.modal.shift;
+        self.tracer.facts.end = end.into();
+    }
+
+    /// G93, G94, G20, G21 and F: the units of a line hold for all its numbers.
+    fn settle_feed(&mut self, block: &mut Block) -> Result<(), Box<Refusal>> {
+        if let Some(chosen) = &block.codes.unit {
+            self.modal.unit = chosen.code;
+        }
+        if let Some(chosen) = &block.codes.feed_mode
+            && chosen.code != self.modal.feed_mode
+        {
+            self.modal.feed_mode = chosen.code;
+            self.modal.feed = None;
+        }
+        let Some(number) = block.number(b'F') else { return Ok(()) };
+        if number < 0.0 {
+            return Err(Refusal::new(
+                block.span(b'F'),
+                format!("F{number} is negative"),
+                "negative feed rate",
+                "a feed rate is above 0",
+            ));
+        }
+        if self.modal.feed_mode == FeedMode::PerMinute {
+            self.modal.feed = (number > 0.0).then_some(number * self.modal.unit / MINUTE);
+        }
+        Ok(())
+    }
+
+    /// S, T, M3, M4, M5, M7, M8, M9.
+    fn settle_laser(&mut self, block: &mut Block) -> Result<(), Box<Refusal>> {
+        if let Some(number) = block.number(b'S') {
+            let full_scale = self.settings.full_scale;
+            if !(0.0..=full_scale).contains(&number) {
+                return Err(Refusal::new(
+                    block.span(b'S'),
+                    format!("S{number} is outside 0 to {full_scale}"),
+                    "laser power",
+                    format!("full power is S{full_scale} (full scale in the machine file)"),
+                ));
+            }
+            self.modal.level = Some(number / full_scale);
+        }
+        if block.number(b'T').is_some() {
+            self.remark(Remark::Tool);
+        }
+        if let Some(chosen) = &block.codes.laser {
+            self.modal.laser = chosen.code;
+        }
+        let Some(on) = block.codes.air_assist.as_ref().map(|chosen| chosen.code) else {
+            return Ok(());
+        };
+        if on && !self.settings.air_assist {
+            self.remark(Remark::NoAirAssist);
+        } else if on != self.modal.air_assist {
+            self.modal.air_assist = on;
+            self.tracer.push(Action::Output { bit: AIR_ASSIST, on });
+        }
+        Ok(())
+    }
+
+    /// The laser along a mark, `None` in the dark.
+    fn power(&self) -> Option<Power> {
+        let level = self.modal.level.filter(|&level| level > 0.0)?;
+        match self.modal.laser {
+            Laser::Off => None,
+            Laser::Constant => Some(Power { level, follows_speed: false }),
+            Laser::FollowsSpeed => Some(Power { level, follows_speed: true }),
+        }
+    }
+
+    /// G4.
+    fn dwell(&mut self, block: &mut Block, span: Range<usize>) -> Result<(), Box<Refusal>> {
+        let help = "G4 waits for P seconds: G4 P0.5";
+        let Some(time) = block.number(b'P') else {
+            return Err(Refusal::new(span, "G4 has no P", "dwell without a time", help));
+        };
+        if !(0.0..=LONGEST_DWELL).contains(&time) {
+            return Err(Refusal::new(
+                block.span(b'P'),
+                format!("a dwell of {time} s is outside 0 to {LONGEST_DWELL} s"),
+                "dwell in seconds",
+                help,
+            ));
+        }
+        // Power that follows the speed is none at rest.
+        let lit = self.power().filter(|power| !power.follows_speed).map(|power| power.level);
+        if time > 0.0 {
+            self.tracer.push(Action::Dwell { time, lit });
+        }
+        Ok(())
+    }
+
+    /// G61 and G64 with the tolerances P and Q.
+    fn path_control(&mut self, block: &mut Block) -> Result<(), Box<Refusal>> {
+        let Some(chosen) = &block.codes.path_control else { return Ok(()) };
+        if chosen.code == PathControl::Exact {
+            return Ok(());
+        }
+        for letter in [b'P', b'Q'] {
+            if block.has(letter) {
+                claim(block, letter)?;
+                if block.number(letter).is_some_and(|tolerance| tolerance < 0.0) {
+                    return Err(Refusal::new(
+                        block.span(letter),
+                        format!("the tolerance {} of G64 is negative", char::from(letter)),
+                        "tolerance",
+                        "a tolerance is 0 or above",
+                    ));
+                }
+            }
+        }
+        self.remark(Remark::Corners);
+        Ok(())
+    }
+
+    /// G28 and G92 to G92.3, which take the coordinates of their line.
+    fn shift_or_home(
+        &mut self,
+        block: &mut Block,
+        once: Option<&Chosen<Once>>,
+        motion: Option<&Chosen<Motion>>,
+    ) -> Result<(), Box<Refusal>> {
+        let Some(Chosen { code, span }) = once else { return Ok(()) };
+        if !matches!(code, Once::Home | Once::Shift) {
+            match code {
+                Once::ClearShift => {
+                    self.modal.shift = Vector3::zeros();
+                    self.modal.kept_shift = Vector3::zeros();
+                }
+                Once::SuspendShift => self.modal.shift = Vector3::zeros(),
+                Once::RestoreShift => self.modal.shift = self.modal.kept_shift,
+                _ => {}
+            }
+            return Ok(());
+        }
+        if let Some(motion) = motion
+            && motion.code != Motion::Cancelled
+            && block.has_axes()
+        {
+            return Err(Refusal::new(
+                motion.span.clone(),
+                format!(
+                    "{} and {} both take the coordinates of this line",
+                    spell(self.text, span),
+                    spell(self.text, &motion.span)
+                ),
+                "second code with coordinates",
+                "write them on lines of their own",
+            ));
+        }
+        let given = [b'X', b'Y', b'Z'].map(|letter| block.has(letter));
+        if *code == Once::Home {
+            let through = self.target(block, false);
+            let mut home = self.home;
+            if given.contains(&true) {
+                for axis in (0..3).filter(|&axis| !given[axis]) {
+                    home[axis] = through[axis];
+                }
+            }
+            self.note_height(through);
+            self.tracer.rapid(through);
+            self.note_height(home);
+            self.tracer.rapid(home);
+            return Ok(());
+        }
+        if !given.contains(&true) {
+            return Err(Refusal::new(
+                span.clone(),
+                "G92 has no coordinates",
+                "no X, Y or Z",
+                "G92 X0 Y0 makes the present point the origin of X and Y",
+            ));
+        }
+        for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
+            if let Some(number) = block.number(letter) {
+                self.modal.shift[axis] =
+                    self.tracer.position[axis] - self.modal.origin[axis] - number * self.modal.unit;
+            }
+        }
+        self.modal.kept_shift = self.modal.shift;
+        Ok(())
+    }
+
+    /// G0 to G3, new or still in force.
+    fn motion(
+        &mut self,
+        block: &mut Block,
+        once: Option<&Chosen<Once>>,
+        motion: Option<&Chosen<Motion>>,
+    ) -> Result<(), Box<Refusal>> {
+        let frame = once.filter(|once| once.code == Once::MachineFrame);
+        let taken = once.is_some_and(|once| matches!(once.code, Once::Home | Once::Shift));
+        let now = self.modal.motion;
+        if let Some(frame) = frame {
+            let straight = matches!(now, Some(Motion::Rapid | Motion::Line));
+            if !straight || !block.has_axes() || self.modal.distance == Reference::Incremental {
+                return Err(Refusal::new(
+                    frame.span.clone(),
+                    "G53 needs G0 or G1, a coordinate, and G90",
+                    "machine coordinates",
+                    "G53 G0 X0 Y0 moves to the machine's zero; arcs and G91 cannot be combined with it",
+                ));
+            }
+        }
+        let arc = matches!(now, Some(Motion::Clockwise | Motion::Counterclockwise));
+        let moves = block.has_axes() || arc && (block.has_offsets() || block.has(b'R'));
+        if taken || !moves {
+            return Ok(());
+        }
+        match now {
+            None | Some(Motion::Cancelled) => Ok(()),
+            Some(Motion::Rapid) => {
+                let to = self.target(block, frame.is_some());
+                self.note_height(to);
+                self.tracer.rapid(to);
+                Ok(())
+            }
+            Some(Motion::Line) => {
+                let feed = self.feed(block, motion)?;
+                let to = self.target(block, frame.is_some());
+                self.note_height(to);
+                self.tracer.line(to, feed);
+                Ok(())
+            }
+            Some(Motion::Clockwise) => self.arc(block, motion, false),
+            Some(Motion::Counterclockwise) => self.arc(block, motion, true),
+        }
+    }
+
+    /// G2 and G3.
+    fn arc(
+        &mut self,
+        block: &mut Block,
+        motion: Option<&Chosen<Motion>>,
+        counterclockwise: bool,
+    ) -> Result<(), Box<Refusal>> {
+        let feed = self.feed(block, motion)?;
+        let place = place(block, motion);
+        let to = self.target(block, false);
+        let form = self.form(block, place.clone())?;
+        let turns = self.turns(block)?;
+        let start = self.tracer.arc_start();
+        let arc = Arc::new(self.modal.plane, counterclockwise, start, to, form, turns).map_err(
+            |fault: NoArc| {
+                let (message, help) = fault.explain();
+                Refusal::new(place, message, "this arc", help)
+            },
+        )?;
+        self.note_height(to);
+        if self.modal.plane != Plane::Xy && self.settings.z == ZMeaning::Ignored {
+            self.remark(Remark::Height);
+        }
+        if self.tracer.arc(&arc, to, feed) {
+            self.remark(Remark::Folded);
+        }
+        Ok(())
+    }
+
+    /// Centre or radius of an arc.
+    fn form(&mut self, block: &mut Block, place: Range<usize>) -> Result<Form, Box<Refusal>> {
+        let [u, v, w] = axes(self.modal.plane);
+        let letters = [b'I', b'J', b'K'];
+        let (first, second) = (char::from(letters[u]), char::from(letters[v]));
+        if let Some(radius) = block.number(b'R') {
+            if block.has_offsets() {
+                return Err(Refusal::new(
+                    block.span(b'R'),
+                    "an arc has R and a centre",
+                    "radius",
+                    "write either R, or I, J and K",
+                ));
+            }
+            return Ok(Form::Radius(radius * self.modal.unit));
+        }
+        // Some post-processors write a zero offset along the normal; another is a wrong plane.
+        if block.number(letters[w]).is_some_and(|number| number != 0.0) {
+            return Err(Refusal::new(
+                block.span(letters[w]),
+                format!("{} is not in the plane of the arc", char::from(letters[w])),
+                "offset out of the plane",
+                format!(
+                    "this plane's centre is {first} and {second}; G17 is XY, G18 is ZX, G19 is YZ"
+                ),
+            ));
+        }
+        let absolute = self.modal.arc_distance == Reference::Absolute;
+        let mut centre = self.tracer.position;
+        let mut given = 0;
+        for axis in [u, v] {
+            let Some(number) = block.number(letters[axis]) else { continue };
+            given += 1;
+            let length = number * self.modal.unit;
+            centre[axis] = if absolute {
+                self.modal.origin[axis] + self.modal.shift[axis] + length
+            } else {
+                centre[axis] + length
+            };
+        }
+        if given == 0 || absolute && given < 2 {
+            let wanted = if absolute { "and" } else { "or" };
+            return Err(Refusal::new(
+                place,
+                "the arc has no centre",
+                "no centre or radius",
+                format!("an arc in this plane needs {first} {wanted} {second}, or R"),
+            ));
+        }
+        Ok(Form::Centre(centre))
+    }
+
+    /// How often an arc passes its end: P of G2 and G3.
+    fn turns(&self, block: &mut Block) -> Result<f64, Box<Refusal>> {
+        if !block.has(b'P') {
+            return Ok(1.0);
+        }
+        claim(block, b'P')?;
+        let turns = block.number(b'P').unwrap_or(1.0);
+        if turns.floor() == turns && (1.0..=MOST_TURNS).contains(&turns) {
+            return Ok(turns);
+        }
+        Err(Refusal::new(
+            block.span(b'P'),
+            format!("P{turns} is not a number of turns"),
+            "turns of the arc",
+            format!("P of G2 and G3 is a whole number from 1 to {MOST_TURNS}"),
+        ))
+    }
+
+    /// The feed of a move on this line.
+    fn feed(
+        &mut self,
+        block: &mut Block,
+        motion: Option<&Chosen<Motion>>,
+    ) -> Result<Feed, Box<Refusal>> {
+        let pace = match self.modal.feed_mode {
+            FeedMode::PerMinute => self.modal.feed.map(Pace::Speed),
+            FeedMode::InverseTime => block
+                .number(b'F')
+                .filter(|&number| number > 0.0)
+                .map(|number| Pace::Time(MINUTE / number)),
+        };
+        let Some(pace) = pace else {
+            let help = match self.modal.feed_mode {
+                FeedMode::PerMinute => "write F in units per minute here or before: F600",
+                FeedMode::InverseTime => {
+                    "under G93 every G1, G2 and G3 line needs an F above 0: one over its minutes"
+                }
+            };
+            return Err(Refusal::new(
+                place(block, motion),
+                "the move has no feed rate",
+                "no F",
+                help,
+            ));
+        };
+        if self.modal.level.is_none() && self.modal.laser != Laser::Off {
+            self.remark(Remark::NoPower);
+        }
+        Ok(Feed { pace, power: self.power() })
+    }
+
+    /// Where the coordinates of a line lead, machine frame [m].
+    fn target(&self, block: &mut Block, machine_frame: bool) -> Vector3<f64> {
+        let mut to = self.tracer.position;
+        for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
+            let Some(number) = block.number(letter) else { continue };
+            let length = number * self.modal.unit;
+            to[axis] = if machine_frame {
+                length
+            } else if self.modal.distance == Reference::Incremental {
+                to[axis] + length
+            } else {
+                self.modal.origin[axis] + self.modal.shift[axis] + length
+            };
+        }
+        to
+    }
+
+    /// Notes the first move along an ignored Z.
+    fn note_height(&mut self, to: Vector3<f64>) {
+        if self.settings.z == ZMeaning::Ignored && to.z != self.tracer.position.z {
+            self.remark(Remark::Height);
+        }
+    }
+
+    /// M0, M1, M2, M30.
+    fn stop(&mut self, block: &Block) -> Result<bool, Box<Refusal>> {
+        match block.codes.stop.as_ref().map(|chosen| chosen.code) {
+            None => Ok(false),
+            Some(Stop::Pause) => {
+                self.tracer.push(Action::Pause);
+                Ok(false)
+            }
+            Some(Stop::Optional) => {
+                self.remark(Remark::OptionalStop);
+                Ok(false)
+            }
+            Some(Stop::End) => Ok(true),
+        }
+    }
+}
+
+/// Refuses a second user of one word.
+fn claim(block: &Block, letter: u8) -> Result<(), Box<Refusal>> {
+    if !block.is_used(letter) {
+        return Ok(());
+    }
+    let name = char::from(letter);
+    Err(Refusal::new(
+        block.span(letter),
+        format!("two codes of this line use {name}"),
+        "used twice",
+        "write the codes on lines of their own",
+    ))
+}
+
+/// Where a move is written: its code, or else its first coordinate.
+fn place(block: &Block, motion: Option<&Chosen<Motion>>) -> Range<usize> {
+    if let Some(motion) = motion {
+        return motion.span.clone();
+    }
+    [b'X', b'Y', b'Z', b'I', b'J', b'K', b'R']
+        .into_iter()
+        .filter(|&letter| block.has(letter))
+        .map(|letter| block.span(letter))
+        .min_by_key(|span| span.start)
+        .unwrap_or(0..0)
+}
