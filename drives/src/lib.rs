@@ -1,1 +1,18 @@
-//! placeholder
+//! The bridge between commands and what they drive, and the clock of the machine.
+//!
+//! - [`port`]: the seam; what hardware or a plant must do.
+//! - [`plant`]: the simulated plant, motors and laser included.
+//! - [`bridge`]: one cycle: apply the latched command, measure, tell.
+//! - [`watchdog`]: laser off without a fresh command, axes to rest without three.
+//!
+//! The bridge's step has no input or output and reads no clock; times come in as arguments.
+
+pub mod bridge;
+pub mod plant;
+pub mod port;
+pub mod watchdog;
+
+pub use bridge::{Bridge, BridgeOptions, Deadlines};
+pub use plant::{PlantOptions, SimulatedPlant};
+pub use port::{Actuation, Freshness, Measurement, Port, Power};
+pub use watchdog::GatePermission;

@@ -1,0 +1,284 @@
+//! One cycle between the samples and the port, as a step without input, output or clock.
+//!
+//! Duties, in the order of a cycle:
+//!
+//! 1. [`Bridge::begin`] at the deadline: puts in force what was latched in the cycle before,
+//!    exchanges with the port, and fills the feedback. [`Bridge::stamp`] completes its time
+//!    stamps just before it is published.
+//! 2. [`Bridge::latch`] keeps the command that answers this feedback, or [`Bridge::miss`] says
+//!    that none came. A command never acts before the next deadline, however early it comes.
+//! 3. [`Bridge::finish`] when the cycle's work is done, so that overruns are counted.
+//!
+//! Before a begin, the service says whether every peer lives ([`Bridge::permit`]), and may stop
+//! the axes ([`Bridge::stop`]).
+//!
+//! - *Fresh*: answers the newest feedback of this run of drives.
+//! - *Overrun*: the cycle's work did not end before the next deadline.
+//! - *Slip*: an overrun that simulated drives waited for; the deadlines that follow moved.
+
+use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
+use signals::{
+    AxisArray, Command, CommandMode, Cycle, DrivesReport, Fault, FaultCode, Feedback, MAX_AXES,
+    Nanoseconds, RealtimeFacts, feedback::status,
+};
+
+use crate::port::{Actuation, Freshness, Measurement, Port, Power};
+use crate::watchdog::{GatePermission, Watch, Watchdog};
+
+/// Cycles without a single encoder count after which an axis counts as at rest: at one count
+/// (1/4096 of a turn) in 20 ms it would turn with less than 0.08 rad/s.
+const REST_CYCLES: u32 = 20;
+
+/// Whether the clock waits for a controller that is late but alive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Deadlines {
+    /// Never: hardware, and simulated drives with `--strict`.
+    #[default]
+    Strict,
+    /// It may: simulated drives.
+    Slipping,
+}
+
+/// How a bridge runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct BridgeOptions {
+    /// Identifies this run of drives: its start on the monotonic clock [ns].
+    pub epoch: u64,
+    /// Whether its clock may slip.
+    pub deadlines: Deadlines,
+}
+
+/// A command that waits for its deadline.
+#[derive(Debug, Clone, Copy)]
+struct Latched {
+    command: Command,
+    received: Nanoseconds,
+}
+
+/// How far the cycle at hand has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// No cycle has begun yet.
+    Unstarted,
+    /// Its deadline has come, its work is under way.
+    Begun,
+    /// Its work ended in time.
+    Done,
+    /// Its work ended after the next deadline, and that has been counted.
+    Overrun,
+}
+
+/// The bridge between samples and a port.
+pub struct Bridge {
+    port: Box<dyn Port + Send>,
+    options: BridgeOptions,
+    watchdog: Watchdog,
+    permission: GatePermission,
+    phase: Phase,
+    latched: Option<Latched>,
+    in_force: Actuation,
+    measurement: Measurement,
+    feedback: Feedback,
+    slips: u64,
+    resting: u32,
+}
+
+impl core::fmt::Debug for Bridge {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter
+            .debug_struct("Bridge")
+            .field("options", &self.options)
+            .field("watchdog", &self.watchdog)
+            .field("cycle", &self.feedback.cycle)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Bridge {
+    /// A bridge to `port`, unpowered, dark, before its first cycle, which is number 0.
+    pub fn new(port: Box<dyn Port + Send>, options: BridgeOptions) -> Self {
+        let axes = port.axes();
+        Self {
+            port,
+            options,
+            watchdog: Watchdog::new(axes),
+            permission: GatePermission::Granted,
+            phase: Phase::Unstarted,
+            latched: None,
+            in_force: Actuation::DISABLED,
+            measurement: Measurement::default(),
+            feedback: Feedback { epoch: options.epoch, ..Feedback::default() },
+            slips: 0,
+            resting: 0,
+        }
+    }
+
+    /// Says whether the gate may open, from the next begin on until said otherwise.
+    pub fn permit(&mut self, permission: GatePermission) {
+        self.permission = permission;
+    }
+
+    /// Stops the axes by the drive's own brake, from the next begin on, until a person resets.
+    pub fn stop(&mut self, cause: FaultCode, now: Nanoseconds) {
+        let code = cause as u32;
+        self.watchdog.stop(Fault { code, axis: 0, value: 0.0, limit: 0.0, at: now });
+    }
+
+    /// Starts the cycle of `deadline` at `now`, not before it: puts the latched command in force,
+    /// measures, and gives the feedback, whose `published` and `exchange` [`Self::stamp`] fills.
+    pub fn begin(&mut self, now: Nanoseconds, deadline: Nanoseconds) -> &Feedback {
+        self.count_slip(deadline);
+        let status = self.engage(now);
+        self.port.exchange(&self.in_force, &mut self.measurement);
+        if self.measurement.fault.is_some() {
+            self.in_force = self.watchdog.stop(Fault { at: now, ..self.measurement.fault });
+        }
+        let first = self.phase == Phase::Unstarted;
+        self.describe(first);
+
+        let feedback = &mut self.feedback;
+        feedback.cycle = if first { Cycle(0) } else { feedback.cycle.next() };
+        feedback.deadline = deadline;
+        feedback.measured = now;
+        feedback.published = now;
+        feedback.exchange = Nanoseconds(0);
+        feedback.missed = self.watchdog.counts().missed;
+        feedback.fault = *self.watchdog.fault();
+        feedback.status = status
+            | bit(status::POWERED, self.measurement.power == Power::On)
+            | bit(status::TOOL_KNOWN, self.measurement.tool.is_some())
+            | bit(status::STOPPED_ALONE, self.watchdog.watch() == Watch::Stopped)
+            | bit(status::SLIPPING, self.options.deadlines == Deadlines::Slipping)
+            | bit(status::GATE_INHIBITED, self.permission == GatePermission::Inhibited);
+        self.phase = Phase::Begun;
+        &self.feedback
+    }
+
+    /// The feedback as it is published at `now`, the exchange having just ended.
+    pub fn stamp(&mut self, now: Nanoseconds) -> &Feedback {
+        self.feedback.exchange = now - self.feedback.measured;
+        self.feedback.published = now;
+        &self.feedback
+    }
+
+    /// Keeps `command`, which reached drives at `received`, for the next deadline if it is fresh.
+    /// Of several the newest counts.
+    pub fn latch(&mut self, command: &Command, received: Nanoseconds) -> Freshness {
+        let answers = command.epoch == self.options.epoch
+            && command.cycle == self.feedback.cycle
+            && self.phase != Phase::Unstarted;
+        if !answers {
+            return Freshness::Stale;
+        }
+        self.latched = Some(Latched { command: *command, received });
+        Freshness::Fresh
+    }
+
+    /// Says that no command is to be expected any more in this cycle.
+    pub fn miss(&mut self) {
+        self.latched = None;
+    }
+
+    /// Ends the work of the cycle.
+    pub fn finish(&mut self, now: Nanoseconds) {
+        if self.phase != Phase::Begun {
+            return;
+        }
+        self.phase = Phase::Done;
+        if now > self.feedback.deadline + CYCLE_PERIOD {
+            self.phase = Phase::Overrun;
+            self.feedback.overruns += 1;
+        }
+    }
+
+    /// The newest feedback.
+    pub fn feedback(&self) -> &Feedback {
+        &self.feedback
+    }
+
+    /// What was counted so far.
+    pub fn report(&self, realtime: RealtimeFacts) -> DrivesReport {
+        let counts = self.watchdog.counts();
+        let braked = matches!(self.in_force.mode, CommandMode::Disabled | CommandMode::QuickStop);
+        let lit = self.in_force.laser.is_lit();
+        DrivesReport {
+            cycle: self.feedback.cycle,
+            overruns: self.feedback.overruns,
+            slips: self.slips,
+            missed: counts.missed,
+            gate_trips: counts.gate_trips,
+            stops: counts.stops,
+            at_rest: u32::from(braked && self.at_rest() && !lit),
+            lit: u32::from(lit),
+            fault: self.feedback.fault,
+            realtime,
+        }
+    }
+
+    fn at_rest(&self) -> bool {
+        self.resting >= REST_CYCLES
+    }
+
+    /// A deadline later than one period after the last means that the clock slipped, or on strict
+    /// deadlines that it left some out.
+    fn count_slip(&mut self, deadline: Nanoseconds) {
+        let late = deadline - (self.feedback.deadline + CYCLE_PERIOD);
+        if self.phase == Phase::Unstarted || late.0 <= 0 {
+            return;
+        }
+        let counted = u64::from(self.phase == Phase::Overrun);
+        let overruns = match self.options.deadlines {
+            Deadlines::Slipping => {
+                self.slips += 1;
+                1
+            }
+            Deadlines::Strict => late.0.unsigned_abs().div_ceil(CYCLE_PERIOD.0.unsigned_abs()),
+        };
+        self.feedback.overruns += overruns.saturating_sub(counted);
+    }
+
+    /// Decides what is in force in the cycle that begins; the status bits of that decision.
+    fn engage(&mut self, now: Nanoseconds) -> u32 {
+        let missed = self.watchdog.counts().missed;
+        let resting = self.at_rest();
+        let latched = self.latched.take();
+        let command = latched.as_ref().map(|latched| &latched.command);
+        self.in_force = self.watchdog.decide(command, self.permission, resting, now);
+        if let Some(Latched { command, received }) = &latched
+            && self.watchdog.watch() == Watch::Following
+        {
+            self.feedback.command_cycle = command.cycle;
+            self.feedback.command_received = *received;
+            self.feedback.command_published = command.published;
+            self.feedback.command_applied = now;
+        }
+        bit(status::COMMAND_MISSED, self.watchdog.counts().missed > missed)
+    }
+
+    /// Copies the measurement into the feedback; `first` has nothing before it to differ from.
+    fn describe(&mut self, first: bool) {
+        let measured = &self.measurement;
+        let axes = self.port.axes().min(MAX_AXES);
+        let mut velocity: AxisArray = [0.0; MAX_AXES];
+        let moved = measured.counts != self.feedback.counts;
+        if !first {
+            let pairs = measured.position.iter().zip(&self.feedback.position);
+            for (velocity, (now, before)) in velocity.iter_mut().zip(pairs).take(axes) {
+                *velocity = (now - before) / CYCLE_TIME;
+            }
+        }
+        self.resting = if first || moved { 0 } else { self.resting.saturating_add(1) };
+        self.feedback.velocity = velocity;
+        self.feedback.counts = measured.counts;
+        self.feedback.position = measured.position;
+        self.feedback.current = measured.current;
+        self.feedback.inputs = measured.inputs;
+        self.feedback.tool = measured.tool.unwrap_or_default();
+        self.feedback.laser = measured.laser;
+    }
+}
+
+/// `mask` if `set`.
+fn bit(mask: u32, set: bool) -> u32 {
+    if set { mask } else { 0 }
+}

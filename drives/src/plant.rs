@@ -1,0 +1,373 @@
+//! The simulated plant: motors, transmission, load, encoders and laser source of a machine file.
+//!
+//! Modes: `Disabled` (phases open, motors coast), `Voltage` (held over the cycle) and `QuickStop`
+//! (the drive's own [`brake`]). The drives of this plant have no position, velocity or torque
+//! interface: those modes are refused with a fault, not imitated.
+//!
+//! What is and is not modelled:
+//!
+//! - The supply saturates the voltage. A chopper keeps the current at the power stage's limit: it
+//!   is cut there at the end of each substep, without a trip.
+//! - Encoders count in whole counts from power-on, rounded to the nearest; the machine is homed,
+//!   at rest at `machine.home`. Currents are read at the deadline, rounded to
+//!   [`PlantOptions::current_resolution`].
+//! - The light follows the gate after the delays of the laser source; gate edges fall where they
+//!   are asked, to the nanosecond.
+//! - There is no holding brake, no backlash, no measurement noise and no thermal model.
+//!
+//! Integration: fourth order at a fixed substep of 50 µs or finer ([`dynamics`], [`winding`]),
+//! with friction's events located inside it ([`friction`]). A transmission too stiff for the
+//! substep asked for gets a finer one.
+
+pub mod brake;
+pub mod dynamics;
+pub mod friction;
+pub mod source;
+pub mod winding;
+
+use machine::kinematics::{Joints, KinematicsError};
+use machine::{Axis, LaserSource, Machine, Mechanism, MechanismVisitor, Pose};
+use nalgebra::{SVector, Vector3};
+use signals::time::CYCLE_TIME;
+use signals::{AxisArray, CommandMode, Fault, FaultCode, LaserCycle, MAX_AXES, Nanoseconds};
+
+use crate::port::{Actuation, Freshness, Measurement, Port, Power};
+use brake::Brake;
+use dynamics::{Dynamics, Motors, Phases, State};
+use source::Source;
+use winding::Weights;
+
+/// Largest eigenvalue times substep: the stability region of the classical Runge–Kutta method
+/// reaches 2.78 along the negative real axis and 2.6 in the worst direction of the left half.
+const STABLE_PRODUCT: f64 = 2.5;
+
+/// Substeps in a cycle beyond which a transmission should be declared rigid.
+const MOST_SUBSTEPS: f64 = 1000.0;
+
+/// How the plant is simulated; what it is stands in the machine file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlantOptions {
+    /// Longest step of the integration [s], `1e-6..=5e-5`; a whole number of steps fill a cycle.
+    pub substep: f64,
+    /// Step of the measured current [A]; 0 reads it exactly.
+    pub current_resolution: f64,
+}
+
+impl Default for PlantOptions {
+    fn default() -> Self {
+        // 20 kHz; 14 bits over ±8 A.
+        Self { substep: 50e-6, current_resolution: 1e-3 }
+    }
+}
+
+/// Why a machine cannot be simulated.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// The mechanism and the list of axes disagree.
+    #[error("the mechanism has {expected} axes, the machine {found}")]
+    AxisCount {
+        /// Axes of the mechanism.
+        expected: usize,
+        /// Axes given.
+        found: usize,
+    },
+    /// More axes than a sample holds.
+    #[error("{0} axes, and a sample holds {MAX_AXES}")]
+    TooManyAxes(usize),
+    /// The tool cannot be at home.
+    #[error("home cannot be reached: {0}")]
+    Home(KinematicsError),
+    /// A joint moves no mass.
+    #[error("the mass matrix of the load is singular at home: an elastic joint must move a mass")]
+    SingularMass,
+    /// The substep is out of range.
+    #[error("a substep of {0} s: it must be from 1e-6 to 5e-5 s")]
+    Substep(f64),
+    /// The transmission needs a finer substep than can be afforded.
+    #[error(
+        "the transmission's fastest motion has a rate of {rate} 1/s, which needs more than \
+         {MOST_SUBSTEPS} substeps in a cycle: leave its stiffness out to make it rigid"
+    )]
+    TooStiff {
+        /// Bound of the fastest eigenvalue [1/s].
+        rate: f64,
+    },
+}
+
+/// The plant of a machine file, its mechanism matched.
+#[derive(Debug)]
+pub struct SimulatedPlant;
+
+impl SimulatedPlant {
+    /// A plant of `machine`, at rest at its home, unpowered and dark.
+    ///
+    /// # Errors
+    /// If the machine cannot be simulated.
+    #[allow(clippy::new_ret_no_self)]
+    pub fn new(
+        machine: &Machine,
+        options: PlantOptions,
+    ) -> Result<Box<dyn Port + Send>, PlantError> {
+        machine.mechanism.visit(Build { machine, options })
+    }
+}
+
+struct Build<'a> {
+    machine: &'a Machine,
+    options: PlantOptions,
+}
+
+impl MechanismVisitor for Build<'_> {
+    type Output = Result<Box<dyn Port + Send>, PlantError>;
+
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
+        let Build { machine, options } = self;
+        let plant =
+            Plant::<N, M>::new(mechanism, &machine.axes, &machine.laser, machine.home, options)?;
+        Ok(Box::new(plant))
+    }
+}
+
+/// A plant with its mechanism known.
+#[derive(Debug, Clone)]
+pub struct Plant<const N: usize, M: Mechanism<N>> {
+    dynamics: Dynamics<N, M>,
+    brake: Brake<N>,
+    source: Source,
+    branch: M::Branch,
+    weights: Weights<N>,
+    substeps: u32,
+    current_resolution: f64,
+    resolution: SVector<f64, N>,
+    origin: SVector<f64, N>,
+    state: State<N>,
+    in_force: Option<Actuation>,
+    light: LaserCycle,
+    fault: Fault,
+}
+
+impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
+    /// A plant of `mechanism`, at rest with its tool at `home` [m], unpowered and dark.
+    ///
+    /// # Errors
+    /// If it cannot be simulated.
+    pub fn new(
+        mechanism: M,
+        axes: &[Axis],
+        laser: &LaserSource,
+        home: [f64; 3],
+        options: PlantOptions,
+    ) -> Result<Self, PlantError> {
+        let PlantOptions { substep, current_resolution } = options;
+        if !(1e-6..=5e-5).contains(&substep) {
+            return Err(PlantError::Substep(substep));
+        }
+        if N > MAX_AXES {
+            return Err(PlantError::TooManyAxes(N));
+        }
+        let axes = <[Axis; N]>::try_from(axes.to_vec())
+            .map_err(|_| PlantError::AxisCount { expected: N, found: axes.len() })?;
+        let branch = M::Branch::default();
+        let pose = Pose::at(Vector3::from(home));
+        let load = mechanism.inverse(&pose, branch, &Joints::zeros()).map_err(PlantError::Home)?;
+
+        // At rest, the motors stand ahead by what gravity stretches the transmission.
+        let sag = mechanism
+            .stiffness()
+            .and_then(|stiffness| stiffness.try_inverse())
+            .map_or_else(Joints::zeros, |compliance| compliance * mechanism.gravity(&load));
+        let motors = Motors::of(&axes);
+        let angle = (load + sag).component_div(&motors.ratio);
+        let dynamics = Dynamics::new(mechanism, motors, &load)?;
+
+        let rate = dynamics.fastest();
+        let substeps = (CYCLE_TIME / substep - 1e-9).max(rate * CYCLE_TIME / STABLE_PRODUCT).ceil();
+        if substeps.is_nan() || substeps > MOST_SUBSTEPS {
+            return Err(PlantError::TooStiff { rate });
+        }
+        Ok(Self {
+            brake: Brake::of(&axes),
+            source: Source::new(laser),
+            branch,
+            weights: motors.windings.weights(CYCLE_TIME / substeps),
+            substeps: substeps as u32,
+            current_resolution,
+            resolution: SVector::from_fn(|row, _| axes[row].encoder.resolution()),
+            origin: angle,
+            state: State {
+                current: SVector::zeros(),
+                angle,
+                speed: SVector::zeros(),
+                load,
+                load_speed: SVector::zeros(),
+            },
+            dynamics,
+            in_force: None,
+            light: LaserCycle::OFF,
+            fault: Fault::default(),
+        })
+    }
+
+    /// Where the plant is, in truth.
+    pub fn state(&self) -> &State<N> {
+        &self.state
+    }
+
+    /// Puts the plant elsewhere, with the power and the laser as they are.
+    pub fn place(&mut self, state: State<N>) {
+        self.state = state;
+        self.dynamics.couple(&mut self.state);
+    }
+
+    /// The equations that it follows.
+    pub fn dynamics(&self) -> &Dynamics<N, M> {
+        &self.dynamics
+    }
+
+    /// Moves one cycle on under `actuation`.
+    fn advance(&mut self, actuation: &Actuation) {
+        let motors = *self.dynamics.motors();
+        let step = self.weights.step;
+        for _ in 0..self.substeps {
+            let phases = match actuation.mode {
+                CommandMode::Disabled => Phases::Open,
+                CommandMode::Voltage => Phases::Driven(SVector::from_fn(|row, _| {
+                    saturate(actuation.voltage[row], motors.voltage[row])
+                })),
+                CommandMode::QuickStop
+                | CommandMode::Position
+                | CommandMode::Velocity
+                | CommandMode::Effort => {
+                    let voltage = self.brake.voltage(&self.state, &motors, step);
+                    Phases::Driven(SVector::from_fn(|row, _| {
+                        saturate(voltage[row], motors.voltage[row])
+                    }))
+                }
+            };
+            self.state = friction::advance(&mut self.dynamics, &self.state, &phases, &self.weights);
+            for (current, limit) in self.state.current.iter_mut().zip(motors.current.iter()) {
+                *current = saturate(*current, *limit);
+            }
+        }
+    }
+
+    /// What of `actuation` this plant carries out: all of it, or nothing but the brake.
+    fn admit(&mut self, actuation: &Actuation) -> Actuation {
+        if actuation.mode == CommandMode::Disabled {
+            self.fault = Fault::default();
+            return Actuation { laser: LaserCycle::OFF, ..*actuation };
+        }
+        if !self.fault.is_some() {
+            self.fault = refusal::<N>(actuation);
+        }
+        if self.fault.is_some() {
+            return self.stopped();
+        }
+        let dark =
+            actuation.freshness == Freshness::Stale || actuation.mode != CommandMode::Voltage;
+        let laser = if dark { LaserCycle::OFF } else { actuation.laser };
+        Actuation { laser, ..*actuation }
+    }
+
+    /// Brakes if the motors are powered, else leaves them unpowered.
+    fn stopped(&self) -> Actuation {
+        match self.in_force {
+            Some(Actuation { mode: CommandMode::Disabled, .. }) | None => Actuation::DISABLED,
+            Some(_) => Actuation::QUICK_STOP,
+        }
+    }
+
+    fn measure(&mut self, measurement: &mut Measurement) {
+        *measurement = Measurement::default();
+        for row in 0..N {
+            let counts =
+                ((self.state.angle[row] - self.origin[row]) / self.resolution[row]).round();
+            measurement.counts[row] = counts as i64;
+            measurement.position[row] = self.origin[row] + counts * self.resolution[row];
+            measurement.current[row] = self.state.current[row];
+            if self.current_resolution > 0.0 {
+                let steps = (self.state.current[row] / self.current_resolution).round();
+                measurement.current[row] = steps * self.current_resolution;
+            }
+        }
+        match self.dynamics.mechanism().forward(&self.state.load, self.branch) {
+            Ok(pose) => measurement.tool = Some(pose.position.into()),
+            Err(error) => self.fail(0, error.value, error.limit),
+        }
+        measurement.laser = self.light;
+    }
+
+    fn fail(&mut self, axis: u32, value: f64, limit: f64) {
+        if !self.fault.is_some() {
+            let code = FaultCode::DriveFault as u32;
+            self.fault = Fault { code, axis, value, limit, at: Nanoseconds(0) };
+        }
+    }
+}
+
+impl<const N: usize, M: Mechanism<N>> Port for Plant<N, M> {
+    fn axes(&self) -> usize {
+        N
+    }
+
+    fn gate_resolution(&self) -> Nanoseconds {
+        Nanoseconds(1)
+    }
+
+    fn exchange(&mut self, actuation: &Actuation, measurement: &mut Measurement) {
+        self.light = LaserCycle::OFF;
+        if let Some(in_force) = self.in_force {
+            self.advance(&in_force);
+            match self.source.cycle(&in_force.laser) {
+                Ok(light) => self.light = light,
+                Err(source::TooManyEdges) => {
+                    self.fail(0, f64::from(in_force.laser.edge_count), signals::MAX_EDGES as f64);
+                }
+            }
+        }
+        self.measure(measurement);
+        let admitted = self.admit(actuation);
+        let braking = |mode| matches!(mode, Some(CommandMode::QuickStop));
+        if braking(Some(admitted.mode)) && !braking(self.in_force.map(|before| before.mode)) {
+            self.brake.engage(&self.state);
+        }
+        if admitted.mode != CommandMode::Disabled {
+            measurement.power = Power::On;
+        }
+        measurement.fault = self.fault;
+        self.in_force = Some(admitted);
+    }
+}
+
+/// Why this plant cannot carry `actuation` out, if it cannot.
+fn refusal<const N: usize>(actuation: &Actuation) -> Fault {
+    let fault = |code: FaultCode, axis, value| Fault {
+        code: code as u32,
+        axis,
+        value,
+        limit: 0.0,
+        at: Nanoseconds(0),
+    };
+    let finite = |values: &AxisArray| values.iter().take(N).position(|value| !value.is_finite());
+    match actuation.mode {
+        CommandMode::Disabled | CommandMode::QuickStop => {}
+        CommandMode::Voltage => {
+            if let Some(axis) = finite(&actuation.voltage) {
+                return fault(FaultCode::NotFinite, axis as u32 + 1, actuation.voltage[axis]);
+            }
+        }
+        mode @ (CommandMode::Position | CommandMode::Velocity | CommandMode::Effort) => {
+            return fault(FaultCode::DriveFault, 0, f64::from(mode as u32));
+        }
+    }
+    if actuation.laser.is_valid() {
+        Fault::default()
+    } else {
+        fault(FaultCode::DriveFault, 0, f64::from(actuation.laser.edge_count))
+    }
+}
+
+/// `value` within ±`limit`.
+fn saturate(value: f64, limit: f64) -> f64 {
+    value.max(-limit).min(limit)
+}

@@ -1,0 +1,99 @@
+//! The drive's own brake: what a quick stop does, and all that is left when commands stop.
+//!
+//! Duties: bring every motor from the speed it has to rest at a constant deceleration, then hold
+//! it. It knows no path and no other axis.
+//!
+//! A speed reference ramps to zero, the position reference is its integral, and a cascade with
+//! the bandwidths of the machine file follows them: position P, velocity PI, then the current's
+//! voltage from the motor's data. It runs at every substep on the motor's own angle, speed and
+//! current, as a drive's firmware does at a rate far above the bridge's. Within one encoder count
+//! the position counts as reached, so that integral action and stiction do not hunt.
+//!
+//! Deceleration: what half the current limit gives to rotor and load seen at the shaft, leaving
+//! the other half to the loops, and never more than the axis's own limit of acceleration.
+
+use machine::Axis;
+use nalgebra::SVector;
+
+use super::dynamics::{Motors, State};
+
+/// Share of the current limit that the ramp may use.
+const RAMP_SHARE: f64 = 0.5;
+
+/// Corner of the velocity PI as a share of its bandwidth, as in the controller's own cascade.
+const INTEGRAL_CORNER: f64 = 0.25;
+
+/// Bandwidth of the current loop as a share of the substep's rate [1/s per 1/s]: a proportional
+/// loop that acts on the state at the start of each substep is well damped at a tenth of it.
+const CURRENT_SHARE: f64 = 0.1;
+
+/// The braking loop of all axes.
+#[derive(Debug, Clone, Copy)]
+pub struct Brake<const N: usize> {
+    position_gain: SVector<f64, N>,
+    velocity_gain: SVector<f64, N>,
+    inertia: SVector<f64, N>,
+    deceleration: SVector<f64, N>,
+    resolution: SVector<f64, N>,
+    angle: SVector<f64, N>,
+    speed: SVector<f64, N>,
+    integral: SVector<f64, N>,
+}
+
+impl<const N: usize> Brake<N> {
+    /// The brake of `axes`.
+    pub fn of(axes: &[Axis; N]) -> Self {
+        let each = |value: fn(&Axis) -> f64| SVector::from_fn(|row, _| value(&axes[row]));
+        Self {
+            position_gain: each(|axis| axis.gains.position),
+            velocity_gain: each(|axis| axis.gains.velocity),
+            inertia: each(|axis| axis.gains.inertia),
+            deceleration: each(|axis| {
+                let torque = RAMP_SHARE * axis.motor.current * axis.motor.torque_constant;
+                (torque / axis.gains.inertia).min(axis.limits.acceleration / axis.ratio)
+            }),
+            resolution: each(|axis| axis.encoder.resolution()),
+            angle: SVector::zeros(),
+            speed: SVector::zeros(),
+            integral: SVector::zeros(),
+        }
+    }
+
+    /// Takes the references from where the motors are.
+    pub fn engage(&mut self, state: &State<N>) {
+        self.angle = state.angle;
+        self.speed = state.speed;
+        self.integral = SVector::zeros();
+    }
+
+    /// Moves the references on by `step` [s] and gives the voltages for it [V], unlimited.
+    pub fn voltage(&mut self, state: &State<N>, motors: &Motors<N>, step: f64) -> SVector<f64, N> {
+        SVector::from_fn(|row, _| {
+            let speed = self.speed[row];
+            let change = (self.deceleration[row] * step).min(speed.abs()) * speed.signum();
+            self.speed[row] = speed - change;
+            self.angle[row] += (speed - 0.5 * change) * step;
+
+            let distance = self.angle[row] - state.angle[row];
+            let distance = if distance.abs() < self.resolution[row] { 0.0 } else { distance };
+            let wanted = self.speed[row] + self.position_gain[row] * distance;
+            let error = wanted - state.speed[row];
+            let bandwidth = self.velocity_gain[row];
+            let direction = if self.speed[row] == 0.0 { 0.0 } else { self.speed[row].signum() };
+            let torque = self.inertia[row]
+                * (bandwidth * (error + self.integral[row]) - change / step)
+                + motors.viscous[row] * self.speed[row]
+                + motors.coulomb[row] * direction;
+            let limit = motors.current[row];
+            let unlimited = torque / motors.windings.torque_constant[row];
+            let target = unlimited.clamp(-limit, limit);
+            if unlimited == target {
+                self.integral[row] += INTEGRAL_CORNER * bandwidth * error * step;
+            }
+            let correction = CURRENT_SHARE / step * motors.windings.inductance[row];
+            motors.windings.resistance[row] * target
+                + motors.windings.torque_constant[row] * state.speed[row]
+                + correction * (target - state.current[row])
+        })
+    }
+}

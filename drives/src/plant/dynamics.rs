@@ -1,0 +1,346 @@
+//! Equations of motion of motors, transmission and load, and one Runge–Kutta step through them.
+//!
+//! Per motor: current, angle, speed; per joint: position and velocity of the load.
+//!
+//! ```text
+//! voltage ─► winding ─► k·i ─► rotor ─ratio─► K, B ─► load ─► tool
+//!                               │ viscous and Coulomb friction
+//! ```
+//!
+//! With an elastic transmission the joints feel `τ = K·(q_m − q_l) + B·(q̇_m − q̇_l)`, and the
+//! motors `−ratio·τ`. With a rigid one motors and load are one inertia in joint coordinates,
+//! `diag(J/ratio²) + M(q)`. A gearbox's efficiency is sizing data and not part of the motion;
+//! losses are the friction at the shaft.
+//!
+//! Which motors stick, and against which friction the others slide, stands still during a step:
+//! [`friction`](super::friction) sees to that.
+
+use machine::kinematics::Joints;
+use machine::{Axis, Mechanism};
+use nalgebra::{SMatrix, SVector};
+
+use super::PlantError;
+use super::friction::Contacts;
+use super::winding::{Weights, Windings};
+
+/// Where the plant is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State<const N: usize> {
+    /// Motor currents [A].
+    pub current: SVector<f64, N>,
+    /// Motor angles [rad].
+    pub angle: SVector<f64, N>,
+    /// Motor speeds [rad/s].
+    pub speed: SVector<f64, N>,
+    /// Load side of the joints [m or rad].
+    pub load: Joints<N>,
+    /// Velocity of the load side [m/s or rad/s].
+    pub load_speed: Joints<N>,
+}
+
+/// What the power stages do with the motors' phases.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Phases<const N: usize> {
+    /// Open: no current. It dies within `L·i/V` of opening, under 1 ms, here at once.
+    Open,
+    /// Driven with these voltages [V].
+    Driven(SVector<f64, N>),
+}
+
+/// What the motors are made of, one entry each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motors<const N: usize> {
+    /// The electrical part.
+    pub windings: Windings<N>,
+    /// Inertia at the shaft [kg·m²].
+    pub inertia: SVector<f64, N>,
+    /// Coulomb friction torque [N·m].
+    pub coulomb: SVector<f64, N>,
+    /// Viscous friction [N·m·s/rad].
+    pub viscous: SVector<f64, N>,
+    /// Joint units per radian.
+    pub ratio: SVector<f64, N>,
+    /// Largest voltage of the power stage [V].
+    pub voltage: SVector<f64, N>,
+    /// Largest current that the power stage lets through [A].
+    pub current: SVector<f64, N>,
+}
+
+impl<const N: usize> Motors<N> {
+    /// The motors of `axes`, of which there are `N`.
+    pub fn of(axes: &[Axis; N]) -> Self {
+        let each = |value: fn(&Axis) -> f64| SVector::from_fn(|row, _| value(&axes[row]));
+        Self {
+            windings: Windings {
+                resistance: each(|axis| axis.motor.resistance),
+                inductance: each(|axis| axis.motor.inductance),
+                torque_constant: each(|axis| axis.motor.torque_constant),
+            },
+            inertia: each(|axis| axis.motor.rotor_inertia),
+            coulomb: each(|axis| axis.friction.coulomb),
+            viscous: each(|axis| axis.friction.viscous),
+            ratio: each(|axis| axis.ratio),
+            voltage: each(|axis| axis.motor.voltage),
+            current: each(|axis| axis.motor.current),
+        }
+    }
+}
+
+/// What joins motors and load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Transmission<const N: usize> {
+    Rigid,
+    Elastic { stiffness: SMatrix<f64, N, N>, damping: SMatrix<f64, N, N> },
+}
+
+/// An inertia in joint coordinates with its inverse; inverted again only when it changes, which
+/// for most mechanisms is never.
+#[derive(Debug, Clone, Copy)]
+struct Inertia<const N: usize> {
+    matrix: SMatrix<f64, N, N>,
+    inverse: SMatrix<f64, N, N>,
+}
+
+/// The equations of motion.
+#[derive(Debug, Clone)]
+pub struct Dynamics<const N: usize, M> {
+    mechanism: M,
+    motors: Motors<N>,
+    transmission: Transmission<N>,
+    inertia: Inertia<N>,
+}
+
+impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
+    /// The equations of `mechanism` moved by `motors`.
+    ///
+    /// # Errors
+    /// If the mass matrix at `home` cannot be inverted.
+    pub fn new(mechanism: M, motors: Motors<N>, home: &Joints<N>) -> Result<Self, PlantError> {
+        let transmission = match mechanism.stiffness() {
+            Some(stiffness) => Transmission::Elastic { stiffness, damping: mechanism.damping() },
+            None => Transmission::Rigid,
+        };
+        let mut matrix = mechanism.mass_matrix(home);
+        if transmission == Transmission::Rigid {
+            matrix += rotors(&motors);
+        }
+        let inverse = matrix.try_inverse().ok_or(PlantError::SingularMass)?;
+        Ok(Self { mechanism, motors, transmission, inertia: Inertia { matrix, inverse } })
+    }
+
+    /// The mechanism.
+    pub fn mechanism(&self) -> &M {
+        &self.mechanism
+    }
+
+    /// The motors.
+    pub fn motors(&self) -> &Motors<N> {
+        &self.motors
+    }
+
+    /// Puts the load where a rigid transmission has it; leaves it alone behind an elastic one.
+    pub fn couple(&self, state: &mut State<N>) {
+        if self.transmission == Transmission::Rigid {
+            state.load = self.motors.ratio.component_mul(&state.angle);
+            state.load_speed = self.motors.ratio.component_mul(&state.speed);
+        }
+    }
+
+    /// An upper bound of the modulus of every mechanical eigenvalue at `home` [1/s].
+    ///
+    /// For `s² + d·s + w²` with matrix norms `d` and `w²`, `|s| ≤ (d + √(d² + 4w²))/2`.
+    pub fn fastest(&self) -> f64 {
+        let motors = &self.motors;
+        let drag = motors.viscous.component_div(&motors.inertia).amax();
+        let Transmission::Elastic { stiffness, damping } = &self.transmission else {
+            return drag;
+        };
+        let admittance = self.inertia.inverse
+            + SMatrix::from_diagonal(
+                &motors.ratio.component_mul(&motors.ratio).component_div(&motors.inertia),
+            );
+        let row_sum = |matrix: SMatrix<f64, N, N>| {
+            matrix.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
+        };
+        let square = row_sum(admittance * stiffness);
+        let linear = row_sum(admittance * damping) + drag;
+        (linear + (linear * linear + 4.0 * square).sqrt()) / 2.0
+    }
+
+    /// Torque that turns each motor, Coulomb friction left out: what its stiction must hold.
+    pub fn net_torque(&mut self, state: &State<N>, contacts: &Contacts<N>) -> SVector<f64, N> {
+        let motors = self.motors;
+        let shaft = motors.windings.torque_constant.component_mul(&state.current)
+            - motors.viscous.component_mul(&state.speed);
+        match self.transmission {
+            Transmission::Elastic { .. } => {
+                shaft - motors.ratio.component_mul(&self.transmitted(state))
+            }
+            Transmission::Rigid => {
+                let (_, load) = self.accelerations(state, contacts);
+                let bias = self.mechanism.bias(&state.load, &state.load_speed);
+                // A held motor bears what the others' acceleration puts on its joint.
+                let load_side = self.inertia.matrix * load + bias;
+                shaft - motors.ratio.component_mul(&load_side)
+            }
+        }
+    }
+
+    /// Effort that the transmission puts on the joints [N or N·m]; zero when it is rigid.
+    pub fn transmitted(&self, state: &State<N>) -> Joints<N> {
+        match &self.transmission {
+            Transmission::Rigid => Joints::zeros(),
+            Transmission::Elastic { stiffness, damping } => {
+                let ratio = &self.motors.ratio;
+                stiffness * (ratio.component_mul(&state.angle) - state.load)
+                    + damping * (ratio.component_mul(&state.speed) - state.load_speed)
+            }
+        }
+    }
+
+    /// Accelerations of motors [rad/s²] and load [m/s² or rad/s²].
+    fn accelerations(
+        &mut self,
+        state: &State<N>,
+        contacts: &Contacts<N>,
+    ) -> (SVector<f64, N>, Joints<N>) {
+        let motors = &self.motors;
+        let torque = motors.windings.torque_constant.component_mul(&state.current)
+            - motors.viscous.component_mul(&state.speed)
+            - contacts.torque();
+        let bias = self.mechanism.bias(&state.load, &state.load_speed);
+        match self.transmission {
+            Transmission::Elastic { .. } => {
+                let effort = self.transmitted(state);
+                let motor = (torque - motors.ratio.component_mul(&effort))
+                    .component_div(&motors.inertia)
+                    .component_mul(contacts.free());
+                self.refresh(&state.load);
+                (motor, self.inertia.inverse * (effort - bias))
+            }
+            Transmission::Rigid => {
+                let push =
+                    (torque.component_div(&motors.ratio) - bias).component_mul(contacts.free());
+                let ratio = motors.ratio;
+                self.refresh(&state.load);
+                let load = if contacts.any_held() {
+                    self.partly_held(&push, contacts.free())
+                } else {
+                    self.inertia.inverse * push
+                };
+                (load.component_div(&ratio), load)
+            }
+        }
+    }
+
+    /// Accelerations of the joints that are free, the others being held.
+    fn partly_held(&self, push: &Joints<N>, free: &SVector<f64, N>) -> Joints<N> {
+        let matrix = SMatrix::<f64, N, N>::from_fn(|row, column| {
+            let held = if row == column { 1.0 - free[row] } else { 0.0 };
+            self.inertia.matrix[(row, column)] * free[row] * free[column] + held
+        });
+        // A principal part of a positive definite matrix is one too.
+        matrix.try_inverse().map_or_else(Joints::zeros, |inverse| inverse * push)
+    }
+
+    /// Follows a mass matrix that depends on the position. One that cannot be inverted, at a
+    /// singular position, leaves the last good one in force.
+    fn refresh(&mut self, load: &Joints<N>) {
+        let mut matrix = self.mechanism.mass_matrix(load);
+        if self.transmission == Transmission::Rigid {
+            matrix += rotors(&self.motors);
+        }
+        if matrix != self.inertia.matrix
+            && let Some(inverse) = matrix.try_inverse()
+        {
+            self.inertia = Inertia { matrix, inverse };
+        }
+    }
+
+    /// Where `start` is after one step of the length of `weights`.
+    ///
+    /// Classical fourth-order Runge–Kutta for the mechanical part; the winding is solved by its
+    /// exponentials at the same stages. Powers of current beyond the stage's limit are cut at the
+    /// end of the step: see [`super::Plant`].
+    pub fn step(
+        &mut self,
+        start: &State<N>,
+        contacts: &Contacts<N>,
+        phases: &Phases<N>,
+        weights: &Weights<N>,
+    ) -> State<N> {
+        let step = weights.step;
+        let half = 0.5 * step;
+        let course = match phases {
+            Phases::Open => None,
+            Phases::Driven(voltage) => {
+                Some(self.motors.windings.course(&start.current, &start.speed, voltage))
+            }
+        };
+        let current =
+            |value: fn(&super::winding::Course<N>, &Weights<N>, &SVector<f64, N>) -> _,
+             speed: &SVector<f64, N>| {
+                course.as_ref().map_or_else(SVector::zeros, |course| value(course, weights, speed))
+            };
+        let mut first = *start;
+        if course.is_none() {
+            first.current = SVector::zeros();
+        }
+        let (motor_1, load_1) = self.accelerations(&first, contacts);
+
+        let mut second = State {
+            current: current(|course, weights, _| course.second(weights), &first.speed),
+            angle: first.angle + first.speed * half,
+            speed: first.speed + motor_1 * half,
+            load: first.load + first.load_speed * half,
+            load_speed: first.load_speed + load_1 * half,
+        };
+        self.couple(&mut second);
+        let (motor_2, load_2) = self.accelerations(&second, contacts);
+
+        let mut third = State {
+            current: current(super::winding::Course::third, &second.speed),
+            angle: first.angle + second.speed * half,
+            speed: first.speed + motor_2 * half,
+            load: first.load + second.load_speed * half,
+            load_speed: first.load_speed + load_2 * half,
+        };
+        self.couple(&mut third);
+        let (motor_3, load_3) = self.accelerations(&third, contacts);
+
+        let mut fourth = State {
+            current: current(super::winding::Course::fourth, &third.speed),
+            angle: first.angle + third.speed * step,
+            speed: first.speed + motor_3 * step,
+            load: first.load + third.load_speed * step,
+            load_speed: first.load_speed + load_3 * step,
+        };
+        self.couple(&mut fourth);
+        let (motor_4, load_4) = self.accelerations(&fourth, contacts);
+
+        let sixth = step / 6.0;
+        let between = second.speed + third.speed;
+        let mut end = State {
+            current: course.map_or_else(SVector::zeros, |course| {
+                course.end(weights, &(between * 0.5), &fourth.speed)
+            }),
+            angle: first.angle + (first.speed + between * 2.0 + fourth.speed) * sixth,
+            speed: first.speed + (motor_1 + (motor_2 + motor_3) * 2.0 + motor_4) * sixth,
+            load: first.load
+                + (first.load_speed
+                    + (second.load_speed + third.load_speed) * 2.0
+                    + fourth.load_speed)
+                    * sixth,
+            load_speed: first.load_speed + (load_1 + (load_2 + load_3) * 2.0 + load_4) * sixth,
+        };
+        self.couple(&mut end);
+        end
+    }
+}
+
+/// The rotors' inertia in joint coordinates.
+fn rotors<const N: usize>(motors: &Motors<N>) -> SMatrix<f64, N, N> {
+    SMatrix::from_diagonal(
+        &motors.inertia.component_div(&motors.ratio.component_mul(&motors.ratio)),
+    )
+}

@@ -1,0 +1,235 @@
+//! Coulomb friction with true stiction: which motors stick, which slide, and when that changes.
+//!
+//! The law (the same that the feedforward uses, since the friction model decides accuracy): a
+//! sliding motor feels `Tc` against its motion; one at rest is held exactly as long as less than
+//! `Tc` acts on it, and starts the instant more does. No speed band, no creep: a stuck motor's
+//! speed is 0.0 and its angle does not change in the last bit.
+//!
+//! Within a smooth stretch every motor keeps its contact. The two events that end one, a sliding
+//! motor reaching speed 0 and a held one being overcome, are located inside the step, and the
+//! rest of the step is taken with the new contacts. So the switching does not lower the order of
+//! the integration, as a sign function evaluated in its stages or a split impulse would.
+
+use machine::Mechanism;
+use nalgebra::SVector;
+
+use super::dynamics::{Dynamics, Phases, State};
+use super::winding::Weights;
+
+/// Refinements of the instant of an event; the margins are smooth, so that each takes regula
+/// falsi several digits on.
+const REFINEMENTS: usize = 4;
+
+/// An event this close to the end of a step, as a share of it, is at its end.
+const TIME_RESOLUTION: f64 = 1e-12;
+
+/// One motor and its friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Contact {
+    /// There is no Coulomb friction.
+    Frictionless,
+    /// At rest, and held there.
+    Held,
+    /// Sliding in the direction of this sign.
+    Sliding(f64),
+}
+
+/// The contacts of all motors through one smooth stretch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contacts<const N: usize> {
+    contact: [Contact; N],
+    torque: SVector<f64, N>,
+    free: SVector<f64, N>,
+    held: usize,
+}
+
+impl<const N: usize> Contacts<N> {
+    fn new() -> Self {
+        Self {
+            contact: [Contact::Frictionless; N],
+            torque: SVector::zeros(),
+            free: SVector::repeat(1.0),
+            held: 0,
+        }
+    }
+
+    fn set(&mut self, motor: usize, contact: Contact, coulomb: f64) {
+        self.contact[motor] = contact;
+        (self.torque[motor], self.free[motor]) = match contact {
+            Contact::Frictionless => (0.0, 1.0),
+            Contact::Held => (0.0, 0.0),
+            Contact::Sliding(sign) => (coulomb * sign, 1.0),
+        };
+        self.held = self.contact.iter().filter(|contact| **contact == Contact::Held).count();
+    }
+
+    /// Coulomb torque against each motor [N·m].
+    pub fn torque(&self) -> &SVector<f64, N> {
+        &self.torque
+    }
+
+    /// 1 for a motor that can move, 0 for one that is held.
+    pub fn free(&self) -> &SVector<f64, N> {
+        &self.free
+    }
+
+    /// Whether any motor is held.
+    pub fn any_held(&self) -> bool {
+        self.held != 0
+    }
+
+    /// The contacts in which `state` goes on.
+    fn decide<M: Mechanism<N>>(dynamics: &mut Dynamics<N, M>, state: &State<N>) -> Self {
+        let coulomb = dynamics.motors().coulomb;
+        let mut contacts = Self::new();
+        for motor in 0..N {
+            if coulomb[motor] > 0.0 {
+                let speed = state.speed[motor];
+                let contact =
+                    if speed == 0.0 { Contact::Held } else { Contact::Sliding(speed.signum()) };
+                contacts.set(motor, contact, coulomb[motor]);
+            }
+        }
+        // Behind a rigid transmission, one motor that lets go changes what the others must bear:
+        // the worst lets go first, and the rest are asked again.
+        while contacts.any_held() {
+            let torque = dynamics.net_torque(state, &contacts);
+            let mut worst = None;
+            let mut excess = 0.0;
+            for motor in 0..N {
+                let over = torque[motor].abs() - coulomb[motor];
+                if contacts.contact[motor] == Contact::Held && over > excess {
+                    (worst, excess) = (Some(motor), over);
+                }
+            }
+            let Some(motor) = worst else { break };
+            contacts.set(motor, Contact::Sliding(torque[motor].signum()), coulomb[motor]);
+        }
+        contacts
+    }
+
+    /// How far each motor is from the end of its contact; negative once it is past it.
+    fn margins<M: Mechanism<N>>(
+        &self,
+        dynamics: &mut Dynamics<N, M>,
+        state: &State<N>,
+    ) -> [f64; N] {
+        let torque =
+            if self.any_held() { dynamics.net_torque(state, self) } else { SVector::zeros() };
+        let coulomb = dynamics.motors().coulomb;
+        core::array::from_fn(|motor| match self.contact[motor] {
+            Contact::Frictionless => f64::INFINITY,
+            Contact::Held => coulomb[motor] - torque[motor].abs(),
+            Contact::Sliding(sign) => sign * state.speed[motor],
+        })
+    }
+}
+
+/// Takes `state` one step on, through all events inside it.
+pub fn advance<const N: usize, M: Mechanism<N>>(
+    dynamics: &mut Dynamics<N, M>,
+    state: &State<N>,
+    phases: &Phases<N>,
+    weights: &Weights<N>,
+) -> State<N> {
+    let mut state = *state;
+    let mut weights = *weights;
+    let mut contacts = Contacts::decide(dynamics, &state);
+    // Every motor may stop and start again within a step; more than that is chatter.
+    for _ in 0..2 * N + 2 {
+        let end = dynamics.step(&state, &contacts, phases, &weights);
+        let after = contacts.margins(dynamics, &end);
+        if after.iter().all(|margin| *margin >= 0.0) {
+            return end;
+        }
+        let before = contacts.margins(dynamics, &state);
+        let first = earliest(&before, &after);
+        let (motor, _) = first;
+        let margins = (before[motor], after[motor]);
+        let share = locate(dynamics, &state, &contacts, phases, &weights, first, margins);
+        let rest = weights.step * (1.0 - share);
+        if share > 0.0 {
+            weights = dynamics.motors().windings.weights(weights.step * share);
+            state = dynamics.step(&state, &contacts, phases, &weights);
+        }
+        let coulomb = dynamics.motors().coulomb[motor];
+        match contacts.contact[motor] {
+            Contact::Held => {
+                let sign = dynamics.net_torque(&state, &contacts)[motor].signum();
+                contacts.set(motor, Contact::Sliding(sign), coulomb);
+            }
+            Contact::Sliding(_) | Contact::Frictionless => {
+                state.speed[motor] = 0.0;
+                dynamics.couple(&mut state);
+                contacts.set(motor, Contact::Held, coulomb);
+                let torque = dynamics.net_torque(&state, &contacts)[motor];
+                if torque.abs() > coulomb {
+                    contacts.set(motor, Contact::Sliding(torque.signum()), coulomb);
+                }
+            }
+        }
+        if rest <= weights.step * TIME_RESOLUTION {
+            return state;
+        }
+        weights = dynamics.motors().windings.weights(rest);
+    }
+    // Chatter: what changes its mind again and again within a step is at rest in it.
+    for motor in 0..N {
+        if contacts.contact[motor] != Contact::Frictionless && state.speed[motor].abs() == 0.0 {
+            contacts.set(motor, Contact::Held, 0.0);
+        }
+    }
+    dynamics.step(&state, &contacts, phases, &weights)
+}
+
+/// The motor whose contact ends first, with the share of the step at which it does, by the chord.
+fn earliest<const N: usize>(before: &[f64; N], after: &[f64; N]) -> (usize, f64) {
+    let mut first = (0, f64::INFINITY);
+    for motor in 0..N {
+        if after[motor] < 0.0 {
+            let share = chord(before[motor].max(0.0), after[motor]);
+            if share < first.1 {
+                first = (motor, share);
+            }
+        }
+    }
+    first
+}
+
+/// Where the line from `before ≥ 0` at 0 to `after < 0` at 1 crosses zero.
+fn chord(before: f64, after: f64) -> f64 {
+    before / (before - after)
+}
+
+/// The share of the step at which the margin of `motor` vanishes, from the guess `share` on.
+fn locate<const N: usize, M: Mechanism<N>>(
+    dynamics: &mut Dynamics<N, M>,
+    state: &State<N>,
+    contacts: &Contacts<N>,
+    phases: &Phases<N>,
+    weights: &Weights<N>,
+    (motor, guess): (usize, f64),
+    (before, after): (f64, f64),
+) -> f64 {
+    let (mut low, mut high) = ((0.0, before.max(0.0)), (1.0, after));
+    let mut share = guess;
+    for _ in 0..REFINEMENTS {
+        if share <= low.0 || share >= high.0 {
+            break;
+        }
+        let part = dynamics.motors().windings.weights(weights.step * share);
+        let there = dynamics.step(state, contacts, phases, &part);
+        let margin = contacts.margins(dynamics, &there)[motor];
+        if margin >= 0.0 {
+            low = (share, margin);
+        } else {
+            high = (share, margin);
+        }
+        let next = low.0 + (high.0 - low.0) * chord(low.1, high.1);
+        if (next - share).abs() <= TIME_RESOLUTION {
+            return next;
+        }
+        share = next;
+    }
+    share
+}

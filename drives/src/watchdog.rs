@@ -1,0 +1,255 @@
+//! What becomes of the machine when commands stop or cannot be trusted.
+//!
+//! Duties:
+//!
+//! - **Gate**: open only in a cycle with a fresh command. The first cycle without one is dark; the
+//!   axes go on with the last command for it, which at constant speed is the right voltage.
+//! - **Axes**: after [`MOST_MISSES`] cycles in a row without a fresh command, or at once for a
+//!   command that makes no sense, a fault of the port or a lost peer, they are stopped by the
+//!   drive's own brake, in the dark and with all outputs off.
+//! - **Latch**: a stop stays, with its first cause, until a person has asked for a reset (its
+//!   ticket travels in the command) and the controller starts again from disabled.
+//!
+//! ```text
+//! Waiting ──command: disabled──► Following ──doubt──► Stopped
+//!    ▲ ▲                            │                    │
+//!    │ └──three misses, unpowered───┘                    │
+//!    └──────────command: disabled, with a new reset──────┘   (goes on to Following)
+//! ```
+//!
+//! This is software on the control computer and not a safety function: the laser's interlock and
+//! the motors' safe torque off are wired.
+
+use signals::{
+    AxisArray, Command, CommandMode, Fault, FaultCode, LaserCycle, Nanoseconds, axis::MAX_AXES,
+};
+
+use crate::port::{Actuation, Freshness};
+
+/// Cycles in a row without a fresh command after which the axes are stopped.
+pub const MOST_MISSES: u32 = 3;
+
+/// Whether the gate may open in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum GatePermission {
+    /// Every peer lives: the command decides.
+    #[default]
+    Granted,
+    /// A peer was found dead: closed whatever the command says.
+    Inhibited,
+}
+
+/// What the watchdog makes of the commands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Watch {
+    /// Unpowered and dark; only a command that says disabled is taken.
+    Waiting,
+    /// Each fresh command is carried out.
+    Following,
+    /// Stopped alone, until a person resets.
+    Stopped,
+}
+
+/// What the watchdog counted since start.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Cycles without a fresh command.
+    pub missed: u64,
+    /// Times it closed an open gate.
+    pub gate_trips: u64,
+    /// Times it stopped powered axes.
+    pub stops: u64,
+}
+
+/// The watchdog of one bridge.
+#[derive(Debug, Clone)]
+pub struct Watchdog {
+    axes: usize,
+    watch: Watch,
+    misses: u32,
+    reset: u64,
+    fault: Fault,
+    last: Actuation,
+    /// Stroke of the open gate at the end of the last cycle, 0 when it was closed.
+    gate: u32,
+    counts: Counts,
+}
+
+impl Watchdog {
+    /// A watchdog over `axes` axes that waits for the first command.
+    pub fn new(axes: usize) -> Self {
+        Self {
+            axes: axes.min(MAX_AXES),
+            watch: Watch::Waiting,
+            misses: 0,
+            reset: 0,
+            fault: Fault::default(),
+            last: Actuation::DISABLED,
+            gate: 0,
+            counts: Counts::default(),
+        }
+    }
+
+    /// Its state.
+    pub fn watch(&self) -> Watch {
+        self.watch
+    }
+
+    /// The cause of the stop, if there is one.
+    pub fn fault(&self) -> &Fault {
+        &self.fault
+    }
+
+    /// What it counted.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// What is in force in the cycle that begins `now`, with the fresh command if one came.
+    /// `resting` axes may be unpowered while stopped; moving ones are braked first.
+    pub fn decide(
+        &mut self,
+        command: Option<&Command>,
+        permission: GatePermission,
+        resting: bool,
+        now: Nanoseconds,
+    ) -> Actuation {
+        match command {
+            Some(command) => self.fresh(command, resting, now),
+            None => self.missed(now),
+        }
+        if permission == GatePermission::Inhibited {
+            self.darken();
+        }
+        let commanded = self.last.freshness == Freshness::Fresh;
+        self.counts.gate_trips += u64::from(self.gate != 0 && !commanded);
+        (self.gate, _) = self.last.laser.last();
+        self.last
+    }
+
+    fn fresh(&mut self, command: &Command, resting: bool, now: Nanoseconds) {
+        self.misses = 0;
+        let mode = command.mode();
+        match self.watch {
+            Watch::Waiting if mode == CommandMode::Disabled => {
+                self.watch = Watch::Following;
+                self.reset = command.reset;
+            }
+            Watch::Waiting => {
+                self.reset = command.reset;
+                let code = FaultCode::DriveFault as u32;
+                let value = f64::from(command.mode);
+                self.stop(Fault { code, axis: 0, value, limit: 0.0, at: now });
+            }
+            Watch::Following => {
+                self.reset = command.reset;
+                let doubt = doubt(command, self.axes, now);
+                if doubt.is_some() {
+                    self.stop(doubt);
+                }
+            }
+            Watch::Stopped if mode == CommandMode::Disabled => {
+                if command.reset != 0 && command.reset != self.reset {
+                    self.reset = command.reset;
+                    self.watch = Watch::Following;
+                    self.fault = Fault::default();
+                } else if resting {
+                    self.last = Actuation::DISABLED;
+                }
+            }
+            Watch::Stopped => {}
+        }
+        if self.watch == Watch::Following {
+            self.last = actuation(command, mode);
+        }
+    }
+
+    fn missed(&mut self, now: Nanoseconds) {
+        if self.watch == Watch::Waiting {
+            return;
+        }
+        self.counts.missed += 1;
+        self.misses = self.misses.saturating_add(1);
+        self.darken();
+        if self.watch == Watch::Following && self.misses >= MOST_MISSES {
+            if self.last.mode == CommandMode::Disabled {
+                self.watch = Watch::Waiting;
+                self.last = Actuation::DISABLED;
+            } else {
+                self.stop(Fault {
+                    code: FaultCode::StaleCommand as u32,
+                    axis: 0,
+                    value: f64::from(self.misses),
+                    limit: f64::from(MOST_MISSES),
+                    at: now,
+                });
+            }
+        }
+    }
+
+    /// Stops the axes from now on. Only the first cause is kept.
+    pub fn stop(&mut self, cause: Fault) -> Actuation {
+        if self.watch != Watch::Stopped {
+            self.watch = Watch::Stopped;
+            self.fault = cause;
+            self.last = if self.last.mode == CommandMode::Disabled {
+                Actuation::DISABLED
+            } else {
+                self.counts.stops += 1;
+                Actuation::QUICK_STOP
+            };
+        }
+        self.last
+    }
+
+    /// Keeps the gate closed in what is in force.
+    fn darken(&mut self) {
+        self.last.freshness = Freshness::Stale;
+        self.last.laser = LaserCycle::OFF;
+    }
+}
+
+/// What `command` asks for. Without a mode that follows the controller there is no light either.
+fn actuation(command: &Command, mode: CommandMode) -> Actuation {
+    let follows = !matches!(mode, CommandMode::Disabled | CommandMode::QuickStop);
+    Actuation {
+        freshness: Freshness::Fresh,
+        mode,
+        position: command.position,
+        velocity: command.velocity,
+        effort: command.effort,
+        voltage: command.voltage,
+        outputs: command.outputs,
+        laser: if follows { command.laser } else { LaserCycle::OFF },
+    }
+}
+
+/// What makes `command` impossible to carry out, if anything: a target of its mode that is not
+/// finite, or a laser cycle that makes no sense.
+fn doubt(command: &Command, axes: usize, now: Nanoseconds) -> Fault {
+    let fault = |code: FaultCode, axis, value, limit| Fault {
+        code: code as u32,
+        axis,
+        value,
+        limit,
+        at: now,
+    };
+    let targets: Option<&AxisArray> = match command.mode() {
+        CommandMode::Disabled | CommandMode::QuickStop => None,
+        CommandMode::Position => Some(&command.position),
+        CommandMode::Velocity => Some(&command.velocity),
+        CommandMode::Effort => Some(&command.effort),
+        CommandMode::Voltage => Some(&command.voltage),
+    };
+    let broken = targets.and_then(|targets| {
+        targets.iter().take(axes).enumerate().find(|(_, target)| !target.is_finite())
+    });
+    if let Some((axis, target)) = broken {
+        return fault(FaultCode::NotFinite, axis as u32 + 1, *target, 0.0);
+    }
+    if !command.laser.is_valid() {
+        let edges = f64::from(command.laser.edge_count);
+        return fault(FaultCode::DriveFault, 0, edges, signals::MAX_EDGES as f64);
+    }
+    Fault::default()
+}
