@@ -5,13 +5,17 @@
 //! [`Machine`] need not check it again.
 
 pub mod actuator;
+pub mod document;
+pub mod file;
 pub mod kinematics;
 pub mod limits;
 pub mod machine;
 pub mod mechanisms;
 pub mod process;
+pub mod quantity;
 
 pub use actuator::{Axis, DcMotor, Encoder, Friction, LoopGains};
+pub use document::{DocumentError, Override};
 pub use kinematics::{Mechanism, Pose};
 pub use limits::{AxisLimits, PathLimits, WorkArea};
 pub use machine::{Machine, Warning};

@@ -1,0 +1,228 @@
+//! What is said of a document that is not sound.
+
+use core::fmt;
+use std::sync::Arc;
+
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+
+use super::node::Place;
+
+/// A text that values come from: the file, or one override.
+#[derive(Debug)]
+pub(crate) struct Source {
+    pub(crate) name: String,
+    pub(crate) text: String,
+    is_file: bool,
+    code: NamedSource<String>,
+}
+
+impl Source {
+    pub(crate) fn file(name: &str, text: &str) -> Arc<Self> {
+        Arc::new(Self::new(name, text.to_owned(), true))
+    }
+
+    pub(crate) fn command_line(text: String) -> Self {
+        Self::new("--set", text, false)
+    }
+
+    fn new(name: &str, text: String, is_file: bool) -> Self {
+        Self { name: name.to_owned(), is_file, code: NamedSource::new(name, text.clone()), text }
+    }
+
+    /// Line and column of byte `offset`, both from 1, the column in characters.
+    pub(crate) fn position(&self, offset: usize) -> Option<(usize, usize)> {
+        if !self.is_file {
+            return None;
+        }
+        let before = self.text.get(..offset).unwrap_or(&self.text);
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let line = before.matches('\n').count() + 1;
+        let column = before.get(line_start..).map_or(0, |text| text.chars().count()) + 1;
+        Some((line, column))
+    }
+}
+
+/// What kind of thing is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProblemKind {
+    /// The file cannot be read.
+    Unreadable,
+    /// It is not TOML.
+    Syntax,
+    /// A key that means nothing here.
+    UnknownKey,
+    /// A key that must be there is not.
+    MissingKey,
+    /// A value of another type than is due.
+    WrongType,
+    /// A number without a unit where a quantity is due.
+    BareNumber,
+    /// A unit that does not exist or cannot be read.
+    UnknownUnit,
+    /// A quantity of another kind than is due.
+    WrongUnit,
+    /// A word that is none of those possible.
+    UnknownWord,
+    /// NaN, infinite or beyond any machine.
+    NotFinite,
+    /// A number outside its range.
+    OutOfRange,
+    /// Two values that cannot both be right.
+    Contradiction,
+}
+
+/// One thing that is wrong, with its place.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// What kind of thing.
+    pub kind: ProblemKind,
+    pub(super) source: Arc<Source>,
+    pub(super) place: Place,
+    pub(super) message: String,
+    pub(super) help: Option<String>,
+}
+
+impl Problem {
+    /// What is wrong, without the place.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// Line from 1; `None` for an override or an unreadable file.
+    pub fn line(&self) -> Option<usize> {
+        self.position().map(|(line, _)| line)
+    }
+
+    /// Column in characters from 1; `None` for an override or an unreadable file.
+    pub fn column(&self) -> Option<usize> {
+        self.position().map(|(_, column)| column)
+    }
+
+    fn position(&self) -> Option<(usize, usize)> {
+        if self.kind == ProblemKind::Unreadable {
+            return None;
+        }
+        self.source.position(self.place.start)
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.position() {
+            Some((line, column)) => write!(formatter, "{}:{line}:{column}: ", self.source.name)?,
+            None if self.kind == ProblemKind::Unreadable => {
+                write!(formatter, "{} ", self.source.name)?;
+            }
+            None => write!(formatter, "--set {}: ", self.source.text)?,
+        }
+        write!(formatter, "{}", self.message)?;
+        match &self.help {
+            Some(help) => write!(formatter, "; {help}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl core::error::Error for Problem {}
+
+impl Diagnostic for Problem {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        (self.kind != ProblemKind::Unreadable).then_some(&self.source.code as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        if self.kind == ProblemKind::Unreadable {
+            return None;
+        }
+        let length = self.place.end.saturating_sub(self.place.start);
+        let label = LabeledSpan::new_primary_with_span(
+            Some(self.message.clone()),
+            (self.place.start, length),
+        );
+        Some(Box::new(core::iter::once(label)))
+    }
+}
+
+/// A document that is not sound: at least one [`Problem`], in the order of the file.
+#[derive(Debug, Clone)]
+pub struct DocumentError {
+    file: String,
+    // Boxed to keep the results that carry this small.
+    first: Box<Problem>,
+    others: Vec<Problem>,
+}
+
+impl DocumentError {
+    pub(super) fn new(file: String, first: Problem, others: Vec<Problem>) -> Self {
+        Self { file, first: Box::new(first), others }
+    }
+
+    pub(super) fn unreadable(file: &str, message: String) -> Self {
+        let first = Problem {
+            kind: ProblemKind::Unreadable,
+            source: Source::file(file, ""),
+            place: Place { source: 0, start: 0, end: 0 },
+            message,
+            help: None,
+        };
+        Self::new(file.to_owned(), first, Vec::new())
+    }
+
+    /// The file as it was named.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Everything that is wrong.
+    pub fn problems(&self) -> impl Iterator<Item = &Problem> {
+        core::iter::once(&*self.first).chain(&self.others)
+    }
+
+    /// Line of the first problem from 1; `None` for an override or an unreadable file.
+    pub fn line(&self) -> Option<usize> {
+        self.first.line()
+    }
+
+    /// Column of the first problem in characters from 1; as [`Self::line`].
+    pub fn column(&self) -> Option<usize> {
+        self.first.column()
+    }
+
+    /// What is wrong first, without its place.
+    pub fn message(&self) -> &str {
+        self.first.message()
+    }
+}
+
+impl fmt::Display for DocumentError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.first, formatter)
+    }
+}
+
+impl core::error::Error for DocumentError {}
+
+impl Diagnostic for DocumentError {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.first.help()
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.first.source_code()
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        self.first.labels()
+    }
+
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
+        if self.others.is_empty() {
+            return None;
+        }
+        Some(Box::new(self.others.iter().map(|problem| problem as &dyn Diagnostic)))
+    }
+}

@@ -1,0 +1,90 @@
+//! What is found wrong while a document is decoded and checked.
+
+use std::sync::Arc;
+
+use super::error::{DocumentError, Problem, ProblemKind, Source};
+use super::node::Place;
+
+/// Problems so far, and the texts that they point into.
+#[derive(Debug)]
+pub struct Findings {
+    sources: Vec<Arc<Source>>,
+    problems: Vec<Problem>,
+}
+
+impl Findings {
+    pub(super) fn new(file: Arc<Source>) -> Self {
+        Self { sources: vec![file], problems: Vec::new() }
+    }
+
+    pub(super) fn add_source(&mut self, source: Arc<Source>) -> usize {
+        self.sources.push(source);
+        self.sources.len() - 1
+    }
+
+    /// The file as it was named.
+    pub fn file(&self) -> &str {
+        self.sources.first().map_or("", |source| &source.name)
+    }
+
+    /// Whether nothing is wrong so far.
+    pub fn is_empty(&self) -> bool {
+        self.problems.is_empty()
+    }
+
+    /// Line and column of `place` in the file, both from 1; `None` for an override.
+    pub fn position(&self, place: Place) -> Option<(usize, usize)> {
+        self.sources.get(place.source)?.position(place.start)
+    }
+
+    /// The override that `place` is in, as on the command line; `None` for the file.
+    pub fn override_text(&self, place: Place) -> Option<&str> {
+        if place.source == 0 {
+            return None;
+        }
+        self.sources.get(place.source).map(|source| source.text.as_str())
+    }
+
+    /// Notes that what stands at `place` is wrong, and what would be right.
+    pub fn refuse(
+        &mut self,
+        kind: ProblemKind,
+        place: Place,
+        message: String,
+        help: Option<String>,
+    ) {
+        let Some(source) = self.sources.get(place.source).cloned() else { return };
+        self.problems.push(Problem { kind, source, place, message, help });
+    }
+
+    /// Notes that a value contradicts another.
+    pub fn contradict(&mut self, place: Place, message: String, help: &str) {
+        self.refuse(ProblemKind::Contradiction, place, message, Some(help.to_owned()));
+    }
+
+    /// Gives `value` if nothing is wrong.
+    ///
+    /// # Errors
+    /// Everything that is wrong.
+    pub fn finish<T>(self, value: T) -> Result<T, DocumentError> {
+        if self.problems.is_empty() { Ok(value) } else { Err(self.into_error()) }
+    }
+
+    /// Everything that is wrong, ordered by place; overrides after the file.
+    ///
+    /// Called only when something is.
+    pub(super) fn into_error(mut self) -> DocumentError {
+        let file = self.file().to_owned();
+        self.problems.sort_by_key(|problem| (problem.place.source, problem.place.start));
+        let mut problems = self.problems.into_iter();
+        match problems.next() {
+            Some(first) => DocumentError::new(file, first, problems.collect()),
+            None => DocumentError::unreadable(&file, "is empty".to_owned()),
+        }
+    }
+
+    /// Gives up after something was found wrong.
+    pub fn fail<T>(self) -> Result<T, DocumentError> {
+        Err(self.into_error())
+    }
+}

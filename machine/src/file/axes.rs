@@ -1,0 +1,181 @@
+//! From the axes' tables to [`Axis`]: ratios, what the loops move, and the motor's own limits.
+
+use core::f64::consts::TAU;
+
+use super::tables::{AxisTable, LimitsTable};
+use crate::actuator::{Axis, DcMotor, Encoder, Friction, LoopGains};
+use crate::document::{Findings, ProblemKind};
+use crate::limits::AxisLimits;
+
+/// Share of the motor's no-load speed that an axis may use where the file sets no limit: what is
+/// left of the voltage there drives the current that friction takes.
+const SPEED_SHARE: f64 = 0.9;
+
+/// What the mechanism knows of an axis.
+pub(super) struct Joint {
+    /// The name that the axis must have.
+    pub(super) name: &'static str,
+    /// Joint travel per radian of the gear's output [m/rad].
+    pub(super) travel: f64,
+    /// Load that the joint moves, the other joints at rest [kg].
+    pub(super) load: f64,
+    /// Inertia that turns stiffly with the gear's output [kg·m²].
+    pub(super) stiff_inertia: f64,
+    /// Range of the joint over the working area [m].
+    pub(super) range: [f64; 2],
+    /// The joint at home [m].
+    pub(super) home: f64,
+}
+
+/// The axis that `table` describes, driving `joint`.
+pub(super) fn axis(table: &AxisTable, joint: &Joint, findings: &mut Findings) -> Axis {
+    let gear = table.gear.value;
+    let ratio = joint.travel / gear;
+    let data = &table.motor.dc;
+    let motor = DcMotor {
+        resistance: data.resistance.value,
+        inductance: data.inductance.value,
+        torque_constant: data.torque_constant.value,
+        rotor_inertia: data.rotor_inertia.value + joint.stiff_inertia / (gear * gear),
+        voltage: data.voltage.value,
+        current: data.current.value,
+        continuous_current: data.continuous_current.map(|current| current.value),
+    };
+    if let Some(continuous) = data.continuous_current
+        && continuous.value > data.current.value
+    {
+        findings.contradict(
+            continuous.place,
+            format!(
+                "the continuous current of {:.3} A is above the power stage's {:.3} A",
+                continuous.value, data.current.value
+            ),
+            "lower `continuous_current`, or raise `current`",
+        );
+    }
+    if data.nominal_torque.is_some() != data.nominal_speed.is_some() {
+        findings.contradict(
+            data.place,
+            "`nominal_torque` and `nominal_speed` only say something together".to_owned(),
+            "give both or none",
+        );
+    }
+    Axis {
+        name: joint.name.to_owned(),
+        ratio,
+        efficiency: table.efficiency.value,
+        motor,
+        friction: Friction {
+            coulomb: table.friction.coulomb.value,
+            viscous: table.friction.viscous.value,
+        },
+        encoder: encoder(table, findings),
+        gains: gains(table, motor.rotor_inertia + ratio * ratio * joint.load, findings),
+        limits: limits(&table.limits, joint, &motor, ratio, findings),
+    }
+}
+
+fn encoder(table: &AxisTable, findings: &mut Findings) -> Encoder {
+    /// Rounding of a resolution that was written per radian or per degree.
+    const WHOLE: f64 = 1e-6;
+    let resolution = table.encoder.resolution;
+    let counts = (resolution.value * TAU).round();
+    if counts < 1.0 || (resolution.value * TAU - counts).abs() > WHOLE * counts {
+        findings.refuse(
+            ProblemKind::OutOfRange,
+            resolution.place,
+            format!("{} counts in a revolution cannot be", resolution.value * TAU),
+            Some("an encoder has a whole number of counts, such as \"4096 counts/rev\"".to_owned()),
+        );
+    }
+    Encoder { counts }
+}
+
+fn gains(table: &AxisTable, inertia: f64, findings: &mut Findings) -> LoopGains {
+    let loops = &table.loops;
+    // A loop that answers within its own cycle cannot be stable.
+    let fastest = 1.0 / signals::time::CYCLE_TIME;
+    for bandwidth in [loops.position, loops.velocity, loops.current] {
+        if bandwidth.value > fastest {
+            findings.refuse(
+                ProblemKind::OutOfRange,
+                bandwidth.place,
+                format!("a bandwidth of {} rad/s is too high", bandwidth.value),
+                Some(format!("the control cycle bears at most {fastest} rad/s")),
+            );
+        }
+    }
+    for (inner, outer, words) in [
+        (loops.velocity, loops.position, ["velocity", "position"]),
+        (loops.current, loops.velocity, ["current", "velocity"]),
+    ] {
+        if outer.value >= inner.value {
+            // The place of a default is that of its table: what was written is what is wrong.
+            let place = if outer.place == loops.place { inner.place } else { outer.place };
+            findings.contradict(
+                place,
+                format!(
+                    "the {} loop ({} rad/s) must be faster than the {} loop around it ({} rad/s)",
+                    words[0], inner.value, words[1], outer.value
+                ),
+                "raise the one or lower the other",
+            );
+        }
+    }
+    LoopGains {
+        position: loops.position.value,
+        velocity: loops.velocity.value,
+        current: loops.current.value,
+        inertia,
+    }
+}
+
+fn limits(
+    table: &LimitsTable,
+    joint: &Joint,
+    motor: &DcMotor,
+    ratio: f64,
+    findings: &mut Findings,
+) -> AxisLimits {
+    let margin = table.following_error.value;
+    let position = match table.position {
+        None => [joint.range[0] - margin, joint.range[1] + margin],
+        Some([lower, upper]) => {
+            if lower.value >= upper.value {
+                findings.contradict(
+                    lower.place,
+                    format!("the range from {} m to {} m is empty", lower.value, upper.value),
+                    "write [from, to], the smaller first",
+                );
+            } else if joint.home < lower.value || joint.home > upper.value {
+                let place = if joint.home < lower.value { lower.place } else { upper.place };
+                findings.contradict(
+                    place,
+                    format!(
+                        "axis `{}` is at {} m at home, outside its limits {} m to {} m",
+                        joint.name, joint.home, lower.value, upper.value
+                    ),
+                    "widen the limits, or move `home`",
+                );
+            }
+            [lower.value, upper.value]
+        }
+    };
+    let no_load = motor.voltage / motor.torque_constant * ratio;
+    if let Some(velocity) = table.velocity
+        && velocity.value > no_load
+    {
+        findings.contradict(
+            velocity.place,
+            format!("the motor reaches {no_load:.4} m/s without load, not {} m/s", velocity.value),
+            "lower the limit, or leave it out to use 90 % of what the motor can do",
+        );
+    }
+    AxisLimits {
+        position,
+        velocity: table.velocity.map_or(SPEED_SHARE * no_load, |velocity| velocity.value),
+        acceleration: table.acceleration.map_or(f64::INFINITY, |limit| limit.value),
+        jerk: table.jerk.map_or(f64::INFINITY, |limit| limit.value),
+        following_error: margin,
+    }
+}

@@ -1,0 +1,61 @@
+//! Motor data that contradict themselves: doubts for a person, not errors.
+//!
+//! Source 003's own table 3-3 promises a torque that its supply cannot drive, so the voltage limit
+//! line `k·i·R/k + k·ω ≤ V` is what counts, and nominal values are never used.
+
+use core::f64::consts::TAU;
+
+use super::tables::DcMotorTable;
+use crate::document::{Findings, Place};
+use crate::machine::Warning;
+
+/// How far a data sheet's nominal point may lie beyond the limit line before it is doubted: the
+/// rounding of two-digit data.
+const ROUNDING: f64 = 0.02;
+
+/// Doubts about the motor of `axis`.
+pub(super) fn check(axis: &str, motor: &DcMotorTable, findings: &Findings) -> Vec<Warning> {
+    let voltage = motor.voltage.value;
+    let resistance = motor.resistance.value;
+    let constant = motor.torque_constant.value;
+    let mut warnings = Vec::new();
+    if let (Some(torque), Some(speed)) = (motor.nominal_torque, motor.nominal_speed) {
+        let current = torque.value / constant;
+        let needed = resistance * current + constant * speed.value;
+        if needed > voltage * (1.0 + ROUNDING) {
+            let available = (voltage - constant * speed.value).max(0.0) / resistance * constant;
+            let stall = voltage / resistance * constant;
+            warnings.push(warning(
+                torque.place,
+                format!(
+                    "axis `{axis}`: the nominal torque of {:.3} N·m at {:.0} rpm needs {current:.1} \
+                     A and {needed:.1} V ({:.1} V even at standstill), the supply gives \
+                     {voltage:.0} V: there the motor gives {available:.3} N·m, and {stall:.3} N·m \
+                     when it stalls",
+                    torque.value,
+                    speed.value * 60.0 / TAU,
+                    resistance * current,
+                ),
+                findings,
+            ));
+        }
+    }
+    let stall_current = voltage / resistance;
+    if motor.current.value > stall_current {
+        warnings.push(warning(
+            motor.current.place,
+            format!(
+                "axis `{axis}`: {voltage:.1} V across {resistance:.3} Ω drive at most \
+                 {stall_current:.2} A, so the current limit of {:.2} A is never reached",
+                motor.current.value
+            ),
+            findings,
+        ));
+    }
+    warnings
+}
+
+fn warning(place: Place, text: String, findings: &Findings) -> Warning {
+    let (line, column) = findings.position(place).unwrap_or((0, 0));
+    Warning { text, line, column }
+}

@@ -1,0 +1,311 @@
+//! The tables of a machine file, with every default: the only place where defaults stand.
+//!
+//! Their documentation becomes the schema's, so it speaks to whoever writes a machine file.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+
+use crate::document::{Fraction, Keyword, Located, Named, NonNegative, Number, Point, Positive};
+use crate::process::ZMeaning;
+use crate::quantity as unit;
+use crate::table;
+
+/// A quantity of any sign.
+type Signed<K> = crate::document::Quantity<K>;
+/// A quantity above 0.
+type Above<K> = crate::document::Quantity<K, Positive>;
+/// A quantity of 0 or more.
+type AtLeastZero<K> = crate::document::Quantity<K, NonNegative>;
+
+table! {
+    /// A machine for laser marking.
+    pub struct MachineTable {
+        /// The machine's name.
+        pub name: Located<String>,
+        /// What it is, for people.
+        pub description: Option<Located<String>>,
+        /// Where the tool rests, [x, y] or [x, y, z]; the centre of the area when left out.
+        pub home: Option<Point>,
+        /// Where the tool may go.
+        pub area: AreaTable,
+        /// Limits of the tool's motion, as norms of the vectors.
+        pub path: PathTable,
+        /// How the axes move the tool: one table, named by the kind of mechanism.
+        pub mechanism: MechanismTable,
+        /// One table for each axis: `x` and `y` (and `z`) of a cartesian, `a` and `b` of a corexy.
+        pub axis: Named<AxisTable>,
+        /// The laser source.
+        pub laser: LaserTable,
+        /// How the machine reads G-code.
+        pub gcode: GcodeTable,
+        /// The job that belongs to the machine.
+        pub job: Option<JobTable>,
+    }
+}
+
+table! {
+    /// Where the tool may go, machine frame: [from, to] in each direction.
+    pub struct AreaTable {
+        /// Range of x.
+        pub x: [Signed<unit::Length>; 2],
+        /// Range of y.
+        pub y: [Signed<unit::Length>; 2],
+        /// Range of z, for machines with such an axis.
+        pub z: Option<[Signed<unit::Length>; 2]>,
+    }
+}
+
+table! {
+    /// Limits of the tool's motion, as norms of the vectors.
+    pub struct PathTable {
+        /// Largest speed while marking.
+        pub speed: Above<unit::Speed> = "0.25 m/s",
+        /// Largest speed of a free move.
+        pub rapid: Above<unit::Speed> = "0.25 m/s",
+        /// Largest acceleration.
+        pub acceleration: Above<unit::Acceleration> = "10 m/s^2",
+        /// Largest jerk.
+        pub jerk: Above<unit::Jerk> = "500 m/s^3",
+        /// How far a smoothed join may lie from the drawn line.
+        pub tolerance: Above<unit::Length> = "5 um",
+    }
+}
+
+table! {
+    /// How the axes move the tool: exactly one of these.
+    pub struct MechanismTable {
+        /// A ball screw for each direction.
+        pub cartesian: Option<CartesianTable>,
+        /// Two crossed belts that move one head.
+        pub corexy: Option<CoreXyTable>,
+    }
+}
+
+table! {
+    /// A ball screw for each direction.
+    pub struct CartesianTable {
+        /// Carriage and screw of x.
+        pub x: ScrewTable,
+        /// Carriage and screw of y.
+        pub y: ScrewTable,
+        /// Carriage and screw of z, where the head moves up and down.
+        pub z: Option<ScrewTable>,
+    }
+}
+
+table! {
+    /// A carriage and its screw.
+    pub struct ScrewTable {
+        /// Everything that moves with the carriage.
+        pub mass: Above<unit::Mass>,
+        /// Travel per turn of the screw.
+        pub lead: Above<unit::Lead>,
+        /// Moment of inertia of the screw, without the carriage; it turns with the motor.
+        pub inertia: AtLeastZero<unit::Inertia> = "0 kg m^2",
+        /// Torsional stiffness from gear to nut, the axial one in series; rigid when left out.
+        pub stiffness: Option<Above<unit::TorsionalStiffness>>,
+        /// Damping of that spring, as a share of critical damping under the carriage.
+        pub damping_ratio: Number<NonNegative> = 0.9,
+    }
+}
+
+table! {
+    /// Two crossed belts that move one head.
+    pub struct CoreXyTable {
+        /// Mass that moves in x: the head.
+        pub mass_x: Above<unit::Mass>,
+        /// Mass that moves in y: the head with its bridge.
+        pub mass_y: Above<unit::Mass>,
+        /// Pitch radius of the driving pulleys.
+        pub pulley_radius: Above<unit::Length>,
+        /// The belts' elasticity; rigid when left out.
+        pub belt: Option<BeltTable>,
+    }
+}
+
+table! {
+    /// Elasticity of both belts together, in each direction of the tool.
+    pub struct BeltTable {
+        /// Stiffness in x and in y, both belts together.
+        pub stiffness: Above<unit::Stiffness>,
+        /// Damping between motor and tool, as a share of critical damping in each direction.
+        pub damping_ratio: Number<NonNegative> = 0.9,
+    }
+}
+
+table! {
+    /// One axis: what stands between the voltage and the joint.
+    pub struct AxisTable {
+        /// Turns of the motor per turn of the screw or pulley.
+        pub gear: Number<Positive> = 1.0,
+        /// Efficiency of gear and screw, for sizing only: losses in motion are `friction`.
+        pub efficiency: Fraction<Positive> = 1.0,
+        /// The motor: one table, named by its kind.
+        pub motor: MotorTable,
+        /// Friction, all of it seen at the motor shaft.
+        pub friction: FrictionTable,
+        /// The encoder on the motor shaft.
+        pub encoder: EncoderTable,
+        /// Limits beyond those of the path.
+        pub limits: LimitsTable,
+        /// Bandwidths of the control loops.
+        pub loops: LoopsTable,
+    }
+}
+
+table! {
+    /// The motor: exactly one of these.
+    pub struct MotorTable {
+        /// A brushed permanent-magnet motor.
+        pub dc: DcMotorTable,
+    }
+}
+
+table! {
+    /// A brushed permanent-magnet motor with its supply and power stage.
+    pub struct DcMotorTable {
+        /// Voltage of the supply.
+        pub voltage: Above<unit::Voltage>,
+        /// Largest current of the power stage.
+        pub current: Above<unit::Current>,
+        /// Resistance of the winding.
+        pub resistance: Above<unit::Resistance>,
+        /// Inductance of the winding.
+        pub inductance: Above<unit::Inductance>,
+        /// Torque per current, which is also back-EMF per speed.
+        pub torque_constant: Above<unit::TorqueConstant>,
+        /// Moment of inertia of the rotor.
+        pub rotor_inertia: Above<unit::Inertia>,
+        /// Current that the winding bears for ever.
+        pub continuous_current: Option<Above<unit::Current>>,
+        /// Torque that the data sheet promises; only checked against the other data.
+        pub nominal_torque: Option<Above<unit::Torque>>,
+        /// Speed at which it promises that torque.
+        pub nominal_speed: Option<Above<unit::AngularSpeed>>,
+    }
+}
+
+table! {
+    /// Friction, all of it seen at the motor shaft.
+    pub struct FrictionTable {
+        /// Coulomb friction, the same at rest and in motion.
+        pub coulomb: AtLeastZero<unit::Torque>,
+        /// Viscous friction.
+        pub viscous: AtLeastZero<unit::TorsionalDamping>,
+    }
+}
+
+table! {
+    /// The encoder on the motor shaft.
+    pub struct EncoderTable {
+        /// Counts per revolution, all edges counted.
+        pub resolution: Above<unit::CountsPerTurn>,
+    }
+}
+
+table! {
+    /// Limits of one axis, in the joint's travel: of the carriage, or of the belt.
+    pub struct LimitsTable {
+        /// Soft limits [from, to]; when left out, the range that the area needs and the following
+        /// error beyond it.
+        pub position: Option<[Signed<unit::Length>; 2]>,
+        /// Largest speed; when left out, 90 % of what the motor reaches without load.
+        pub velocity: Option<Above<unit::Speed>>,
+        /// Largest acceleration; none when left out.
+        pub acceleration: Option<Above<unit::Acceleration>>,
+        /// Largest jerk; none when left out.
+        pub jerk: Option<Above<unit::Jerk>>,
+        /// Largest difference between setpoint and feedback before the machine stops.
+        pub following_error: Above<unit::Length> = "1 mm",
+    }
+}
+
+// The bandwidths suit a cycle of 1 ms with a command that acts one cycle later: ω_c = 0.349/T_s,
+// and for the outer loops what a pilot of both machines found (100 1/s in the velocity loop and
+// 25 1/s in the position loop fail).
+table! {
+    /// Bandwidths of the control loops; the gains follow from motor and load.
+    pub struct LoopsTable {
+        /// Position loop.
+        pub position: Above<unit::Bandwidth> = "40 1/s",
+        /// Velocity loop.
+        pub velocity: Above<unit::Bandwidth> = "160 rad/s",
+        /// Current loop.
+        pub current: Above<unit::Bandwidth> = "349 rad/s",
+    }
+}
+
+table! {
+    /// The laser source.
+    pub struct LaserTable {
+        /// From the gate's opening to light; the planner makes up for it.
+        pub on_delay: AtLeastZero<unit::Duration> = "0 s",
+        /// From the gate's closing to darkness; the planner makes up for it.
+        pub off_delay: AtLeastZero<unit::Duration> = "0 s",
+    }
+}
+
+table! {
+    /// How the machine reads G-code.
+    pub struct GcodeTable {
+        /// The S word that means full power.
+        pub full_scale: Number<Positive> = 1000.0,
+        /// What Z means: `ignored`, or the height of the `focus` on a machine with a z axis.
+        pub z: Located<ZMeaning> = "ignored",
+        /// Whether M7 and M8 switch an air assist.
+        pub air_assist: Located<bool> = true,
+        /// Origins of the work coordinate systems, machine frame; the home when left out.
+        pub origins: OriginsTable,
+    }
+}
+
+table! {
+    /// Origins of the work coordinate systems, machine frame; the home when left out.
+    pub struct OriginsTable {
+        /// Origin of G54, in force when a program starts.
+        pub g54: Option<Point>,
+        /// Origin of G55.
+        pub g55: Option<Point>,
+        /// Origin of G56.
+        pub g56: Option<Point>,
+        /// Origin of G57.
+        pub g57: Option<Point>,
+        /// Origin of G58.
+        pub g58: Option<Point>,
+        /// Origin of G59.
+        pub g59: Option<Point>,
+        /// Origin of G59.1.
+        pub g59_1: Option<Point>,
+        /// Origin of G59.2.
+        pub g59_2: Option<Point>,
+        /// Origin of G59.3.
+        pub g59_3: Option<Point>,
+    }
+}
+
+table! {
+    /// The job that belongs to the machine.
+    pub struct JobTable {
+        /// The job that runs when none is named, relative to this file.
+        pub sample: Located<String>,
+    }
+}
+
+impl Keyword for ZMeaning {
+    const NAME: &'static str = "a meaning of Z";
+    const WORDS: &'static [(&'static str, Self)] =
+        &[("ignored", Self::Ignored), ("focus", Self::Focus)];
+}
+
+impl JsonSchema for ZMeaning {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "ZMeaning".into()
+    }
+
+    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "enum": ["ignored", "focus"] })
+    }
+}

@@ -1,0 +1,301 @@
+//! From the tables of a machine file to a [`Machine`] without contradictions.
+
+use std::path::PathBuf;
+
+use super::axes::{Joint, axis};
+use super::motor_check;
+use super::tables::{
+    AreaTable, AxisTable, CartesianTable, CoreXyTable, MachineTable, OriginsTable, ScrewTable,
+};
+use crate::document::{
+    Document, DocumentError, Findings, Located, Named, Place, Point, ProblemKind, nearest,
+};
+use crate::limits::{PathLimits, WorkArea};
+use crate::machine::Machine;
+use crate::mechanisms::{Cartesian, CoreXy, Elasticity, MechanismKind};
+use crate::process::{GcodeSettings, LaserSource, ZMeaning};
+
+pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
+    let (table, mut findings) = document.decode::<MachineTable>()?;
+    let area = area(&table.area, &mut findings);
+    let home = home(table.home, &area, &mut findings);
+    let Some((mechanism, joints)) = mechanism(&table, &area, home, &mut findings) else {
+        return findings.fail();
+    };
+    let Some(tables) = axes_in_order(&table.axis, &joints, &mut findings) else {
+        return findings.fail();
+    };
+    let mut axes = Vec::with_capacity(joints.len());
+    let mut warnings = Vec::new();
+    for (table, joint) in tables.into_iter().zip(&joints) {
+        axes.push(axis(table, joint, &mut findings));
+        warnings.extend(motor_check::check(joint.name, &table.motor.dc, &findings));
+    }
+    if table.area.z.is_none() && mechanism.axes() == 3 {
+        findings.contradict(
+            table.area.place,
+            "the machine has a z axis, but its area has no range of z".to_owned(),
+            "add `z = [from, to]`",
+        );
+    }
+    if let Some([lower, _]) = table.area.z
+        && mechanism.axes() < 3
+    {
+        findings.contradict(
+            lower.place,
+            "the area has a range of z, but the mechanism has no z axis".to_owned(),
+            "remove `z`",
+        );
+    }
+    let gcode = &table.gcode;
+    if gcode.z.value == ZMeaning::Focus && mechanism.axes() < 3 {
+        findings.contradict(
+            gcode.z.place,
+            "Z cannot move the focus: the mechanism has no z axis".to_owned(),
+            "write \"ignored\", or add the z axis",
+        );
+    }
+    let machine = Machine {
+        name: table.name.value.clone(),
+        mechanism,
+        axes,
+        area,
+        home,
+        path: PathLimits {
+            speed: table.path.speed.value,
+            rapid: table.path.rapid.value,
+            acceleration: table.path.acceleration.value,
+            jerk: table.path.jerk.value,
+            tolerance: table.path.tolerance.value,
+        },
+        laser: LaserSource {
+            on_delay: table.laser.on_delay.value,
+            off_delay: table.laser.off_delay.value,
+        },
+        gcode: GcodeSettings {
+            full_scale: gcode.full_scale.value,
+            z: gcode.z.value,
+            origins: origins(&gcode.origins, home),
+            air_assist: gcode.air_assist.value,
+        },
+        sample_job: table.job.as_ref().map(|job| PathBuf::from(&job.sample.value)),
+        warnings,
+    };
+    findings.finish(machine)
+}
+
+/// The area as a box; z is from 0 to 0 where it has no range.
+fn area(table: &AreaTable, findings: &mut Findings) -> WorkArea {
+    let mut area = WorkArea { lower: [0.0; 3], upper: [0.0; 3] };
+    let ranges = [Some(table.x), Some(table.y), table.z];
+    for (index, (name, range)) in ["x", "y", "z"].into_iter().zip(ranges).enumerate() {
+        let Some([lower, upper]) = range else { continue };
+        if lower.value >= upper.value {
+            findings.contradict(
+                lower.place,
+                format!("the range of {name} from {} m to {} m is empty", lower.value, upper.value),
+                "write [from, to], the smaller first",
+            );
+        }
+        area.lower[index] = lower.value;
+        area.upper[index] = upper.value;
+    }
+    area
+}
+
+fn home(point: Option<Point>, area: &WorkArea, findings: &mut Findings) -> [f64; 3] {
+    let Some(point) = point else {
+        return core::array::from_fn(|index| (area.lower[index] + area.upper[index]) / 2.0);
+    };
+    for (index, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let (lower, upper) = (area.lower[index], area.upper[index]);
+        // An empty range was reported as such.
+        if lower <= upper && !(lower..=upper).contains(&point.value[index]) {
+            findings.contradict(
+                point.place,
+                format!(
+                    "home lies outside the area: {name} is {} m, the area is from {lower} m to \
+                     {upper} m",
+                    point.value[index]
+                ),
+                "move `home` into the area, or widen the area",
+            );
+        }
+    }
+    point.value
+}
+
+/// The mechanism, and what it asks of each axis, in the order of its joints.
+fn mechanism(
+    table: &MachineTable,
+    area: &WorkArea,
+    home: [f64; 3],
+    findings: &mut Findings,
+) -> Option<(MechanismKind, Vec<Joint>)> {
+    match (&table.mechanism.cartesian, &table.mechanism.corexy) {
+        (Some(cartesian), None) => cartesian_kind(cartesian, area, home, findings),
+        (None, Some(corexy)) => Some(corexy_kind(corexy, area, home)),
+        (None, None) => {
+            findings.refuse(
+                ProblemKind::MissingKey,
+                table.mechanism.place,
+                "no mechanism is given".to_owned(),
+                Some("add [mechanism.cartesian] or [mechanism.corexy]".to_owned()),
+            );
+            None
+        }
+        (Some(cartesian), Some(corexy)) => {
+            findings.contradict(
+                cartesian.place.max(corexy.place),
+                "the machine has two mechanisms".to_owned(),
+                "keep either [mechanism.cartesian] or [mechanism.corexy]",
+            );
+            None
+        }
+    }
+}
+
+fn cartesian_kind(
+    table: &CartesianTable,
+    area: &WorkArea,
+    home: [f64; 3],
+    findings: &mut Findings,
+) -> Option<(MechanismKind, Vec<Joint>)> {
+    let screws: Vec<&ScrewTable> = [&table.x, &table.y].into_iter().chain(&table.z).collect();
+    let joints: Vec<Joint> = ["x", "y", "z"]
+        .into_iter()
+        .zip(&screws)
+        .enumerate()
+        .map(|(index, (name, screw))| Joint {
+            name,
+            travel: screw.lead.value,
+            load: screw.mass.value,
+            stiff_inertia: screw.inertia.value,
+            range: [area.lower[index], area.upper[index]],
+            home: home[index],
+        })
+        .collect();
+    let springs: Vec<Elasticity> = screws
+        .iter()
+        .filter_map(|screw| {
+            Some(Elasticity::of_screw(
+                screw.stiffness?.value,
+                screw.lead.value,
+                screw.mass.value,
+                screw.damping_ratio.value,
+            ))
+        })
+        .collect();
+    if !springs.is_empty() && springs.len() < screws.len() {
+        let rigid = screws.iter().find(|screw| screw.stiffness.is_none());
+        findings.contradict(
+            rigid.map_or(table.place, |screw| screw.place),
+            "this screw is rigid, another one is not".to_owned(),
+            "give every screw its `stiffness`, or none",
+        );
+        return None;
+    }
+    let kind = match *screws.as_slice() {
+        [x, y] => MechanismKind::Cartesian(Cartesian {
+            mass: [x.mass.value, y.mass.value],
+            elasticity: springs.try_into().ok(),
+        }),
+        [x, y, z] => MechanismKind::CartesianLift(Cartesian {
+            mass: [x.mass.value, y.mass.value, z.mass.value],
+            elasticity: springs.try_into().ok(),
+        }),
+        _ => return None,
+    };
+    Some((kind, joints))
+}
+
+fn corexy_kind(
+    table: &CoreXyTable,
+    area: &WorkArea,
+    home: [f64; 3],
+) -> (MechanismKind, Vec<Joint>) {
+    let mass = [table.mass_x.value, table.mass_y.value];
+    let joint = |name, range, home| Joint {
+        name,
+        travel: table.pulley_radius.value,
+        // Source 003 eq. 4.6: the diagonal of Jᵀ·M·J.
+        load: (mass[0] + mass[1]) / 4.0,
+        stiff_inertia: 0.0,
+        range,
+        home,
+    };
+    let ([x0, y0, _], [x1, y1, _]) = (area.lower, area.upper);
+    let joints = vec![
+        joint("a", [x0 + y0, x1 + y1], home[0] + home[1]),
+        joint("b", [x0 - y1, x1 - y0], home[0] - home[1]),
+    ];
+    let elasticity = table.belt.as_ref().map(|belt| {
+        mass.map(|mass| Elasticity::damped(belt.stiffness.value, mass, belt.damping_ratio.value))
+    });
+    (MechanismKind::CoreXy(CoreXy { mass, elasticity }), joints)
+}
+
+/// The axes' tables in the order of the joints; each joint has one, and no other is there.
+fn axes_in_order<'a>(
+    axes: &'a Named<AxisTable>,
+    joints: &[Joint],
+    findings: &mut Findings,
+) -> Option<Vec<&'a AxisTable>> {
+    let names = || joints.iter().map(|joint| joint.name);
+    let list = || names().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    let is_there = |name: &str| axes.entries.iter().any(|(found, _)| found.value == name);
+    let mut renamed = 0;
+    for (Located { value: name, place }, _) in &axes.entries {
+        if names().all(|known| known != name) {
+            renamed += 1;
+            let free = names().filter(|name| !is_there(name));
+            let help = match nearest(name, free) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("the axes of this mechanism are {}", list()),
+            };
+            unknown_axis(name, *place, help, findings);
+        }
+    }
+    let missing: Vec<&str> = names().filter(|name| !is_there(name)).collect();
+    // As many unknown axes as missing ones are misspelt, and were reported where they stand.
+    for name in missing.iter().skip(renamed) {
+        findings.refuse(
+            ProblemKind::MissingKey,
+            axes.place,
+            format!("axis `{name}` is missing"),
+            Some(format!("add [axis.{name}]: the axes of this mechanism are {}", list())),
+        );
+    }
+    if renamed > 0 || !missing.is_empty() {
+        return None;
+    }
+    names()
+        .map(|name| {
+            axes.entries.iter().find(|(found, _)| found.value == name).map(|(_, table)| table)
+        })
+        .collect()
+}
+
+fn unknown_axis(name: &str, place: Place, help: String, findings: &mut Findings) {
+    findings.refuse(
+        ProblemKind::UnknownKey,
+        place,
+        format!("the mechanism has no axis `{name}`"),
+        Some(help),
+    );
+}
+
+fn origins(table: &OriginsTable, home: [f64; 3]) -> [[f64; 3]; 9] {
+    [
+        table.g54,
+        table.g55,
+        table.g56,
+        table.g57,
+        table.g58,
+        table.g59,
+        table.g59_1,
+        table.g59_2,
+        table.g59_3,
+    ]
+    .map(|origin| origin.map_or(home, |point| point.value))
+}

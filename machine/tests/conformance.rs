@@ -1,0 +1,200 @@
+//! What every mechanism must do, whatever it is: independent routes to the same numbers.
+
+#![allow(clippy::unwrap_used)]
+
+use machine::kinematics::{JointMotion, Joints, ToolMotion};
+use machine::mechanisms::Elasticity;
+use machine::{Cartesian, CoreXy, Mechanism, Pose};
+use nalgebra::Vector3;
+
+/// Repeatable numbers from -1 to 1 (xorshift64*).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        let bits = self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11;
+        bits as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    fn vector(&mut self, scale: f64, lift: bool) -> Vector3<f64> {
+        let z = self.next();
+        Vector3::new(self.next(), self.next(), if lift { z } else { 0.0 }) * scale
+    }
+}
+
+const CASES: usize = 500;
+
+/// Runs the suite over seeded motions.
+fn conforms<const N: usize, M: Mechanism<N>>(mechanism: &M) {
+    let lift = N > 2;
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    for case in 0..CASES {
+        let tool = ToolMotion {
+            position: random.vector(0.1, lift) + Vector3::new(0.1, 0.1, 0.0),
+            velocity: random.vector(0.25, lift),
+            acceleration: random.vector(10.0, lift),
+            jerk: random.vector(500.0, lift),
+        };
+        let context = format!("{} case {case}: {tool:?}", M::NAME);
+        kinematics(mechanism, &tool, &context);
+        dynamics(mechanism, &tool, &context);
+    }
+    transmission(mechanism);
+}
+
+#[track_caller]
+fn near(found: f64, expected: f64, tolerance: f64, context: &str) {
+    let error = (found - expected).abs();
+    assert!(error <= tolerance, "{found} against {expected} (off by {error:e}), {context}");
+}
+
+fn kinematics<const N: usize, M: Mechanism<N>>(mechanism: &M, tool: &ToolMotion, context: &str) {
+    let branch = M::Branch::default();
+    let start = Joints::<N>::zeros();
+    let q = mechanism.inverse(&Pose::at(tool.position), branch, &start).unwrap();
+    let back = mechanism.forward(&q, branch).unwrap();
+    near((back.position - tool.position).norm(), 0.0, 1e-15, context);
+    let again = mechanism.inverse(&back, branch, &q).unwrap();
+    near((again - q).norm(), 0.0, 1e-15, context);
+
+    // Jacobian against central differences; forward is linear or smooth, so h² and rounding/h
+    // both stay below 1e-9.
+    let step = 1e-6;
+    let jacobian = mechanism.jacobian(&q);
+    for column in 0..N {
+        let mut offset = Joints::<N>::zeros();
+        offset[column] = step;
+        let ahead = mechanism.forward(&(q + offset), branch).unwrap().position;
+        let behind = mechanism.forward(&(q - offset), branch).unwrap().position;
+        let difference = (ahead - behind) / (2.0 * step);
+        for row in 0..3 {
+            near(jacobian[(row, column)], difference[row], 1e-9, context);
+        }
+    }
+
+    let motion: JointMotion<N> = mechanism.joint_motion(tool, branch, &q).unwrap();
+    near((motion.position - q).norm(), 0.0, 1e-15, context);
+    let linear = (jacobian * motion.velocity).fixed_rows::<3>(0).into_owned();
+    near((linear - tool.velocity).norm(), 0.0, 1e-14, context);
+    // Each derivative of the joints against a difference of the one below, along the path that the
+    // tool's derivatives define.
+    let h = 1e-5;
+    let at = |t: f64| {
+        let along = ToolMotion {
+            position: tool.position
+                + tool.velocity * t
+                + tool.acceleration * (t * t / 2.0)
+                + tool.jerk * (t * t * t / 6.0),
+            velocity: tool.velocity + tool.acceleration * t + tool.jerk * (t * t / 2.0),
+            acceleration: tool.acceleration + tool.jerk * t,
+            jerk: tool.jerk,
+        };
+        mechanism.joint_motion(&along, branch, &q).unwrap()
+    };
+    let (ahead, behind) = (at(h), at(-h));
+    let speed = (ahead.position - behind.position) / (2.0 * h);
+    let acceleration = (ahead.velocity - behind.velocity) / (2.0 * h);
+    let jerk = (ahead.acceleration - behind.acceleration) / (2.0 * h);
+    // Truncation jerk·h²/6 = 1e-8 in speed; rounding 1e-16/h elsewhere.
+    near((speed - motion.velocity).norm(), 0.0, 1e-7, context);
+    near((acceleration - motion.acceleration).norm(), 0.0, 1e-6, context);
+    near((jerk - motion.jerk).norm(), 0.0, 1e-4, context);
+}
+
+fn dynamics<const N: usize, M: Mechanism<N>>(mechanism: &M, tool: &ToolMotion, context: &str) {
+    let branch = M::Branch::default();
+    let motion = mechanism.joint_motion(tool, branch, &Joints::zeros()).unwrap();
+    let q = motion.position;
+    let mass = mechanism.mass_matrix(&q);
+    near((mass - mass.transpose()).amax(), 0.0, 1e-15, context);
+    assert!(mass.cholesky().is_some(), "the mass matrix is not positive: {context}");
+
+    // Column by column: inverse dynamics of a unit acceleration at rest, without gravity.
+    let rest = |acceleration: Joints<N>| JointMotion {
+        position: q,
+        velocity: Joints::zeros(),
+        acceleration,
+        jerk: Joints::zeros(),
+    };
+    let held = mechanism.inverse_dynamics(&rest(Joints::zeros()));
+    near((held - mechanism.gravity(&q)).norm(), 0.0, 1e-12, context);
+    for column in 0..N {
+        let mut unit = Joints::<N>::zeros();
+        unit[column] = 1.0;
+        let effort = mechanism.inverse_dynamics(&rest(unit)) - held;
+        near((effort - mass.column(column)).norm(), 0.0, 1e-12, context);
+    }
+
+    // Power into the joints is the change of kinetic energy and the work against gravity: an
+    // independent route through the energy alone.
+    let h = 1e-6;
+    let energy = |t: f64| {
+        let velocity = motion.velocity + motion.acceleration * t;
+        velocity.dot(&(mechanism.mass_matrix(&(q + motion.velocity * t)) * velocity)) / 2.0
+    };
+    let change = (energy(h) - energy(-h)) / (2.0 * h);
+    let power = mechanism.inverse_dynamics(&motion).dot(&motion.velocity);
+    let lifting = mechanism.gravity(&q).dot(&motion.velocity);
+    near(power, change + lifting, 1e-7, context);
+}
+
+fn transmission<const N: usize, M: Mechanism<N>>(mechanism: &M) {
+    let Some(stiffness) = mechanism.stiffness() else {
+        assert_eq!(mechanism.damping().amax(), 0.0);
+        return;
+    };
+    let damping = mechanism.damping();
+    assert_eq!((stiffness - stiffness.transpose()).amax(), 0.0);
+    assert_eq!((damping - damping.transpose()).amax(), 0.0);
+    assert!(stiffness.cholesky().is_some() && damping.cholesky().is_some());
+}
+
+const SCREW: Elasticity = Elasticity { stiffness: 1e8, damping: 2.5e4 };
+
+#[test]
+fn the_cartesian_conforms() {
+    conforms(&Cartesian { mass: [1.93, 0.33], elasticity: Some([SCREW; 2]) });
+    conforms(&Cartesian { mass: [1.93, 0.33], elasticity: None });
+}
+
+#[test]
+fn the_cartesian_with_a_lift_conforms() {
+    let mechanism = Cartesian { mass: [1.93, 0.33, 0.2], elasticity: Some([SCREW; 3]) };
+    conforms(&mechanism);
+    assert_eq!(mechanism.gravity(&Joints::zeros()), Joints::from([0.0, 0.0, 0.2 * 9.806_65]));
+}
+
+#[test]
+fn the_corexy_conforms() {
+    let belts = [0.33, 1.06].map(|mass| Elasticity::damped(6e4, mass, 0.9));
+    conforms(&CoreXy { mass: [0.33, 1.06], elasticity: Some(belts) });
+    conforms(&CoreXy { mass: [0.33, 1.06], elasticity: None });
+}
+
+/// A force on the head alone stretches only its own direction, by force over stiffness.
+#[test]
+fn the_belts_are_two_springs_along_x_and_y() {
+    let belts = [Elasticity::damped(6e4, 0.33, 0.9), Elasticity::damped(3e4, 1.06, 0.9)];
+    let corexy = CoreXy { mass: [0.33, 1.06], elasticity: Some(belts) };
+    let inverse = corexy.stiffness().unwrap().try_inverse().unwrap();
+    let jacobian = corexy.jacobian(&Joints::zeros()).fixed_view::<2, 2>(0, 0).into_owned();
+    let give = jacobian * inverse * jacobian.transpose();
+    near(give[(0, 0)], 1.0 / 6e4, 1e-18, "x");
+    near(give[(1, 1)], 1.0 / 3e4, 1e-18, "y");
+    near(give[(0, 1)], 0.0, 1e-18, "across");
+}
+
+#[test]
+fn a_planar_mechanism_refuses_to_leave_its_plane() {
+    let corexy = CoreXy { mass: [0.33, 1.06], elasticity: None };
+    let pose = |z| Pose::at(Vector3::new(0.1, 0.1, z));
+    let error = corexy.inverse(&pose(0.01), (), &Joints::zeros()).unwrap_err();
+    assert_eq!((error.code, error.value), ("out_of_plane", 0.01));
+    let error = corexy.inverse(&pose(f64::NAN), (), &Joints::zeros()).unwrap_err();
+    assert_eq!(error.code, "out_of_plane");
+    let flat = Cartesian { mass: [1.0, 1.0], elasticity: None };
+    assert_eq!(flat.inverse(&pose(-0.01), (), &Joints::zeros()).unwrap_err().value, -0.01);
+}
