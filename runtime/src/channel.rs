@@ -313,7 +313,7 @@ impl<T: Channel> Subscriber<T> {
     }
 
     /// The next sample, if one waits. Does not allocate.
-    pub fn next(&mut self) -> Result<Option<T>, ChannelError> {
+    pub fn receive(&mut self) -> Result<Option<T>, ChannelError> {
         let Some(sample) = self.port.receive().map_err(|_| lost::<T>())? else { return Ok(None) };
         let serial = sample.user_header().0;
         let origin = Some(sample.origin().value());
@@ -330,7 +330,7 @@ impl<T: Channel> Subscriber<T> {
     /// The newest sample that waits, all older ones dropped. Does not allocate.
     pub fn newest(&mut self) -> Result<Option<T>, ChannelError> {
         let mut newest = None;
-        while let Some(sample) = self.next()? {
+        while let Some(sample) = self.receive()? {
             newest = Some(sample);
         }
         Ok(newest)

@@ -13,6 +13,7 @@ pub mod allocation;
 pub mod channel;
 pub mod child;
 pub mod clock;
+pub mod core_lock;
 pub mod domain;
 pub mod event_ring;
 pub mod instance;

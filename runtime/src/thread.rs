@@ -12,6 +12,8 @@ use std::io::{self, Write};
 use core_affinity::CoreId;
 use signals::RealtimeFacts;
 
+use crate::core_lock::{CoreError, CoreLock};
+
 /// Priority of the drives' cycle, above the controller on the same core.
 pub const DRIVES_PRIORITY: i32 = 85;
 
@@ -62,6 +64,17 @@ pub struct Realtime {
     _awake: Option<File>,
 }
 
+impl Realtime {
+    /// Claims the core for this pipeline, if the thread really has a real-time priority on one;
+    /// for drives, whose controller shares the core.
+    pub fn claim_core(&self) -> Result<Option<CoreLock>, CoreError> {
+        match usize::try_from(self.facts.core) {
+            Ok(core) if self.facts.fifo == 1 => CoreLock::claim(core).map(Some),
+            _ => Ok(None),
+        }
+    }
+}
+
 /// The last CPU that this process may use. Ask before pinning: afterwards only the pinned one is
 /// allowed.
 pub fn last_core() -> usize {
@@ -103,7 +116,9 @@ pub fn enter_realtime(options: &RealtimeOptions) -> Realtime {
         Placement::Anywhere => None,
     };
     if let Some(core) = core {
-        if core_affinity::set_for_current(CoreId { id: core }) {
+        // Numbers beyond the mask's size would make it panic.
+        let possible = core < libc::CPU_SETSIZE as usize;
+        if possible && core_affinity::set_for_current(CoreId { id: core }) {
             facts.core = core as i32;
         } else {
             warnings.push(format!(
@@ -216,4 +231,46 @@ fn forbid_deep_sleep() -> io::Result<File> {
     let mut file = File::options().write(true).open("/dev/cpu_dma_latency")?;
     file.write_all(&0i32.to_ne_bytes())?;
     Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn a_thread_that_asks_for_nothing_gets_no_warning() {
+        let options =
+            RealtimeOptions { priority: None, placement: Placement::Automatic, lock_memory: false };
+        let realtime = std::thread::spawn(move || enter_realtime(&options)).join().unwrap();
+        assert_eq!(realtime.facts, RealtimeFacts { core: -1, ..RealtimeFacts::default() });
+        assert_eq!(realtime.warnings, Vec::<String>::new());
+        assert!(realtime.claim_core().unwrap().is_none());
+    }
+
+    #[test]
+    fn whatever_is_missing_is_said() {
+        let options = RealtimeOptions {
+            priority: Some(CONTROLLER_PRIORITY),
+            placement: Placement::Core(last_core()),
+            lock_memory: false,
+        };
+        let realtime = std::thread::spawn(move || enter_realtime(&options)).join().unwrap();
+        assert_eq!(realtime.facts.core, last_core() as i32);
+        assert_eq!(realtime.facts.priority, 80 * realtime.facts.fifo);
+        assert_eq!(realtime.warnings.len(), usize::from(realtime.facts.fifo == 0));
+    }
+
+    #[test]
+    fn a_cpu_that_does_not_exist_is_named() {
+        let options = RealtimeOptions {
+            priority: None,
+            placement: Placement::Core(100_000),
+            lock_memory: false,
+        };
+        let realtime = std::thread::spawn(move || enter_realtime(&options)).join().unwrap();
+        assert_eq!(realtime.facts.core, -1);
+        assert!(realtime.warnings[0].starts_with("not pinned to CPU 100000"));
+    }
 }

@@ -33,10 +33,10 @@ fn a_published_sample_arrives_whole() {
     let mut publisher = drives.publisher::<Feedback>().unwrap();
     let mut subscriber = controller.subscriber::<Feedback>(Reading::Newest).unwrap();
 
-    assert_eq!(subscriber.next().unwrap(), None);
+    assert_eq!(subscriber.receive().unwrap(), None);
     assert!(publisher.publish(&feedback(7)).unwrap());
-    assert_eq!(subscriber.next().unwrap(), Some(feedback(7)));
-    assert_eq!(subscriber.next().unwrap(), None);
+    assert_eq!(subscriber.receive().unwrap(), Some(feedback(7)));
+    assert_eq!(subscriber.receive().unwrap(), None);
     assert_eq!(subscriber.epoch(), 1);
     drop(holder);
 }
@@ -55,7 +55,7 @@ fn a_cycle_sees_the_newest_and_a_monitor_every_sample() {
     }
     assert_eq!(cycle.newest().unwrap(), Some(command(99)));
     let seen: Vec<u64> =
-        std::iter::from_fn(|| monitor.next().unwrap()).map(|command| command.cycle.0).collect();
+        std::iter::from_fn(|| monitor.receive().unwrap()).map(|command| command.cycle.0).collect();
     assert_eq!(seen, (0..100).collect::<Vec<_>>());
     assert_eq!(monitor.lost(), 0);
 }
@@ -69,13 +69,13 @@ fn a_slow_reader_counts_what_it_lost_and_stops_nobody() {
     let progress = |played| Progress { played, ..Progress::default() };
 
     publisher.publish(&progress(0)).unwrap();
-    assert_eq!(reader.next().unwrap(), Some(progress(0)));
+    assert_eq!(reader.receive().unwrap(), Some(progress(0)));
     // The status channels hold 64 samples: of 200 more the first 136 give way.
     for played in 1..=200 {
         assert!(publisher.publish(&progress(played)).unwrap());
     }
     let seen: Vec<u64> =
-        std::iter::from_fn(|| reader.next().unwrap()).map(|progress| progress.played).collect();
+        std::iter::from_fn(|| reader.receive().unwrap()).map(|progress| progress.played).collect();
     assert_eq!(seen, (137..=200).collect::<Vec<_>>());
     assert_eq!(reader.lost(), 136);
 }
@@ -91,8 +91,8 @@ fn a_late_reader_gets_the_newest_sample_at_the_next_refresh() {
 
     let mut planner = holder.subscriber::<JobOffer>(Reading::Newest).unwrap();
     publisher.refresh().unwrap();
-    assert_eq!(planner.next().unwrap(), Some(offer));
-    assert_eq!(planner.next().unwrap(), None);
+    assert_eq!(planner.receive().unwrap(), Some(offer));
+    assert_eq!(planner.receive().unwrap(), None);
 }
 
 #[test]
@@ -114,14 +114,14 @@ fn a_full_setpoint_channel_refuses_and_loses_nothing() {
     let mut expected = 0;
     while expected < sent {
         // One out makes room for one in.
-        assert_eq!(controller.next().unwrap(), Some(setpoint(expected)));
+        assert_eq!(controller.receive().unwrap(), Some(setpoint(expected)));
         expected += 1;
         if sent < 3000 {
             assert!(planner.publish(&setpoint(sent)).unwrap());
             sent += 1;
         }
     }
-    assert_eq!(controller.next().unwrap(), None);
+    assert_eq!(controller.receive().unwrap(), None);
     assert_eq!((expected, controller.lost()), (3000, 0));
 }
 
@@ -229,7 +229,7 @@ fn one_allocation_for_each_publish_and_none_for_all_else() {
             assert!(listener.wait_until(clock::now() + Nanoseconds(1_000_000_000)).unwrap());
             assert!(!listener.wait_until(clock::now()).unwrap());
             assert_eq!(newest.newest().unwrap().unwrap().cycle, Cycle(cycle));
-            assert_eq!(every.next().unwrap().unwrap().cycle, Cycle(cycle));
+            assert_eq!(every.receive().unwrap().unwrap().cycle, Cycle(cycle));
             assert!(queue.take().is_none());
             assert_eq!(peers.state(Role::Domain), runtime::peer::PeerState::Alive);
         });
@@ -306,7 +306,7 @@ fn another_thread_enters_and_makes_its_own_ports() {
         }
     });
     send.send(3).unwrap();
-    while reader.next().unwrap().is_none() {
+    while reader.receive().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(1));
     }
     // What a publisher says last is still heard after it has gone.
@@ -315,7 +315,7 @@ fn another_thread_enters_and_makes_its_own_ports() {
     drop(send);
     thread.join().unwrap();
     let rest: Vec<u64> =
-        std::iter::from_fn(|| reader.next().unwrap()).map(|progress| progress.played).collect();
+        std::iter::from_fn(|| reader.receive().unwrap()).map(|progress| progress.played).collect();
     assert_eq!((rest, reader.lost()), (vec![4, 5], 0));
 }
 
