@@ -1,1 +1,24 @@
-//! placeholder
+//! From setpoints and feedback to commands: look-ahead, player, cascades, feedforward, state
+//! machine, supervision.
+//!
+//! [`Controller::step`] answers one feedback. It does no input or output, and after
+//! [`Controller::new`] it allocates nothing; the same step runs in real time and in simulation.
+
+pub mod alignment;
+pub mod cascade;
+pub mod controller;
+pub mod digest;
+pub mod exchange;
+pub mod feedforward;
+pub mod gate;
+pub mod intake;
+pub mod lookahead;
+pub mod player;
+pub mod ramp;
+pub mod rate_limit;
+pub mod statistics;
+pub mod stream_time;
+pub mod supervision;
+
+pub use controller::Controller;
+pub use exchange::{Inputs, Outputs, Peers, Presence};

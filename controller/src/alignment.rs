@@ -1,0 +1,63 @@
+//! From where the axes stand to where a stream starts, without a jump.
+//!
+//! Enabling takes the references from an encoder, which rounds to a count; a stream starts at a
+//! planned position. The rest between the two is faded out before the first setpoint is played.
+
+use crate::feedforward::Planned;
+use machine::Machine;
+use signals::{AxisArray, FaultCode, MAX_AXES};
+
+use crate::supervision::{Finding, Tracking};
+
+/// Encoder counts that a stream may start away from where an axis stands.
+const TOLERANCE: f64 = 16.0;
+
+/// Cycles to fade over: at most 0.7 rad/s for [`TOLERANCE`] of a 4096-count encoder.
+const CYCLES: u32 = 64;
+
+/// What is left of the distance.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Alignment {
+    offset: AxisArray,
+    left: u32,
+}
+
+impl Alignment {
+    /// From the angles in `standing` to those in `start`.
+    ///
+    /// # Errors
+    /// An axis that stands too far away, with the distance in joint units.
+    pub fn new(machine: &Machine, standing: &Planned, start: &Planned) -> Result<Self, Finding> {
+        let mut offset = [0.0; MAX_AXES];
+        for (index, axis) in machine.axes.iter().enumerate().take(MAX_AXES) {
+            offset[index] = standing.angle[index] - start.angle[index];
+            let limit = TOLERANCE * axis.encoder.resolution();
+            if offset[index].abs() > limit || offset[index].is_nan() {
+                let (value, limit) = (offset[index].abs() * axis.ratio, limit * axis.ratio);
+                let code = FaultCode::StreamStart;
+                return Err(Finding::on(index, code, value, limit, Tracking::Sound));
+            }
+        }
+        let aligned = offset.iter().all(|offset| *offset == 0.0);
+        Ok(Self { offset, left: if aligned { 0 } else { CYCLES } })
+    }
+
+    /// Whether the axes are where the stream starts.
+    pub fn is_done(&self) -> bool {
+        self.left == 0
+    }
+
+    /// Goes on by one cycle, and adds what is left to `planned`.
+    pub fn apply(&mut self, planned: &mut Planned) {
+        if self.left == 0 {
+            return;
+        }
+        self.left -= 1;
+        let at = f64::from(self.left) / f64::from(CYCLES);
+        // The quintic from 0 to 1 with no speed and no acceleration at either end.
+        let share = at * at * at * (10.0 + at * (6.0 * at - 15.0));
+        for (angle, offset) in planned.angle.iter_mut().zip(&self.offset) {
+            *angle += offset * share;
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! What goes into a controller step and what comes out of it.
+
+use signals::{
+    Command, ControllerReport, Feedback, Nanoseconds, OperatorReply, OperatorRequest, Progress,
+    Setpoint,
+};
+
+/// Whether a peer is there.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Presence {
+    /// It is alive, or has not been there yet.
+    #[default]
+    Present,
+    /// It was there, and has died or left.
+    Lost,
+}
+
+/// The processes that this one depends on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Peers {
+    /// Who sends setpoints; missed only while a stream is played.
+    pub planner: Presence,
+    /// Who sends feedback.
+    pub drives: Presence,
+    /// Who holds the domain.
+    pub supervisor: Presence,
+}
+
+/// What a step is given.
+#[derive(Debug, Clone, Copy)]
+pub struct Inputs<'a> {
+    /// The newest feedback.
+    pub feedback: &'a Feedback,
+    /// When it was read.
+    pub received: Nanoseconds,
+    /// Setpoints that arrived since the last step, in order; no more than
+    /// [`Controller::room`](crate::Controller::room) had room for.
+    pub setpoints: &'a [Setpoint],
+    /// A person's request.
+    pub request: Option<OperatorRequest>,
+    /// Who is there.
+    pub peers: Peers,
+}
+
+/// What a step gives back.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Outputs {
+    /// The answer to the feedback. Its `published` is the time of the step; whoever publishes it
+    /// may set it anew.
+    pub command: Command,
+    /// How far the stream has come: every few cycles, and when the state changes.
+    pub progress: Option<Progress>,
+    /// What was counted over the stream: once a second, and when it ends.
+    pub report: Option<ControllerReport>,
+    /// The answer to the request.
+    pub reply: Option<OperatorReply>,
+}

@@ -1,0 +1,181 @@
+//! The laser over one cycle of the machine, from the laser over the stretch of stream played in it.
+
+use crate::lookahead::Lookahead;
+use crate::stream_time::{ONE, StreamTime};
+use signals::time::CYCLE_PERIOD;
+use signals::{GateEdge, LaserCycle};
+
+/// A stretch of stream played in one cycle, at the rate it has on average.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Stretch {
+    /// Stream time at the start of the cycle.
+    pub from: StreamTime,
+    /// Stream time at its end; not before `from` when there is light to give.
+    pub to: StreamTime,
+}
+
+impl Stretch {
+    /// Mean rate over the cycle.
+    pub fn rate(self) -> f64 {
+        (self.to - self.from).setpoints()
+    }
+}
+
+/// The laser over `stretch`, dark before `dark_until`. Edges keep their stream time; power follows
+/// the rate, so that each length of line gets the same light.
+pub fn laser(lookahead: &Lookahead, stretch: Stretch, dark_until: StreamTime) -> LaserCycle {
+    let rate = stretch.rate();
+    if stretch.to <= stretch.from || stretch.to <= dark_until {
+        return LaserCycle::OFF;
+    }
+    let mut cycle = LaserCycle::OFF;
+    let start = stretch.from.max(dark_until);
+    let first = start.sequence();
+    let last = StreamTime(stretch.to.0 - 1).sequence();
+    let period = CYCLE_PERIOD.0 as f64;
+    let planned = &lookahead.setpoint(first).laser;
+    if stretch.from.fraction() == 0.0 && stretch.from == start && stretch.to.0 - start.0 == ONE {
+        return *planned;
+    }
+    // What is on where the light may begin: the last edge that has passed by then.
+    let passed = start.fraction() * period;
+    let (gate, power) = planned
+        .edges()
+        .iter()
+        .take_while(|edge| f64::from(edge.offset) <= passed)
+        .last()
+        .map_or((planned.gate, planned.power), |edge| (edge.gate, edge.power));
+    let power_at_rate = |power: f64| (power * rate).min(1.0);
+    if start == stretch.from {
+        (cycle.gate, cycle.power) = (gate, power_at_rate(power));
+    } else if gate != 0 {
+        let offset = (start - stretch.from).setpoints() / rate * period;
+        push(&mut cycle, offset, gate, power_at_rate(power));
+    }
+    for sequence in first..=last {
+        let laser = &lookahead.setpoint(sequence).laser;
+        let into = (StreamTime::of(sequence) - stretch.from).setpoints();
+        // A setpoint starts with what the one before ended with, unless the planner says otherwise.
+        if sequence != first && (laser.gate, power_at_rate(laser.power)) != cycle.last() {
+            push(&mut cycle, into / rate * period, laser.gate, power_at_rate(laser.power));
+        }
+        for edge in laser.edges() {
+            let begun = sequence != first || f64::from(edge.offset) > passed;
+            let offset = (into + f64::from(edge.offset) / period) / rate * period;
+            if begun && offset < period {
+                push(&mut cycle, offset, edge.gate, power_at_rate(edge.power));
+            }
+        }
+    }
+    cycle
+}
+
+/// Adds an edge. Three cycles' worth of edges may not fit into one: then the cycle ends in the dark
+/// rather than with light that nobody ends.
+fn push(cycle: &mut LaserCycle, offset: f64, gate: u32, power: f64) {
+    let offset = (offset.round().max(0.0) as u32).min(CYCLE_PERIOD.0 as u32 - 1);
+    if !cycle.push(GateEdge { offset, gate, power })
+        && let Some(last) = cycle.edges.last_mut()
+    {
+        (last.gate, last.power) = (0, 0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use signals::{Nanoseconds, Setpoint};
+
+    /// Dark, then stroke 3 from 1.25 to 3.5 in stream time, at power 0.4.
+    fn ring() -> Lookahead {
+        let mut ring = Lookahead::new();
+        for sequence in 0..8 {
+            let mut setpoint = Setpoint { stream: 1, sequence, ..Setpoint::default() };
+            match sequence {
+                1 => {
+                    assert!(setpoint.laser.push(GateEdge { offset: 250_000, gate: 3, power: 0.4 }))
+                }
+                2 => (setpoint.laser.gate, setpoint.laser.power) = (3, 0.4),
+                3 => {
+                    (setpoint.laser.gate, setpoint.laser.power) = (3, 0.4);
+                    assert!(setpoint.laser.push(GateEdge { offset: 500_000, gate: 0, power: 0.0 }));
+                }
+                _ => {}
+            }
+            ring.accept(&setpoint, Nanoseconds(0), 2.0).unwrap();
+        }
+        ring
+    }
+
+    fn at(setpoints: f64) -> StreamTime {
+        StreamTime((setpoints * ONE as f64).round() as i64)
+    }
+
+    /// Lit stream time and exposure over `[from, to)` in steps of `rate`.
+    fn play(from: f64, to: f64, rate: f64, dark_until: f64) -> (f64, f64) {
+        let ring = ring();
+        let (mut lit, mut exposure, mut now) = (0.0, 0.0, at(from));
+        while now < at(to) {
+            let stretch = Stretch { from: now, to: now + at(rate) };
+            let cycle = laser(&ring, stretch, at(dark_until));
+            assert!(cycle.is_valid(), "{cycle:?}");
+            let (mut since, mut gate, mut power) = (0.0, cycle.gate, cycle.power);
+            let end = GateEdge { offset: 1_000_000, gate: 0, power: 0.0 };
+            for edge in cycle.edges().iter().chain([&end]) {
+                let time = f64::from(edge.offset) * 1e-6;
+                if gate != 0 {
+                    assert_eq!(gate, 3);
+                    lit += (time - since) * rate;
+                    exposure += (time - since) * power;
+                }
+                (since, gate, power) = (time, edge.gate, edge.power);
+            }
+            now = stretch.to;
+        }
+        (lit, exposure)
+    }
+
+    #[test]
+    fn lit_stream_time_and_exposure_do_not_depend_on_the_rate() {
+        for rate in [1.0, 0.5, 0.1, 0.3, 2.0, 1.7] {
+            for from in [0.0, 0.25, 0.9] {
+                let (lit, exposure) = play(from, 7.0, rate, 0.0);
+                // Offsets are whole nanoseconds: 1e-6 of a cycle per edge.
+                assert!((lit - 2.25).abs() < 1e-5, "{lit} at rate {rate} from {from}");
+                assert!((exposure - 0.9).abs() < 1e-5, "{exposure} at rate {rate} from {from}");
+            }
+        }
+    }
+
+    #[test]
+    fn lights_again_exactly_where_it_went_dark() {
+        for dark_until in [1.1, 1.5, 2.0, 2.75, 3.5, 4.0] {
+            for rate in [1.0, 0.37, 1.9] {
+                let (lit, _) = play(0.3, 7.0, rate, dark_until);
+                let expected = (3.5 - f64::max(1.25, dark_until)).max(0.0);
+                assert!((lit - expected).abs() < 1e-5, "{lit} from {dark_until} at {rate}");
+            }
+        }
+    }
+
+    #[test]
+    fn as_planned_is_the_planners_own_cycle() {
+        let ring = ring();
+        for sequence in 0..7 {
+            let stretch =
+                Stretch { from: StreamTime::of(sequence), to: StreamTime::of(sequence + 1) };
+            let cycle = laser(&ring, stretch, StreamTime(0));
+            assert_eq!(cycle, ring.setpoint(sequence).laser);
+        }
+    }
+
+    #[test]
+    fn backwards_and_at_rest_it_is_dark() {
+        let ring = ring();
+        for (from, to) in [(3.0, 2.0), (2.0, 2.0)] {
+            let stretch = Stretch { from: at(from), to: at(to) };
+            assert_eq!(laser(&ring, stretch, StreamTime(0)), LaserCycle::OFF);
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Which setpoints are taken into the look-ahead: those of the stream that was started.
+//!
+//! Only a stream that the domain has started is played, so a restarted process never replays an
+//! old one. Setpoints may arrive before the start of their stream does; whatever belongs to a
+//! stream that is over, or was never started, is let go.
+
+use crate::lookahead::Lookahead;
+use crate::rate_limit::RateLimit;
+use crate::supervision::{Finding, Supervision, Tracking};
+use machine::Machine;
+use signals::{FaultCode, Nanoseconds, Setpoint};
+
+/// Setpoints that must be in hand before a stream begins, unless it is shorter [setpoints].
+pub const BEGINNING: u64 = 250;
+
+/// The way into the look-ahead.
+#[derive(Debug)]
+pub struct Intake {
+    lookahead: Lookahead,
+    rate_limit: RateLimit,
+    /// The stream to play, 0 for none.
+    started: u64,
+    /// The newest stream that is over.
+    finished: u64,
+}
+
+impl Intake {
+    /// Empty, for this machine.
+    pub fn new(machine: &Machine) -> Self {
+        Self {
+            lookahead: Lookahead::new(),
+            rate_limit: RateLimit::new(machine),
+            started: 0,
+            finished: 0,
+        }
+    }
+
+    /// The setpoints in hand.
+    pub fn lookahead(&self) -> &Lookahead {
+        &self.lookahead
+    }
+
+    /// The setpoints in hand, to pass time.
+    pub fn lookahead_mut(&mut self) -> &mut Lookahead {
+        &mut self.lookahead
+    }
+
+    /// The stream to play, 0 for none.
+    pub fn started(&self) -> u64 {
+        self.started
+    }
+
+    /// The newest stream that is over, 0 for none.
+    pub fn finished(&self) -> u64 {
+        self.finished
+    }
+
+    /// Makes `stream` the one to play; `false` when it is over or no stream number.
+    #[must_use]
+    pub fn start(&mut self, stream: u64) -> bool {
+        if stream <= self.finished {
+            return false;
+        }
+        self.started = stream;
+        if self.lookahead.stream() != stream {
+            self.lookahead.clear(stream);
+        }
+        true
+    }
+
+    /// Whether enough of the started stream is in hand to begin.
+    pub fn is_ready(&self) -> bool {
+        self.started != 0
+            && self.lookahead.stream() == self.started
+            && (self.lookahead.is_complete() || self.lookahead.accepted() >= BEGINNING)
+    }
+
+    /// The stream in hand is over.
+    pub fn finish(&mut self) {
+        self.finished = self.finished.max(self.started);
+        self.started = 0;
+        self.lookahead.clear(0);
+    }
+
+    /// Takes one setpoint, or lets it go.
+    ///
+    /// # Errors
+    /// One that breaks a limit, or breaks the stream that was started.
+    pub fn take(
+        &mut self,
+        setpoint: &Setpoint,
+        received: Nanoseconds,
+        supervision: &Supervision,
+    ) -> Result<(), Finding> {
+        if setpoint.stream <= self.finished && setpoint.stream != 0 {
+            return Ok(());
+        }
+        if self.started == 0 {
+            let repeated = setpoint.sequence == 0;
+            let continued = setpoint.stream == self.lookahead.stream()
+                && setpoint.sequence == self.lookahead.accepted();
+            match (repeated, continued) {
+                (true, _) => self.lookahead.clear(setpoint.stream),
+                (false, true) => {}
+                (false, false) => return Ok(()),
+            }
+        } else if setpoint.stream < self.started && setpoint.stream != 0 {
+            return Ok(());
+        }
+        supervision.setpoint(setpoint)?;
+        let largest_rate = self.rate_limit.of(setpoint);
+        self.lookahead.accept(setpoint, received, largest_rate).map_err(|broken| {
+            let (value, limit) = (broken.sequence as f64, broken.expected as f64);
+            Finding::new(FaultCode::StreamBroken, value, limit, Tracking::Sound)
+        })
+    }
+}

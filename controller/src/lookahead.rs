@@ -1,0 +1,264 @@
+//! The setpoints that travel ahead of time, in a fixed ring, with some of the past kept for going
+//! back along the stream.
+
+use crate::rate_limit::LARGEST_RATE;
+use crate::stream_time::StreamTime;
+use signals::setpoint::flags;
+use signals::{Nanoseconds, Setpoint};
+
+/// Setpoints in the ring; a power of two.
+pub const CAPACITY: usize = 2048;
+
+/// Played setpoints that stay. A hold from rate 2 comes to rest after 232 of them, and a resume
+/// starts 232 before the point where the gate was closed.
+pub const HISTORY: usize = 640;
+
+/// Setpoints that share one summary.
+const BLOCK: usize = 64;
+
+const BLOCKS: usize = CAPACITY / BLOCK;
+
+/// What a block of setpoints allows and holds.
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    largest_rate: f64,
+    lit: bool,
+}
+
+/// A setpoint did not continue the stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("setpoint {sequence} of stream {stream} where {expected} was due")]
+pub struct StreamBroken {
+    /// The stream of the setpoint.
+    pub stream: u64,
+    /// Its sequence number.
+    pub sequence: u64,
+    /// The sequence number that would have been right.
+    pub expected: u64,
+}
+
+/// The ring.
+#[derive(Debug)]
+pub struct Lookahead {
+    setpoints: Box<[Setpoint; CAPACITY]>,
+    received: Box<[Nanoseconds; CAPACITY]>,
+    blocks: [Block; BLOCKS],
+    stream: u64,
+    accepted: u64,
+    played: u64,
+    complete: bool,
+}
+
+impl Lookahead {
+    /// An empty ring, its memory touched.
+    pub fn new() -> Self {
+        Self {
+            setpoints: boxed(Setpoint::default()),
+            received: boxed(Nanoseconds(0)),
+            blocks: [Block { largest_rate: LARGEST_RATE, lit: false }; BLOCKS],
+            stream: 0,
+            accepted: 0,
+            played: 0,
+            complete: false,
+        }
+    }
+
+    /// Empties the ring and waits for the first setpoint of `stream`, 0 for any.
+    pub fn clear(&mut self, stream: u64) {
+        (self.stream, self.accepted, self.played, self.complete) = (stream, 0, 0, false);
+    }
+
+    /// Takes the next setpoint of the stream, of which `largest_rate` is known.
+    ///
+    /// # Errors
+    /// A gap, a repetition, another stream, or no room.
+    pub fn accept(
+        &mut self,
+        setpoint: &Setpoint,
+        received: Nanoseconds,
+        largest_rate: f64,
+    ) -> Result<(), StreamBroken> {
+        let continues = setpoint.sequence == self.accepted
+            && (setpoint.stream == self.stream || self.stream == 0);
+        if !continues || setpoint.stream == 0 || self.complete || self.room() == 0 {
+            return Err(StreamBroken {
+                stream: setpoint.stream,
+                sequence: setpoint.sequence,
+                expected: self.accepted,
+            });
+        }
+        self.stream = setpoint.stream;
+        let slot = self.accepted as usize % CAPACITY;
+        self.setpoints[slot] = *setpoint;
+        self.received[slot] = received;
+        let block = &mut self.blocks[slot / BLOCK];
+        if slot.is_multiple_of(BLOCK) {
+            *block = Block { largest_rate, lit: false };
+        }
+        block.largest_rate = block.largest_rate.min(largest_rate);
+        block.lit |= setpoint.laser.is_lit();
+        self.accepted += 1;
+        self.complete = setpoint.has(flags::LAST);
+        Ok(())
+    }
+
+    /// The stream in the ring, 0 for none.
+    pub fn stream(&self) -> u64 {
+        self.stream
+    }
+
+    /// Setpoints taken so far.
+    pub fn accepted(&self) -> u64 {
+        self.accepted
+    }
+
+    /// Setpoints whose time has passed.
+    pub fn played(&self) -> u64 {
+        self.played
+    }
+
+    /// Whether the stream's last setpoint is in the ring.
+    pub fn is_complete(&self) -> bool {
+        self.complete
+    }
+
+    /// How many more setpoints there is room for.
+    pub fn room(&self) -> usize {
+        (CAPACITY - HISTORY).saturating_sub((self.accepted - self.played) as usize)
+    }
+
+    /// The time up to `now` has passed; going back along the stream takes nothing back.
+    pub fn pass(&mut self, now: StreamTime) {
+        self.played = self.played.max(now.sequence()).min(self.accepted);
+    }
+
+    /// The instant of the newest setpoint.
+    pub fn end(&self) -> StreamTime {
+        StreamTime::of(self.accepted.saturating_sub(1))
+    }
+
+    /// The instant of the oldest setpoint still held.
+    pub fn beginning(&self) -> StreamTime {
+        StreamTime::of(self.accepted.saturating_sub(CAPACITY as u64))
+    }
+
+    /// The setpoint with this number, or the nearest one held.
+    pub fn setpoint(&self, sequence: u64) -> &Setpoint {
+        &self.setpoints[self.nearest(sequence)]
+    }
+
+    /// When that setpoint came in.
+    pub fn received(&self, sequence: u64) -> Nanoseconds {
+        self.received[self.nearest(sequence)]
+    }
+
+    /// The largest rate that all setpoints from `from` to `to` allow, up to a block more at either
+    /// end. What has not come in yet is taken to allow no more than the planned rate.
+    pub fn largest_rate(&self, from: StreamTime, to: StreamTime) -> f64 {
+        let known = if self.complete || to <= self.end() { LARGEST_RATE } else { 1.0 };
+        self.blocks(from, to).fold(known, |rate, block| rate.min(block.largest_rate))
+    }
+
+    /// Whether there may be light between `from` and `to`, or up to a block outside.
+    pub fn may_be_lit(&self, from: StreamTime, to: StreamTime) -> bool {
+        self.blocks(from, to).any(|block| block.lit)
+    }
+
+    fn blocks(&self, from: StreamTime, to: StreamTime) -> impl Iterator<Item = &Block> {
+        let block = |sequence: u64| sequence / BLOCK as u64;
+        let last = block(to.min(self.end()).sequence());
+        let first = block(from.max(self.beginning()).sequence());
+        (first..=last).map(|index| &self.blocks[index as usize % BLOCKS])
+    }
+
+    fn nearest(&self, sequence: u64) -> usize {
+        let newest = self.accepted.saturating_sub(1);
+        let oldest = self.accepted.saturating_sub(CAPACITY as u64);
+        sequence.clamp(oldest, newest) as usize % CAPACITY
+    }
+}
+
+impl Default for Lookahead {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// `value` everywhere, made on the heap: the ring is larger than some stacks.
+fn boxed<T: Copy + core::fmt::Debug>(value: T) -> Box<[T; CAPACITY]> {
+    let Ok(array) = vec![value; CAPACITY].into_boxed_slice().try_into() else {
+        unreachable!("the length is the array's")
+    };
+    array
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn setpoint(stream: u64, sequence: u64) -> Setpoint {
+        Setpoint { stream, sequence, ..Setpoint::default() }
+    }
+
+    fn take(ring: &mut Lookahead, sequence: u64) -> Result<(), StreamBroken> {
+        ring.accept(&setpoint(7, sequence), Nanoseconds(sequence as i64), 2.0)
+    }
+
+    #[test]
+    fn refuses_what_does_not_continue_the_stream() {
+        let mut ring = Lookahead::new();
+        take(&mut ring, 0).unwrap();
+        take(&mut ring, 1).unwrap();
+        for (stream, sequence) in [(7, 1), (7, 3), (8, 2), (0, 2)] {
+            let refused = ring.accept(&setpoint(stream, sequence), Nanoseconds(0), 2.0);
+            assert_eq!(refused, Err(StreamBroken { stream, sequence, expected: 2 }));
+        }
+        let last = Setpoint { flags: flags::LAST, ..setpoint(7, 2) };
+        ring.accept(&last, Nanoseconds(0), 2.0).unwrap();
+        assert!(take(&mut ring, 3).is_err());
+    }
+
+    #[test]
+    fn keeps_the_past_and_says_how_much_room_is_left() {
+        let mut ring = Lookahead::new();
+        for sequence in 0..5000_u64 {
+            if ring.room() == 0 {
+                ring.pass(StreamTime::of(sequence - 100));
+            }
+            take(&mut ring, sequence).unwrap();
+            let oldest = ring.played().saturating_sub(HISTORY as u64);
+            assert_eq!(ring.setpoint(oldest).sequence, oldest);
+            assert_eq!(ring.setpoint(sequence).sequence, sequence);
+            assert_eq!(ring.received(sequence), Nanoseconds(sequence as i64));
+            assert_eq!(ring.setpoint(sequence + 9).sequence, sequence);
+        }
+        ring.pass(StreamTime::of(10));
+        assert!(ring.played() > 10, "going back takes nothing back");
+    }
+
+    #[test]
+    fn summarises_blocks_and_forgets_old_ones() {
+        let mut ring = Lookahead::new();
+        for sequence in 0..3000_u64 {
+            ring.pass(StreamTime::of(sequence));
+            let slow = sequence == 200 || sequence == 200 + CAPACITY as u64 + 64;
+            let mut setpoint = setpoint(7, sequence);
+            setpoint.laser.gate = u32::from(sequence == 200);
+            let rate = if slow { 1.25 } else { 2.0 };
+            ring.accept(&setpoint, Nanoseconds(0), rate).unwrap();
+            if sequence == 1000 {
+                let around = |from, to| (StreamTime::of(from), StreamTime::of(to));
+                let (from, to) = around(100, 300);
+                assert_eq!((ring.largest_rate(from, to), ring.may_be_lit(from, to)), (1.25, true));
+                let (from, to) = around(300, 900);
+                assert_eq!((ring.largest_rate(from, to), ring.may_be_lit(from, to)), (2.0, false));
+                let (from, to) = around(300, 1100);
+                assert_eq!(ring.largest_rate(from, to), 1.0, "the unknown is played as planned");
+            }
+        }
+        let slow = 200 + CAPACITY as u64 + 64;
+        assert_eq!(ring.largest_rate(StreamTime::of(slow), StreamTime::of(slow)), 1.25);
+        assert!(!ring.may_be_lit(StreamTime::of(1300), StreamTime::of(2990)));
+    }
+}

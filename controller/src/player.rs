@@ -1,0 +1,316 @@
+//! Plays the stream: which stream time belongs to which deadline, and how a hold, a resume, a
+//! pause and a dry stream change that.
+//!
+//! Three instants are in the making. `now` belongs to the feedback that is being answered, `next`
+//! to the deadline at which the answer takes effect, `after` to the one at which it ends. `next`
+//! was promised by the previous command, so a decision taken now acts from `next` on: the gate at
+//! once, the rate up to `after`.
+//!
+//! A hold closes the gate at `next` and brakes. The point where it closed stays the boundary of
+//! the dark: a resume goes back far enough to be at full rate there again, and lights exactly
+//! there. What was not lit anyway is not played again.
+
+use crate::gate::{self, Stretch};
+use crate::lookahead::Lookahead;
+use crate::ramp::{Ramp, Rate, Slew};
+use crate::rate_limit::LARGEST_RATE;
+use crate::stream_time::{ONE, StreamTime};
+use signals::LaserCycle;
+use signals::setpoint::flags;
+use signals::time::CYCLE_TIME;
+
+/// The slowest that an override goes.
+pub const SMALLEST_RATE: f64 = 0.1;
+
+/// How far ahead rates are limited: slowing from the largest rate to the planned one takes 424
+/// setpoints.
+const HORIZON: StreamTime = StreamTime(576 * ONE);
+
+/// Setpoints never played into while more may come: the neighbours of an interpolation.
+const RESERVE: StreamTime = StreamTime(2 * ONE);
+
+/// Setpoints that a rewind goes further back than the way up to rate, so that the rate is steady
+/// where the light comes back.
+const STEADY: StreamTime = StreamTime(4 * ONE);
+
+/// One deadline and what of the stream belongs to it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Instant {
+    /// Stream time.
+    pub time: StreamTime,
+    /// Rate there, 1 as planned.
+    pub rate: f64,
+    /// Its change over the cycle before [1/s].
+    pub rate_change: f64,
+}
+
+/// What the player came upon.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event {
+    /// Nothing.
+    None,
+    /// The program pauses at `after`.
+    Paused,
+    /// The stream ends at `after`.
+    Ended,
+    /// No more may be played without the distance to stop; braking.
+    Starved,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Activity {
+    /// Standing.
+    Resting,
+    /// Going forward; the slew is the one to and from rest until the rate is reached.
+    Playing(Slew),
+    /// Coming to rest.
+    Braking,
+    /// Going back in the dark, to rest at about this time.
+    Rewinding(StreamTime),
+    /// Coming to rest before going forward again.
+    Turning,
+}
+
+/// The player.
+#[derive(Debug, Clone)]
+pub struct Player {
+    now: Instant,
+    next: Instant,
+    after: Instant,
+    ramp: Ramp,
+    activity: Activity,
+    /// Whether the stretch from `next` to `after` may be lit.
+    marking: bool,
+    dark_until: StreamTime,
+    /// Whether light beyond `dark_until` was left out.
+    owes_light: bool,
+    /// Whether the stream itself is at rest here, so that the rate may jump.
+    at_planned_rest: bool,
+    /// Pauses below this sequence number have been kept.
+    paused_until: u64,
+    wanted: Rate,
+}
+
+impl Player {
+    /// Before the first setpoint of a stream, at the planned rate.
+    pub fn new() -> Self {
+        Self {
+            now: Instant::default(),
+            next: Instant::default(),
+            after: Instant::default(),
+            ramp: Ramp::new(),
+            activity: Activity::Resting,
+            marking: false,
+            dark_until: StreamTime::default(),
+            owes_light: false,
+            at_planned_rest: true,
+            paused_until: 0,
+            wanted: Rate::ONE,
+        }
+    }
+
+    /// Back to before the first setpoint; the wanted rate stays.
+    pub fn rewind(&mut self) {
+        *self = Self { wanted: self.wanted, ..Self::new() };
+    }
+
+    /// Plays at `rate` from now on, as far as the limits let it; `false` and no change when it is
+    /// not within [`SMALLEST_RATE`]..=[`LARGEST_RATE`].
+    #[must_use]
+    pub fn set_rate(&mut self, rate: f64) -> bool {
+        let allowed = (SMALLEST_RATE..=LARGEST_RATE).contains(&rate);
+        if allowed {
+            self.wanted = Rate::nearest(rate);
+        }
+        allowed
+    }
+
+    /// The rate asked for.
+    pub fn wanted_rate(&self) -> f64 {
+        self.wanted.value()
+    }
+
+    /// The instant of the feedback.
+    pub fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// The deadline at which the command takes effect.
+    pub fn next(&self) -> Instant {
+        self.next
+    }
+
+    /// The deadline after that one.
+    pub fn after(&self) -> Instant {
+        self.after
+    }
+
+    /// Whether nothing moves, as far as commands have gone out.
+    pub fn is_at_rest(&self) -> bool {
+        self.is_resting() && self.now.time == self.after.time
+    }
+
+    /// Whether it waits for [`Self::resume`].
+    pub fn is_resting(&self) -> bool {
+        self.activity == Activity::Resting
+    }
+
+    /// Closes the gate from `next` on and comes to rest along the path.
+    pub fn hold(&mut self) {
+        match self.activity {
+            Activity::Playing(_) => {
+                // `after` is what the coming `advance` makes `next`.
+                if self.after.time >= self.dark_until {
+                    self.dark_until = self.after.time;
+                    self.owes_light = false;
+                }
+                self.activity = Activity::Braking;
+            }
+            Activity::Rewinding(_) | Activity::Turning => self.activity = Activity::Braking,
+            Activity::Resting | Activity::Braking => {}
+        }
+    }
+
+    /// Goes on from rest: at once where the stream itself rests, else from as far back as the
+    /// light needs.
+    pub fn resume(&mut self, lookahead: &Lookahead) {
+        if !self.is_resting() {
+            return;
+        }
+        let here = self.after.time;
+        let rate = self.rate_allowed(lookahead, here);
+        let start = Ramp::starting_distance(rate, Slew::STOP) + STEADY;
+        let steady_from = if self.owes_light {
+            Some(self.dark_until)
+        } else if !self.at_planned_rest && lookahead.may_be_lit(here, here + start) {
+            Some(here)
+        } else {
+            None
+        };
+        let oldest = lookahead.beginning();
+        self.activity = match steady_from.map(|light| (light - start).max(oldest)) {
+            Some(back) if back < here => Activity::Rewinding(back),
+            None if self.at_planned_rest => {
+                self.ramp.jump(rate);
+                Activity::Playing(Slew::OVERRIDE)
+            }
+            _ => Activity::Playing(Slew::STOP),
+        };
+        self.at_planned_rest = false;
+    }
+
+    /// Goes on by one cycle.
+    pub fn advance(&mut self, lookahead: &Lookahead) -> Event {
+        self.now = self.next;
+        self.next = self.after;
+        self.marking = matches!(self.activity, Activity::Playing(_));
+        let from = self.next.time;
+        let mut event = Event::None;
+        let rate = match self.activity {
+            Activity::Resting => {
+                self.after = Instant { time: from, rate: 0.0, rate_change: 0.0 };
+                return event;
+            }
+            Activity::Playing(slew) => {
+                let allowed = self.rate_allowed(lookahead, from);
+                let rate = self.ramp.toward(allowed, slew);
+                let reach = from + self.ramp.stopping_distance(rate, Slew::STOP) + RESERVE;
+                if reach > lookahead.end() && !lookahead.is_complete() {
+                    self.dark_until = self.dark_until.max(from);
+                    self.activity = Activity::Braking;
+                    self.marking = false;
+                    event = Event::Starved;
+                    self.ramp.toward(Rate::ZERO, Slew::STOP)
+                } else {
+                    if self.ramp.rate() == allowed.value() {
+                        self.activity = Activity::Playing(Slew::OVERRIDE);
+                    }
+                    rate
+                }
+            }
+            Activity::Rewinding(back) => {
+                let rate = self.ramp.toward(Rate(-Rate::ONE.0), Slew::STOP);
+                if from + self.ramp.stopping_distance(rate, Slew::STOP) < back {
+                    self.activity = Activity::Turning;
+                    self.ramp.toward(Rate::ZERO, Slew::STOP)
+                } else {
+                    rate
+                }
+            }
+            Activity::Braking | Activity::Turning => self.ramp.toward(Rate::ZERO, Slew::STOP),
+        };
+        let time = from + self.ramp.advance(rate);
+        let reached = self.ramp.rate();
+        self.after = Instant { time, rate: reached, rate_change: self.rate_change(reached) };
+        if let Some(found) = self.planned_rest(lookahead) {
+            // A planned rest on the way is as good a place to stop as any.
+            let playing = matches!(self.activity, Activity::Playing(_));
+            self.activity = Activity::Resting;
+            self.at_planned_rest = true;
+            if playing {
+                event = found;
+            }
+        } else if self.ramp.is_still() {
+            self.activity = match self.activity {
+                Activity::Turning => Activity::Playing(Slew::STOP),
+                Activity::Braking => Activity::Resting,
+                other => other,
+            };
+        }
+        event
+    }
+
+    /// The laser from `next` to `after`.
+    pub fn laser(&mut self, lookahead: &Lookahead) -> LaserCycle {
+        let stretch = Stretch { from: self.next.time, to: self.after.time };
+        let cycle = gate::laser(lookahead, stretch, self.dark_until);
+        if self.marking {
+            return cycle;
+        }
+        self.owes_light |= cycle.is_lit();
+        LaserCycle::OFF
+    }
+
+    /// Where the digital outputs stand: they do not go back with a rewind.
+    pub fn outputs_at(&self) -> StreamTime {
+        self.next.time.max(self.dark_until)
+    }
+
+    /// Whether `after` came to a setpoint where the stream itself rests; stops exactly there.
+    fn planned_rest(&mut self, lookahead: &Lookahead) -> Option<Event> {
+        let first = self.next.time.sequence() + 1;
+        for sequence in first..=self.after.time.sequence() {
+            let setpoint = lookahead.setpoint(sequence);
+            let pauses = setpoint.has(flags::PAUSE) && sequence >= self.paused_until;
+            let ends = lookahead.is_complete() && StreamTime::of(sequence) >= lookahead.end();
+            if pauses || ends {
+                self.paused_until = sequence + 1;
+                self.ramp.jump(Rate::ZERO);
+                let time = StreamTime::of(sequence);
+                self.after = Instant { time, rate: 0.0, rate_change: 0.0 };
+                return Some(if ends { Event::Ended } else { Event::Paused });
+            }
+        }
+        None
+    }
+
+    fn rate_change(&self, reached: f64) -> f64 {
+        // Out of a planned rest the rate jumps, but nothing moves there.
+        let from_rest = self.next.rate == 0.0 && reached.abs() > 0.05;
+        if from_rest { 0.0 } else { (reached - self.next.rate) / CYCLE_TIME }
+    }
+
+    fn rate_allowed(&self, lookahead: &Lookahead, from: StreamTime) -> Rate {
+        if self.wanted <= Rate::ONE {
+            return self.wanted;
+        }
+        let largest = lookahead.largest_rate(from, from + HORIZON);
+        self.wanted.min(Rate::below(largest))
+    }
+}
+
+impl Default for Player {
+    fn default() -> Self {
+        Self::new()
+    }
+}

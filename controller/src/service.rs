@@ -1,0 +1,155 @@
+//! The controller service: woken by the feedback, it answers with one command in the same cycle.
+//!
+//! It moves samples between the channels and [`Controller::step`] and decides nothing itself. The
+//! thread that takes operators' requests is not real-time; a lock-free queue lies between.
+
+use crate::controller::Controller;
+use crate::exchange::{Inputs, Outputs, Peers as PeersPresent, Presence};
+use machine::Machine;
+use runtime::clock;
+use runtime::operator::OperatorQueue;
+use runtime::peer::{PeerState, Peers};
+use runtime::thread::{self, RealtimeOptions};
+use runtime::wake::{Listener, Notifier, Wake};
+use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, signal};
+use signals::{
+    Command, ControllerReport, ControllerState, Feedback, Nanoseconds, OperatorRequest,
+    OperatorVerb, Progress, Setpoint,
+};
+
+/// Setpoints taken in one cycle at most: a late planner is caught up with over several cycles.
+const DRAIN: usize = 16;
+
+/// How long to wait for a wake before looking at the peers.
+const LOOK: Nanoseconds = Nanoseconds(100_000_000);
+
+/// Runs until it is told to end (SIGTERM), or the supervisor has died and the axes are at rest.
+///
+/// # Errors
+/// When a channel fails.
+pub fn run(
+    domain: &Domain,
+    machine: &Machine,
+    realtime: &RealtimeOptions,
+) -> Result<(), ServiceError> {
+    let mut cycle = ServiceCycle::open(domain, machine)?;
+    let realtime = thread::enter_realtime(realtime);
+    cycle.controller.set_realtime(realtime.facts);
+    cycle.wake.drain()?;
+    loop {
+        cycle.wake.wait_until(clock::now() + LOOK)?;
+        let received = clock::now();
+        while let Some(feedback) = cycle.feedbacks.newest()? {
+            cycle.answer(&feedback, received)?;
+        }
+        if cycle.shall_end() {
+            return Ok(());
+        }
+    }
+}
+
+struct ServiceCycle {
+    controller: Controller,
+    outputs: Outputs,
+    setpoints_taken: Vec<Setpoint>,
+    told_to_stop: bool,
+    peers: Peers,
+    operators: OperatorQueue,
+    feedbacks: Subscriber<Feedback>,
+    setpoints: Subscriber<Setpoint>,
+    commands: Publisher<Command>,
+    progress: Publisher<Progress>,
+    reports: Publisher<ControllerReport>,
+    wake: Listener,
+    answered: Notifier,
+}
+
+impl ServiceCycle {
+    fn open(domain: &Domain, machine: &Machine) -> Result<Self, ServiceError> {
+        Ok(Self {
+            controller: Controller::new(machine),
+            outputs: Outputs::default(),
+            setpoints_taken: Vec::with_capacity(DRAIN),
+            told_to_stop: false,
+            peers: Peers::watch(domain, &[Role::Domain, Role::Planner, Role::Drives])?,
+            operators: OperatorQueue::start(domain)?,
+            feedbacks: domain.subscriber(Reading::Newest)?,
+            setpoints: domain.subscriber(Reading::Every)?,
+            commands: domain.publisher()?,
+            progress: domain.publisher()?,
+            reports: domain.publisher()?,
+            wake: domain.listener(Wake::Feedback)?,
+            answered: domain.notifier(Wake::Command)?,
+        })
+    }
+
+    fn answer(&mut self, feedback: &Feedback, received: Nanoseconds) -> Result<(), ServiceError> {
+        self.setpoints_taken.clear();
+        while self.setpoints_taken.len() < DRAIN.min(self.controller.room()) {
+            let Some(setpoint) = self.setpoints.next()? else { break };
+            self.setpoints_taken.push(setpoint);
+        }
+        let inputs = Inputs {
+            feedback,
+            received,
+            setpoints: &self.setpoints_taken,
+            request: self.request(),
+            peers: self.present(),
+        };
+        self.controller.step(received, &inputs, &mut self.outputs);
+
+        // The command first: everything else can wait until drives has it.
+        self.outputs.command.published = clock::now();
+        self.commands.publish(&self.outputs.command)?;
+        self.answered.notify()?;
+        if let Some(reply) = self.outputs.reply {
+            self.operators.answer(reply);
+        }
+        if let Some(progress) = &mut self.outputs.progress {
+            progress.published = clock::now();
+            self.progress.publish(progress)?;
+        }
+        if let Some(report) = &self.outputs.report {
+            self.reports.publish(report)?;
+        }
+        Ok(())
+    }
+
+    /// The oldest request of a person; being told to end is one too, to stop.
+    fn request(&mut self) -> Option<OperatorRequest> {
+        if let Some(request) = self.operators.take() {
+            return Some(request);
+        }
+        if self.told_to_stop || signal::termination().is_none() {
+            return None;
+        }
+        self.told_to_stop = true;
+        Some(OperatorRequest { verb: OperatorVerb::Stop as u32, ..OperatorRequest::default() })
+    }
+
+    fn present(&mut self) -> PeersPresent {
+        let mut presence = |role| match self.peers.state(role) {
+            PeerState::Dead => Presence::Lost,
+            PeerState::Unknown | PeerState::Alive => Presence::Present,
+        };
+        PeersPresent {
+            planner: presence(Role::Planner),
+            drives: presence(Role::Drives),
+            supervisor: presence(Role::Domain),
+        }
+    }
+
+    /// Told to, or left alone; never while the axes may still be moving, unless nobody moves them.
+    fn shall_end(&mut self) -> bool {
+        let supervisor = self.peers.state(Role::Domain);
+        if signal::termination().is_none() && supervisor != PeerState::Dead {
+            return false;
+        }
+        let state = self.outputs.command.state();
+        let resting = matches!(
+            state,
+            ControllerState::Disabled | ControllerState::Idle | ControllerState::Faulted
+        );
+        resting || self.peers.state(Role::Drives) == PeerState::Dead
+    }
+}

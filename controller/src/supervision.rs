@@ -1,0 +1,253 @@
+//! Whether what comes in can be trusted, and whether the motors follow.
+//!
+//! A finding says what is wrong and whether the axes can still be trusted to follow the plan. If
+//! so they come to rest along the path, else the drives brake them.
+
+use machine::{Axis, Machine};
+use signals::feedback::status;
+use signals::time::CYCLE_TIME;
+use signals::{AxisArray, Cycle, Fault, FaultCode, Feedback, MAX_AXES, Nanoseconds, Setpoint};
+
+/// Feedback cycles that may be missing in a row.
+const LARGEST_GAP: u64 = 3;
+
+/// Overruns in a row that a clock which does not slip may have.
+const OVERRUNS: u64 = 3;
+
+/// How far a planned value may exceed its limit before the setpoint is refused. The planner's
+/// checker refuses sooner.
+const EXCESS: f64 = 1.001;
+
+/// Rounding of a planned position against its soft limit [m or rad].
+const ROUNDING: f64 = 1e-9;
+
+/// Time over which the heating of a winding is averaged [s]; short against a real winding's.
+const HEATING_TIME: f64 = 5.0;
+
+/// Encoder counts per cycle within which an axis counts as standing.
+const STANDING_COUNTS: f64 = 1.5;
+
+/// Whether the axes can still be trusted to follow the plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tracking {
+    /// They can come to rest along the path.
+    Sound,
+    /// The drives must brake them.
+    Lost,
+}
+
+/// Something wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finding {
+    /// What.
+    pub fault: Fault,
+    /// What it means for the way to rest.
+    pub tracking: Tracking,
+}
+
+impl Finding {
+    /// A finding that belongs to no axis.
+    pub fn new(code: FaultCode, value: f64, limit: f64, tracking: Tracking) -> Self {
+        Self { fault: Fault { code: code as u32, value, limit, ..Fault::default() }, tracking }
+    }
+
+    /// A finding on the axis with this index.
+    pub fn on(index: usize, code: FaultCode, value: f64, limit: f64, tracking: Tracking) -> Self {
+        let mut finding = Self::new(code, value, limit, tracking);
+        finding.fault.axis = index as u32 + 1;
+        finding
+    }
+
+    /// The same, found at `now`.
+    pub fn at(mut self, now: Nanoseconds) -> Self {
+        self.fault.at = now;
+        self
+    }
+}
+
+/// The watch over feedback and motors.
+#[derive(Debug, Clone)]
+pub struct Supervision {
+    axes: Vec<Axis>,
+    seen: Option<Seen>,
+    overruns: u64,
+    heating: AxisArray,
+    standing: u32,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    epoch: u64,
+    cycle: Cycle,
+    overruns: u64,
+}
+
+impl Supervision {
+    /// Of this machine.
+    pub fn new(machine: &Machine) -> Self {
+        Self {
+            axes: machine.axes.clone(),
+            seen: None,
+            overruns: 0,
+            heating: [0.0; MAX_AXES],
+            standing: 0,
+        }
+    }
+
+    /// Forgets what was counted; the windings stay as warm as they are.
+    pub fn reset(&mut self) {
+        self.overruns = 0;
+    }
+
+    /// Cycles in a row in which no axis moved by more than an encoder count or so.
+    pub fn standing(&self) -> u32 {
+        self.standing
+    }
+
+    /// Takes a feedback: how many cycles after the last one it is.
+    ///
+    /// # Errors
+    /// The same or an older cycle, a gap, another run of drives, a number that is not finite, or
+    /// too many overruns in a row.
+    pub fn feedback(&mut self, feedback: &Feedback) -> Result<u64, Finding> {
+        let seen =
+            Seen { epoch: feedback.epoch, cycle: feedback.cycle, overruns: feedback.overruns };
+        let before = self.seen.replace(seen);
+        self.watch_standing(feedback);
+        if let Some(index) = not_finite(feedback, self.axes.len()) {
+            let value = feedback.position.get(index).copied().unwrap_or_default();
+            return Err(Finding::on(index, FaultCode::NotFinite, value, 0.0, Tracking::Lost));
+        }
+        let Some(before) = before else { return Ok(1) };
+        let gap = seen.cycle.0.saturating_sub(before.cycle.0);
+        if before.epoch != seen.epoch || gap == 0 || gap > LARGEST_GAP {
+            let limit = LARGEST_GAP as f64;
+            let stale = FaultCode::StaleFeedback;
+            return Err(Finding::new(stale, gap as f64, limit, Tracking::Lost));
+        }
+        let overran = seen.overruns > before.overruns && !feedback.has(status::SLIPPING);
+        self.overruns = if overran { self.overruns + 1 } else { 0 };
+        if self.overruns > OVERRUNS {
+            let (value, limit) = (self.overruns as f64, OVERRUNS as f64);
+            return Err(Finding::new(FaultCode::Overrun, value, limit, Tracking::Sound));
+        }
+        Ok(gap)
+    }
+
+    /// Whether drives says that something is wrong on its side, with the motors powered.
+    ///
+    /// # Errors
+    /// Its own fault, or that it stopped the axes alone.
+    pub fn drives(&self, feedback: &Feedback) -> Result<(), Finding> {
+        if feedback.fault.is_some() {
+            return Err(Finding { fault: feedback.fault, tracking: Tracking::Lost });
+        }
+        if feedback.has(status::STOPPED_ALONE) {
+            let missed = feedback.missed as f64;
+            return Err(Finding::new(FaultCode::StaleCommand, missed, 3.0, Tracking::Lost));
+        }
+        if !feedback.has(status::POWERED) {
+            return Err(Finding::new(FaultCode::DriveFault, 0.0, 0.0, Tracking::Lost));
+        }
+        Ok(())
+    }
+
+    /// Whether the axes follow `angle` [rad at the motor] inside their limits, and stay cool.
+    ///
+    /// # Errors
+    /// Following error, soft limit or overload, with the axis.
+    pub fn motion(&mut self, feedback: &Feedback, angle: &AxisArray) -> Result<(), Finding> {
+        for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
+            let limits = &axis.limits;
+            let measured = feedback.position[index] * axis.ratio;
+            let error = (angle[index] * axis.ratio - measured).abs();
+            if error > limits.following_error || error.is_nan() {
+                let (code, limit) = (FaultCode::FollowingError, limits.following_error);
+                return Err(Finding::on(index, code, error, limit, Tracking::Lost));
+            }
+            // A plan may go right up to the limit, and the axis follows it with some error.
+            let [lower, upper] = limits.position;
+            let margin = limits.following_error;
+            if measured < lower - margin || measured > upper + margin {
+                let limit = if measured < lower { lower } else { upper };
+                let code = FaultCode::PositionLimit;
+                return Err(Finding::on(index, code, measured, limit, Tracking::Lost));
+            }
+            if let Some(continuous) = axis.motor.continuous_current {
+                let current = feedback.current[index];
+                let heating = &mut self.heating[index];
+                *heating += (current * current - *heating) * (CYCLE_TIME / HEATING_TIME);
+                if *heating > continuous * continuous {
+                    let (code, value) = (FaultCode::Overload, heating.sqrt());
+                    return Err(Finding::on(index, code, value, continuous, Tracking::Sound));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a setpoint can be played.
+    ///
+    /// # Errors
+    /// A number that is not finite, or a value beyond its axis' limit.
+    pub fn setpoint(&self, setpoint: &Setpoint) -> Result<(), Finding> {
+        let sound = Tracking::Sound;
+        let scalars = [setpoint.path_velocity, setpoint.path_acceleration, setpoint.path_jerk];
+        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+        if !finite(&setpoint.tool) || !finite(&scalars) || !setpoint.laser.is_valid() {
+            let sequence = setpoint.sequence as f64;
+            return Err(Finding::new(FaultCode::NotFinite, sequence, 0.0, sound));
+        }
+        for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
+            let limits = &axis.limits;
+            let numbers = [
+                setpoint.position[index],
+                setpoint.velocity[index],
+                setpoint.acceleration[index],
+                setpoint.jerk[index],
+                setpoint.lead[index],
+                setpoint.lead_momentum[index],
+                setpoint.effort[index],
+                setpoint.static_effort[index],
+                setpoint.momentum[index],
+            ];
+            if let Some(value) = numbers.iter().find(|value| !value.is_finite()) {
+                return Err(Finding::on(index, FaultCode::NotFinite, *value, 0.0, sound));
+            }
+            let [position, velocity, acceleration, jerk, ..] = numbers;
+            let [lower, upper] = limits.position;
+            let broken = [
+                (lower - position, ROUNDING, position, lower),
+                (position - upper, ROUNDING, position, upper),
+                (velocity.abs(), limits.velocity * EXCESS, velocity, limits.velocity),
+                (
+                    acceleration.abs(),
+                    limits.acceleration * EXCESS,
+                    acceleration,
+                    limits.acceleration,
+                ),
+                (jerk.abs(), limits.jerk * EXCESS, jerk, limits.jerk),
+            ];
+            if let Some((_, _, value, limit)) = broken.iter().find(|(size, most, ..)| size > most) {
+                let code = FaultCode::SetpointLimit;
+                return Err(Finding::on(index, code, *value, *limit, sound));
+            }
+        }
+        Ok(())
+    }
+
+    fn watch_standing(&mut self, feedback: &Feedback) {
+        let stands = self.axes.iter().zip(&feedback.velocity).all(|(axis, velocity)| {
+            velocity.abs() * CYCLE_TIME <= STANDING_COUNTS * axis.encoder.resolution()
+        });
+        self.standing = if stands { self.standing.saturating_add(1) } else { 0 };
+    }
+}
+
+/// The first axis with a measured number that is not finite.
+fn not_finite(feedback: &Feedback, axes: usize) -> Option<usize> {
+    let measured = feedback.position.iter().zip(&feedback.velocity).zip(&feedback.current);
+    measured.take(axes).position(|((position, velocity), current)| {
+        !(position.is_finite() && velocity.is_finite() && current.is_finite())
+    })
+}
