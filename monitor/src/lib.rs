@@ -1,12 +1,14 @@
 //! Watches a run without anybody waiting for it: latency histograms, the recording, the judgement
 //! of the marks, the summary and the report.
 //!
-//! What happens per sample does no input or output; files are
+//! What happens per sample ([`stage::MonitorStage::step`]) does no input or output; files are
 //! written by functions that are told where to.
 
 pub mod latency;
 pub mod marks;
 pub mod recording;
+pub mod report;
 pub mod run_folder;
+pub mod stage;
 pub mod summary;
 pub mod trace;

@@ -1,9 +1,166 @@
-//! What the report draws of a run.
+//! What the report draws of a run, thinned as it is collected: an hour takes the memory of a
+//! second, and no extreme is lost.
 
-use crate::marks::tool_path::LitSpans;
-use signals::LaserCycle;
+pub mod envelope;
+pub mod outline;
+
+use crate::marks::tool_path::{Interval, LitSpans, Moment, ToolPath};
+use crate::recording::CycleRecord;
+use envelope::Envelope;
+use outline::{Outline, OutlinePoint};
+use signals::hop::{Hop, latencies};
+use signals::{LaserCycle, MAX_AXES};
 
 /// Share of a cycle in which the laser marked, 0..=1.
 pub fn lit_share(laser: &LaserCycle) -> f64 {
     LitSpans::of(laser).share()
+}
+
+/// The curves of a run over time and its paths in the plane.
+#[derive(Debug)]
+pub struct Trace {
+    path: ToolPath,
+    waiting: Option<CycleRecord>,
+    timed: bool,
+    /// Paths of the tool with the laser on, from edge to edge.
+    pub marked: Outline,
+    /// Paths of the tool in the dark.
+    pub dark: Outline,
+    /// Distance of the tool from the plan while lit [m].
+    pub deviation_lit: Envelope,
+    /// Distance of the tool from the plan in the dark, while a stream is played [m].
+    pub deviation_dark: Envelope,
+    /// Speed of the tool [m/s].
+    pub speed: Envelope,
+    /// Power of the laser at its largest in the cycle, fraction of full scale.
+    pub power: Envelope,
+    /// Reference minus feedback per axis [rad at the motor].
+    pub following_error: [Envelope; MAX_AXES],
+    /// Measured current per axis [A].
+    pub current: [Envelope; MAX_AXES],
+    /// Commanded voltage per axis [V].
+    pub voltage: [Envelope; MAX_AXES],
+    /// Latency per hop, in the order of [`Hop::ALL`] [s]; empty in virtual time.
+    pub latency: [Envelope; Hop::ALL.len()],
+}
+
+impl Trace {
+    /// An empty trace; `timed` tells whether the samples' stamps are those of a real clock.
+    pub fn new(timed: bool) -> Self {
+        Self {
+            path: ToolPath::default(),
+            waiting: None,
+            timed,
+            marked: Outline::default(),
+            dark: Outline::default(),
+            deviation_lit: Envelope::default(),
+            deviation_dark: Envelope::default(),
+            speed: Envelope::default(),
+            power: Envelope::default(),
+            following_error: std::array::from_fn(|_| Envelope::default()),
+            current: std::array::from_fn(|_| Envelope::default()),
+            voltage: std::array::from_fn(|_| Envelope::default()),
+            latency: std::array::from_fn(|_| Envelope::default()),
+        }
+    }
+
+    /// Takes the next record.
+    pub fn push(&mut self, record: &CycleRecord) {
+        let CycleRecord { feedback, command } = record;
+        let answered = record.is_answered();
+        for axis in 0..MAX_AXES {
+            let pick = |values: &signals::AxisArray| values.get(axis).copied();
+            let curves = [
+                (&mut self.following_error, answered, &command.following_error),
+                (&mut self.current, true, &feedback.current),
+                (&mut self.voltage, answered, &command.voltage),
+            ];
+            for (envelopes, known, values) in curves {
+                if let Some(envelope) = envelopes.get_mut(axis) {
+                    envelope.push(pick(values).filter(|_| known));
+                }
+            }
+        }
+        if self.timed {
+            self.push_latency(record);
+        }
+        if let Some(interval) = self.path.push(Moment::of(record)) {
+            self.interval(&interval);
+        }
+    }
+
+    /// Ends the trace: the last cycle has no neighbour to wait for.
+    pub fn finish(&mut self) {
+        if let Some(interval) = self.path.finish() {
+            self.interval(&interval);
+        }
+        self.marked.end();
+        self.dark.end();
+    }
+
+    fn push_latency(&mut self, record: &CycleRecord) {
+        let mut values = [None; Hop::ALL.len()];
+        if let Some(answered) = self.waiting.replace(*record)
+            && answered.is_answered()
+        {
+            for (hop, latency) in latencies(&answered.feedback, &answered.command, &record.feedback)
+            {
+                if let Some(value) = values.get_mut(hop as usize) {
+                    *value = Some(latency.seconds());
+                }
+            }
+        }
+        for (envelope, value) in self.latency.iter_mut().zip(values) {
+            envelope.push(value);
+        }
+    }
+
+    fn interval(&mut self, interval: &Interval) {
+        let laser = &interval.end.laser;
+        let power = laser.edges().iter().map(|edge| (edge.gate, edge.power));
+        let brightest = std::iter::once((laser.gate, laser.power))
+            .chain(power)
+            .filter(|(gate, _)| *gate != 0)
+            .fold(0.0_f64, |brightest, (_, power)| brightest.max(power));
+        self.power.push(Some(brightest));
+        let known = interval.tool_known();
+        self.speed.push(known.then(|| interval.speed_at_start()));
+        let lit = interval.lit();
+        let deviation = interval.deviation(1.0).filter(|_| known).map(|distance| distance.norm());
+        let any = !lit.as_slice().is_empty();
+        self.deviation_lit.push(deviation.filter(|_| any));
+        self.deviation_dark.push(deviation.filter(|_| !any && interval.end.planned.is_some()));
+        if known {
+            self.draw(interval, &lit);
+        }
+    }
+
+    fn draw(&mut self, interval: &Interval, lit: &LitSpans) {
+        let mut done = 0.0;
+        for &(from, to) in lit.as_slice() {
+            if from > done {
+                self.marked.end();
+                draw_part(&mut self.dark, interval, done, from);
+            }
+            if from > 0.0 {
+                self.dark.end();
+            }
+            draw_part(&mut self.marked, interval, from, to);
+            done = to;
+        }
+        if done < 1.0 {
+            self.marked.end();
+            draw_part(&mut self.dark, interval, done, 1.0);
+        } else {
+            self.dark.end();
+        }
+    }
+}
+
+fn draw_part(outline: &mut Outline, interval: &Interval, from: f64, to: f64) {
+    for part in [from, 0.5 * (from + to), to] {
+        let tool = interval.tool(part);
+        let deviation = interval.deviation(part).unwrap_or_default();
+        outline.add(OutlinePoint { tool: [tool.x, tool.y], deviation: [deviation.x, deviation.y] });
+    }
 }

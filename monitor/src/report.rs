@@ -1,0 +1,38 @@
+//! The report of a run: one page that opens offline, and the picture of the path by itself.
+
+pub mod chart;
+pub mod page;
+pub mod path;
+
+use crate::latency::HopHistograms;
+use crate::summary::Summary;
+use crate::trace::Trace;
+use signals::artwork::Artwork;
+
+/// What a report is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct Report<'a> {
+    /// The figures; its machine's axes give the charts their names and number.
+    pub summary: &'a Summary,
+    /// What was to be marked.
+    pub artwork: &'a Artwork,
+    /// The curves and paths.
+    pub trace: &'a Trace,
+    /// Torque constant of each axis [N·m/A], in the order of the axes.
+    pub torque_constants: &'a [f64],
+    /// The latencies; empty in virtual time.
+    pub histograms: &'a HopHistograms,
+}
+
+/// A picture could not be drawn; the data it was given are at fault.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("cannot draw the picture \"{title}\": {reason}")]
+pub struct PictureError {
+    /// Which picture.
+    pub title: String,
+    /// What the drawing library says.
+    pub reason: String,
+}
+
+#[cfg(test)]
+mod tests;

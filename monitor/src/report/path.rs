@@ -1,0 +1,186 @@
+//! The picture of the path: what was to be marked, what was marked, and the way in the dark.
+
+use super::chart::{
+    CURVES, FINE, GRID, INK, WIDTH, centred, draw, frame, legend, legend_line, short, span,
+    text_style,
+};
+use super::{PictureError, Report};
+use crate::trace::outline::OutlinePoint;
+use plotters::prelude::*;
+
+/// Metres to millimetres, the unit of the picture.
+const MILLIMETRES: f64 = 1e3;
+
+/// The most points of the plan drawn; more are thinned evenly.
+const PLAN_POINTS: usize = 40_000;
+
+/// Share of the drawing's size that the largest magnified deviation takes.
+const MAGNIFIED: f64 = 0.03;
+
+impl Report<'_> {
+    /// Planned and truly marked path, equal scales, as an SVG that stands alone.
+    ///
+    /// # Errors
+    /// [`PictureError`] when the numbers cannot be drawn.
+    pub fn picture(&self) -> Result<String, PictureError> {
+        self.draw_path("path", None)
+    }
+
+    /// The same with the deviation from the plan magnified, and how many times.
+    ///
+    /// # Errors
+    /// [`PictureError`] when the numbers cannot be drawn.
+    pub fn magnified_picture(&self) -> Result<(String, f64), PictureError> {
+        let gain = self.gain();
+        Ok((self.draw_path("magnified deviation", Some(gain))?, gain))
+    }
+
+    /// A round number by which the largest deviation becomes visible.
+    fn gain(&self) -> f64 {
+        let largest = self.trace.deviation_lit.range().map_or(0.0, |(_, high)| high);
+        let ([low_x, high_x], [low_y, high_y]) = self.extent();
+        let size = (high_x - low_x).max(high_y - low_y);
+        let wanted = MAGNIFIED * size / largest.max(1e-9);
+        let mut gain = 1.0;
+        for step in [2.0, 2.5, 2.0].into_iter().cycle().take(15) {
+            if gain * step > wanted {
+                break;
+            }
+            gain *= step;
+        }
+        gain
+    }
+
+    /// The rectangle around the plan and the marks [m].
+    fn extent(&self) -> ([f64; 2], [f64; 2]) {
+        let plan = || self.artwork.strokes.iter().flat_map(|stroke| &stroke.points);
+        let marks = || self.trace.marked.paths().iter().flatten();
+        let along = |axis: usize| {
+            let planned = plan().filter_map(move |point| point.get(axis).copied());
+            let marked = marks().filter_map(move |point| point.tool.get(axis).copied());
+            let (low, high) = span(planned.chain(marked)).unwrap_or((0.0, 0.01));
+            [low, high.max(low + 1e-3)]
+        };
+        (along(0), along(1))
+    }
+
+    fn draw_path(&self, title: &str, gain: Option<f64>) -> Result<String, PictureError> {
+        let (x, y) = self.extent();
+        let size = (x[1] - x[0]).max(y[1] - y[0]);
+        let air = 0.08 * size;
+        let (x, y) = ([x[0] - air, x[1] + air], [y[0] - air, y[1] + air]);
+        // Equal scales: the frame's margins are 8 + 64 + 20 across, 8 + 44 + 8 up.
+        let (inner_width, margin_up) = (f64::from(WIDTH - 92), 60.0);
+        let scale = inner_width / (x[1] - x[0]);
+        let inner = (scale * (y[1] - y[0])).clamp(120.0, 720.0);
+        let (x, y) = widened(x, y, inner_width / inner);
+        let height = (inner + margin_up).round() as u32;
+        let plan = self.plan();
+        draw(title, height, |area| {
+            let mut chart = frame(area).build_cartesian_2d(
+                x[0] * MILLIMETRES..x[1] * MILLIMETRES,
+                y[0] * MILLIMETRES..y[1] * MILLIMETRES,
+            )?;
+            chart
+                .configure_mesh()
+                .x_desc("x [mm]")
+                .y_desc("y [mm]")
+                .x_labels(11)
+                .y_labels(((inner / 60.0) as usize).max(3))
+                .x_label_formatter(&|value| short(value))
+                .y_label_formatter(&|value| short(value))
+                .label_style(text_style())
+                .axis_desc_style(text_style())
+                .axis_style(INK.stroke_width(FINE))
+                .bold_line_style(GRID.stroke_width(FINE))
+                .light_line_style(TRANSPARENT)
+                .draw()?;
+            if gain.is_none() {
+                let dark = self.trace.dark.paths().iter().map(|path| millimetres(path, 0.0));
+                let style = CURVES[7].mix(0.7).stroke_width(FINE);
+                curves(&mut chart, "in the dark", style, dark)?;
+            }
+            let style =
+                CURVES[1].mix(0.9).stroke_width(if gain.is_some() { FINE } else { 3 * FINE });
+            curves(&mut chart, "planned", style, plan.into_iter())?;
+            let marked = self
+                .trace
+                .marked
+                .paths()
+                .iter()
+                .map(|path| millimetres(path, gain.map_or(0.0, |gain| gain - 1.0)));
+            let name =
+                gain.map_or("marked".to_owned(), |gain| format!("marked, deviation × {gain}"));
+            curves(&mut chart, &name, CURVES[0].stroke_width(FINE + 1), marked)?;
+            if self.trace.marked.paths().is_empty() {
+                let middle = ((WIDTH * FINE / 2) as i32, (height * FINE / 2) as i32);
+                area.draw(&Text::new("nothing was marked", middle, centred()))?;
+            }
+            legend(&mut chart)
+        })
+    }
+
+    /// The strokes of the plan [mm], thinned evenly where they have too many points.
+    fn plan(&self) -> Vec<Vec<(f64, f64)>> {
+        let count: usize = self.artwork.strokes.iter().map(|stroke| stroke.points.len()).sum();
+        let every = count.div_ceil(PLAN_POINTS).max(1);
+        let thinned = |points: &[[f64; 3]]| {
+            let last = points.len().saturating_sub(1);
+            (points.iter().enumerate())
+                .filter(|(index, _)| index % every == 0 || *index == last)
+                .map(|(_, [x, y, _])| (x * MILLIMETRES, y * MILLIMETRES))
+                .collect()
+        };
+        self.artwork.strokes.iter().map(|stroke| thinned(&stroke.points)).collect()
+    }
+}
+
+/// Draws several lines as one entry of the legend; a line of one point becomes a dot.
+fn curves<'b>(
+    chart: &mut ChartContext<
+        'b,
+        SVGBackend<'b>,
+        Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
+    >,
+    name: &str,
+    style: ShapeStyle,
+    lines: impl Iterator<Item = Vec<(f64, f64)>>,
+) -> Result<(), super::chart::Failure<'b>> {
+    let mut first = true;
+    for line in lines.filter(|line| !line.is_empty()) {
+        let still = line.iter().all(|point| Some(point) == line.first());
+        if let (true, Some(&dot)) = (still, line.first()) {
+            let size = style.stroke_width.max(2 * FINE);
+            chart.draw_series([Circle::new(dot, size, style.filled())])?;
+        }
+        let series = chart.draw_series(LineSeries::new(line, style))?;
+        if first {
+            series.label(name).legend(move |(x, y)| legend_line(x, y, style));
+            first = false;
+        }
+    }
+    Ok(())
+}
+
+/// A path [mm], moved by its deviation times `extra`.
+fn millimetres(path: &[OutlinePoint], extra: f64) -> Vec<(f64, f64)> {
+    path.iter()
+        .map(|OutlinePoint { tool, deviation }| {
+            (
+                (tool[0] + extra * deviation[0]) * MILLIMETRES,
+                (tool[1] + extra * deviation[1]) * MILLIMETRES,
+            )
+        })
+        .collect()
+}
+
+/// The ranges grown about their middles to the ratio of width to height.
+fn widened(x: [f64; 2], y: [f64; 2], ratio: f64) -> ([f64; 2], [f64; 2]) {
+    let (width, height) = (x[1] - x[0], y[1] - y[0]);
+    let grown = |range: [f64; 2], by: f64| [range[0] - 0.5 * by, range[1] + 0.5 * by];
+    if width < height * ratio {
+        (grown(x, height * ratio - width), y)
+    } else {
+        (x, grown(y, width / ratio - height))
+    }
+}
