@@ -4,6 +4,9 @@
 //! parsed raw, with unknown keys refused, and then validated into the types here; whoever holds a
 //! [`Machine`] need not check it again.
 
+// Units stand in brackets throughout, `[m]`, which rustdoc takes for links.
+#![allow(rustdoc::broken_intra_doc_links)]
+
 pub mod actuator;
 pub mod document;
 pub mod file;

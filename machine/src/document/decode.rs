@@ -22,6 +22,11 @@ pub trait Decode: Sized + JsonSchema {
         true
     }
 
+    /// A value as a person would write it; `None` for a table.
+    fn example() -> Option<String> {
+        None
+    }
+
     /// What an editor needs to know.
     fn field_schema(generator: &mut SchemaGenerator) -> Schema {
         generator.subschema_for::<Self>()
@@ -68,6 +73,10 @@ impl<T: JsonSchema> JsonSchema for Located<T> {
 }
 
 impl Decode for Located<String> {
+    fn example() -> Option<String> {
+        Some("\"…\"".to_owned())
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         match &node.value {
             Value::Text(text) => Some(Self::new(text.clone(), node.place)),
@@ -80,6 +89,10 @@ impl Decode for Located<String> {
 }
 
 impl Decode for Located<bool> {
+    fn example() -> Option<String> {
+        Some("true".to_owned())
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         match node.value {
             Value::Flag(flag) => Some(Self::new(flag, node.place)),
@@ -92,6 +105,10 @@ impl Decode for Located<bool> {
 }
 
 impl<T: Decode> Decode for Option<T> {
+    fn example() -> Option<String> {
+        T::example()
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         T::decode(node, findings).map(Some)
     }
@@ -110,6 +127,10 @@ impl<T: Decode> Decode for Option<T> {
 }
 
 impl<T: Decode> Decode for Vec<T> {
+    fn example() -> Option<String> {
+        Some(format!("[{}]", T::example()?))
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         let Value::List(nodes) = &node.value else {
             wrong_type(node, "a list", findings);
@@ -125,6 +146,10 @@ impl<T: Decode, const N: usize> Decode for [T; N]
 where
     [T; N]: JsonSchema,
 {
+    fn example() -> Option<String> {
+        Some(format!("[{}]", vec![T::example()?; N].join(", ")))
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         let Value::List(nodes) = &node.value else {
             wrong_type(node, &format!("a list of {N}"), findings);

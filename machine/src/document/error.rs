@@ -83,9 +83,12 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// What is wrong, without the place.
-    pub fn message(&self) -> &str {
-        &self.message
+    /// What is wrong and what would be right, without the place.
+    pub fn message(&self) -> String {
+        match &self.help {
+            Some(help) => format!("{}; {help}", self.message),
+            None => self.message.clone(),
+        }
     }
 
     /// Line from 1; `None` for an override or an unreadable file.
@@ -115,11 +118,7 @@ impl fmt::Display for Problem {
             }
             None => write!(formatter, "--set {}: ", self.source.text)?,
         }
-        write!(formatter, "{}", self.message)?;
-        match &self.help {
-            Some(help) => write!(formatter, "; {help}"),
-            None => Ok(()),
-        }
+        write!(formatter, "{}", self.message)
     }
 }
 
@@ -147,7 +146,8 @@ impl Diagnostic for Problem {
     }
 }
 
-/// A document that is not sound: at least one [`Problem`], in the order of the file.
+/// A document that is not sound: at least one [`Problem`], what is there before what is missing,
+/// else in the order of the file, overrides last.
 #[derive(Debug, Clone)]
 pub struct DocumentError {
     file: String,
@@ -192,8 +192,8 @@ impl DocumentError {
         self.first.column()
     }
 
-    /// What is wrong first, without its place.
-    pub fn message(&self) -> &str {
+    /// What is wrong first and what would be right, without its place.
+    pub fn message(&self) -> String {
         self.first.message()
     }
 }

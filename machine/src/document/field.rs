@@ -102,6 +102,10 @@ pub struct Quantity<K, R = Any> {
 }
 
 impl<K: Kind, R: Range> Decode for Quantity<K, R> {
+    fn example() -> Option<String> {
+        Some(format!("\"{}\"", K::EXAMPLE))
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         let place = node.place;
         let due = || format!("write {} such as \"{}\"", K::NAME, K::EXAMPLE);
@@ -180,6 +184,10 @@ pub struct Number<R = Any> {
 }
 
 impl<R: Range> Decode for Number<R> {
+    fn example() -> Option<String> {
+        Some("1".to_owned())
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         let Value::Number(number) = node.value else {
             wrong_type(node, "a number without unit", findings);
@@ -222,6 +230,10 @@ pub struct Fraction<R = NonNegative> {
 }
 
 impl<R: Range> Decode for Fraction<R> {
+    fn example() -> Option<String> {
+        Some("\"80 %\"".to_owned())
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         let place = node.place;
         let (number, written) = match &node.value {
@@ -294,6 +306,10 @@ impl<K: Keyword> Decode for Located<K>
 where
     Located<K>: JsonSchema,
 {
+    fn example() -> Option<String> {
+        Some(format!("\"{}\"", K::WORDS.first()?.0))
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         let words = || K::WORDS.iter().map(|(word, _)| *word);
         let list = || words().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
@@ -331,6 +347,10 @@ impl<K: Keyword, T: Decode> Decode for Either<K, T>
 where
     Located<K>: JsonSchema,
 {
+    fn example() -> Option<String> {
+        Some(format!("\"{}\"", K::WORDS.first()?.0))
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         if let Value::Text(text) = &node.value {
             let words = || K::WORDS.iter().map(|(word, _)| *word);
@@ -371,6 +391,10 @@ pub struct Point {
 }
 
 impl Decode for Point {
+    fn example() -> Option<String> {
+        Some("[\"10 mm\", \"5 mm\"]".to_owned())
+    }
+
     fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
         let Value::List(nodes) = &node.value else {
             wrong_type(node, "a point such as [\"10 mm\", \"5 mm\"]", findings);

@@ -37,6 +37,12 @@ impl Findings {
         self.sources.get(place.source)?.position(place.start)
     }
 
+    /// What stands at `place`.
+    pub(super) fn text(&self, place: Place) -> &str {
+        let source = self.sources.get(place.source);
+        source.and_then(|source| source.text.get(place.start..place.end)).unwrap_or_default()
+    }
+
     /// The override that `place` is in, as on the command line; `None` for the file.
     pub fn override_text(&self, place: Place) -> Option<&str> {
         if place.source == 0 {
@@ -70,12 +76,14 @@ impl Findings {
         if self.problems.is_empty() { Ok(value) } else { Err(self.into_error()) }
     }
 
-    /// Everything that is wrong, ordered by place; overrides after the file.
+    /// Everything that is wrong. What is missing comes last: a wrong key is often its cause.
     ///
     /// Called only when something is.
     pub(super) fn into_error(mut self) -> DocumentError {
         let file = self.file().to_owned();
-        self.problems.sort_by_key(|problem| (problem.place.source, problem.place.start));
+        self.problems.sort_by_key(|problem| {
+            (problem.kind == ProblemKind::MissingKey, problem.place.source, problem.place.start)
+        });
         let mut problems = self.problems.into_iter();
         match problems.next() {
             Some(first) => DocumentError::new(file, first, problems.collect()),

@@ -20,7 +20,8 @@
 //! let document = Document::parse("job.toml", "hight = \"10 mm\"").unwrap();
 //! let error = document.decode::<Letters>().unwrap_err();
 //! assert_eq!(error.line(), Some(1));
-//! assert_eq!(error.to_string(), "job.toml:1:1: unknown key `hight`; did you mean `height`?");
+//! assert_eq!(error.to_string(), "job.toml:1:1: unknown key `hight`");
+//! assert_eq!(error.message(), "unknown key `hight`; did you mean `height`?");
 //! ```
 
 mod decode;

@@ -120,8 +120,12 @@ pub(super) fn parse(text: &str, source: usize, findings: &mut Findings) -> Optio
     }
     for error in errors {
         let span = error.span().unwrap_or(text.len()..text.len());
-        let place = Place { source, start: span.start.min(text.len()), end: span.end };
-        findings.refuse(ProblemKind::Syntax, place, error.message().to_owned(), None);
+        let place = Place { source, start: span.start, end: span.end };
+        let message = match text.get(span) {
+            Some(key) if error.message() == "duplicate key" => format!("duplicate key `{key}`"),
+            _ => error.message().to_owned(),
+        };
+        findings.refuse(ProblemKind::Syntax, place, message, None);
     }
     None
 }

@@ -41,16 +41,17 @@ impl<'a> TableReader<'a> {
             if fields.iter().any(|field| field.key == entry.key) {
                 continue;
             }
-            // Keys that are already there were hardly meant twice.
-            let free = fields.iter().map(|field| field.key).filter(|key| {
-                entries.iter().all(|entry| entry.key != *key) && !misspelt.contains(key)
-            });
-            let near = nearest(&entry.key, free.clone());
+            // Keys that are already there were hardly meant twice, except tables: a part of one
+            // may stand under its own header.
+            let keys = || fields.iter().map(|field| field.key);
+            let is_free = |key: &&str| entries.iter().all(|entry| entry.key != *key);
+            let near =
+                nearest(&entry.key, keys().filter(is_free)).or_else(|| nearest(&entry.key, keys()));
             let help = match near {
                 Some(near) => format!("did you mean `{near}`?"),
                 None if fields.is_empty() => "nothing can be set here".to_owned(),
                 None => {
-                    let keys: Vec<&str> = fields.iter().map(|field| field.key).collect();
+                    let keys: Vec<&str> = keys().collect();
                     format!("what can be set here is {}", keys.join(", "))
                 }
             };
@@ -83,11 +84,19 @@ impl<'a> TableReader<'a> {
         let absent = T::absent(self.place, findings);
         // A misspelt key was reported where it stands; that it is missing too would be noise.
         if absent.is_none() && !self.misspelt.contains(&key) {
+            let table = match findings.text(self.place) {
+                "" => "the file".to_owned(),
+                table => format!("the table `{table}`"),
+            };
+            let help = match T::example() {
+                Some(example) => format!("add `{key} = {example}` to {table}"),
+                None => format!("add the table `{key}` to {table}"),
+            };
             findings.refuse(
                 ProblemKind::MissingKey,
                 self.place,
-                format!("`{key}` is missing"),
-                Some(format!("add `{key}` to this table")),
+                format!("`{key}` is missing in {table}"),
+                Some(help),
             );
         }
         absent

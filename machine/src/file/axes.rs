@@ -25,6 +25,8 @@ pub(super) struct Joint {
     pub(super) range: [f64; 2],
     /// The joint at home [m].
     pub(super) home: f64,
+    /// Joint speed per tool speed in the tool's least favourable direction.
+    pub(super) worst_speed: f64,
 }
 
 /// The axis that `table` describes, driving `joint`.

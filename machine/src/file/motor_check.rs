@@ -1,13 +1,16 @@
 //! Motor data that contradict themselves: doubts for a person, not errors.
 //!
 //! Source 003's own table 3-3 promises a torque that its supply cannot drive, so the voltage limit
-//! line `k·i·R/k + k·ω ≤ V` is what counts, and nominal values are never used.
+//! line `R·i + k·ω ≤ V` is what counts, and nominal values are never used.
 
 use core::f64::consts::TAU;
 
+use super::axes::Joint;
 use super::tables::DcMotorTable;
-use crate::document::{Findings, Place};
+use crate::actuator::Axis;
+use crate::document::{Findings, Place, Positive, Quantity};
 use crate::machine::Warning;
+use crate::quantity::Speed;
 
 /// How far a data sheet's nominal point may lie beyond the limit line before it is doubted: the
 /// rounding of two-digit data.
@@ -30,8 +33,8 @@ pub(super) fn check(axis: &str, motor: &DcMotorTable, findings: &Findings) -> Ve
                 format!(
                     "axis `{axis}`: the nominal torque of {:.3} N·m at {:.0} rpm needs {current:.1} \
                      A and {needed:.1} V ({:.1} V even at standstill), the supply gives \
-                     {voltage:.0} V: there the motor gives {available:.3} N·m, and {stall:.3} N·m \
-                     when it stalls",
+                     {voltage:.0} V: at that speed it drives {available:.3} N·m, at standstill \
+                     {stall:.3} N·m",
                     torque.value,
                     speed.value * 60.0 / TAU,
                     resistance * current,
@@ -55,7 +58,35 @@ pub(super) fn check(axis: &str, motor: &DcMotorTable, findings: &Findings) -> Ve
     warnings
 }
 
+/// Doubts about path speeds that `axis` cannot follow in every direction.
+pub(super) fn check_speeds(
+    speeds: [&Quantity<Speed, Positive>; 2],
+    joint: &Joint,
+    axis: &Axis,
+    findings: &Findings,
+) -> Vec<Warning> {
+    let limit = axis.limits.velocity;
+    speeds
+        .into_iter()
+        .filter(|speed| speed.value * joint.worst_speed > limit)
+        .map(|speed| {
+            let text = format!(
+                "axis `{}` reaches {limit:.3} m/s, but a path at {} m/s may ask it for {:.3} m/s: \
+                 jobs that do will be refused",
+                axis.name,
+                speed.value,
+                speed.value * joint.worst_speed
+            );
+            warning(speed.place, text, findings)
+        })
+        .collect()
+}
+
 fn warning(place: Place, text: String, findings: &Findings) -> Warning {
     let (line, column) = findings.position(place).unwrap_or((0, 0));
+    let text = match findings.override_text(place) {
+        Some(setting) => format!("--set {setting}: {text}"),
+        None => text,
+    };
     Warning { text, line, column }
 }

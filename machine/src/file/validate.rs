@@ -27,9 +27,12 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     };
     let mut axes = Vec::with_capacity(joints.len());
     let mut warnings = Vec::new();
-    for (table, joint) in tables.into_iter().zip(&joints) {
-        axes.push(axis(table, joint, &mut findings));
-        warnings.extend(motor_check::check(joint.name, &table.motor.dc, &findings));
+    for (axis_table, joint) in tables.into_iter().zip(&joints) {
+        let axis = axis(axis_table, joint, &mut findings);
+        warnings.extend(motor_check::check(joint.name, &axis_table.motor.dc, &findings));
+        let speeds = [&table.path.speed, &table.path.rapid];
+        warnings.extend(motor_check::check_speeds(speeds, joint, &axis, &findings));
+        axes.push(axis);
     }
     if table.area.z.is_none() && mechanism.axes() == 3 {
         findings.contradict(
@@ -107,10 +110,13 @@ fn home(point: Option<Point>, area: &WorkArea, findings: &mut Findings) -> [f64;
     let Some(point) = point else {
         return core::array::from_fn(|index| (area.lower[index] + area.upper[index]) / 2.0);
     };
+    if !findings.is_empty() {
+        // An empty range was found: where home should be cannot be said.
+        return point.value;
+    }
     for (index, name) in ["x", "y", "z"].into_iter().enumerate() {
         let (lower, upper) = (area.lower[index], area.upper[index]);
-        // An empty range was reported as such.
-        if lower <= upper && !(lower..=upper).contains(&point.value[index]) {
+        if !(lower..=upper).contains(&point.value[index]) {
             findings.contradict(
                 point.place,
                 format!(
@@ -173,6 +179,7 @@ fn cartesian_kind(
             stiff_inertia: screw.inertia.value,
             range: [area.lower[index], area.upper[index]],
             home: home[index],
+            worst_speed: 1.0,
         })
         .collect();
     let springs: Vec<Elasticity> = screws
@@ -223,6 +230,8 @@ fn corexy_kind(
         stiff_inertia: 0.0,
         range,
         home,
+        // Along a diagonal one belt takes the whole motion.
+        worst_speed: core::f64::consts::SQRT_2,
     };
     let ([x0, y0, _], [x1, y1, _]) = (area.lower, area.upper);
     let joints = vec![

@@ -187,7 +187,7 @@ fn parse_unit(text: &str, offset: usize) -> Result<(f64, f64, Dimension), Quanti
     let mut below = 1.0;
     let mut dimension = Dimension::NONE;
     let mut divide = false;
-    let mut pending: Option<usize> = None;
+    let mut pending: Option<Range<usize>> = None;
     let mut rest = text;
     loop {
         let trimmed = rest.trim_start();
@@ -198,7 +198,7 @@ fn parse_unit(text: &str, offset: usize) -> Result<(f64, f64, Dimension), Quanti
                 return Err(malformed(first, at));
             }
             divide = first == '/';
-            pending = Some(at);
+            pending = Some(at..at + first.len_utf8());
             rest = trimmed.get(first.len_utf8()..).unwrap_or_default();
             continue;
         }
@@ -222,9 +222,9 @@ fn parse_unit(text: &str, offset: usize) -> Result<(f64, f64, Dimension), Quanti
         rest = after.get(length..).unwrap_or_default();
     }
     match pending {
-        Some(at) => Err(QuantityError::new(
+        Some(span) => Err(QuantityError::new(
             QuantityErrorKind::Malformed,
-            at..at + 1,
+            span,
             "the unit ends with an operator".to_owned(),
         )),
         None => Ok((above, below, dimension)),

@@ -1,0 +1,266 @@
+//! What a person reads: places, suggestions, overrides, warnings.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use machine::document::{Document, Override};
+use machine::{Machine, MechanismKind};
+
+const COREXY: &str = include_str!("../../machines/corexy.toml");
+
+fn set(settings: &[&str]) -> Vec<Override> {
+    settings.iter().map(|setting| setting.parse().unwrap()).collect()
+}
+
+#[track_caller]
+fn refused(from: &str, to: &str, expected: &[&str]) {
+    let text = COREXY.replacen(from, to, 1);
+    assert_ne!(text, COREXY, "`{from}` is not in the file");
+    let error = Machine::parse("corexy.toml", &text, &[]).unwrap_err();
+    let messages: Vec<String> = error
+        .problems()
+        .map(|problem| {
+            let place = format!("{}:{}", problem.line().unwrap(), problem.column().unwrap());
+            format!("{place}: {}", problem.message())
+        })
+        .collect();
+    assert_eq!(messages, expected);
+}
+
+#[test]
+fn errors_say_what_is_wrong_and_what_would_be_right() {
+    refused(
+        "pulley_radius =",
+        "puley_radius =",
+        &["29:1: unknown key `puley_radius`; did you mean `pulley_radius`?"],
+    );
+    refused(
+        "\"10 m/s^2\"",
+        "10",
+        &["21:16: `10` has no unit, an acceleration is due; write it with its unit, such as \
+           \"10 m/s^2\""],
+    );
+    refused(
+        "\"10 m/s^2\"",
+        "\"10 m/s\"",
+        &["21:16: `10 m/s` is a speed, an acceleration is due; write an acceleration such as \
+           \"10 m/s^2\""],
+    );
+    refused("\"2.3 ohm\"", "\"2.3 Ohm\"", &["47:14: `Ohm` is not a unit; did you mean `ohm`?"]);
+    refused(
+        "mass_x = \"0.33 kg\"",
+        "",
+        &["26:12: `mass_x` is missing in the table `corexy`; add `mass_x = \"0.33 kg\"` to the \
+           table `corexy`"],
+    );
+    refused(
+        "z = \"ignored\"",
+        "z = \"focused\"",
+        &["106:5: `focused` is not a meaning of Z; did you mean \"focus\"?"],
+    );
+    refused(
+        "z = \"ignored\"",
+        "z = \"focus\"",
+        &[
+            "106:5: Z cannot move the focus: the mechanism has no z axis; write \"ignored\", or add \
+           the z axis",
+        ],
+    );
+    refused(
+        "following_error = \"1 mm\"",
+        "velocity = \"0.8 m/s\"",
+        &["62:12: the motor reaches 0.7143 m/s without load, not 0.8 m/s; lower the limit, or \
+           leave it out to use 90 % of what the motor can do"],
+    );
+    refused(
+        "velocity = \"160 rad/s\"",
+        "velocity = \"400 rad/s\"",
+        &["67:12: the current loop (349 rad/s) must be faster than the velocity loop around it \
+           (400 rad/s); raise the one or lower the other"],
+    );
+}
+
+#[test]
+fn independent_errors_are_reported_together() {
+    let text = COREXY.replacen("0.33 kg", "0.33 lb", 1).replacen("jerk =", "jerky =", 1).replacen(
+        "gear = 8",
+        "gear = -8",
+        1,
+    );
+    let error = Machine::parse("corexy.toml", &text, &[]).unwrap_err();
+    let lines: Vec<_> = error.problems().map(|problem| problem.line().unwrap()).collect();
+    assert_eq!(lines, [22, 27, 39]);
+}
+
+#[test]
+fn the_report_shows_the_line_with_its_label() {
+    let text = COREXY.replacen("10 m/s^2", "10 mps", 1);
+    let error = Machine::parse("machines/corexy.toml", &text, &[]).unwrap_err();
+    let mut report = String::new();
+    miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::unicode_nocolor())
+        .render_report(&mut report, &error)
+        .unwrap();
+    for part in [
+        "machines/corexy.toml:21:16",
+        "21 │ acceleration = \"10 mps\"",
+        "`mps` is not a unit",
+        "help: did you mean",
+    ] {
+        assert!(report.contains(part), "`{part}` is not in\n{report}");
+    }
+}
+
+#[test]
+fn overrides_change_values_and_the_last_one_counts() {
+    let settings = set(&[
+        "path.jerk=5000 m/s^3",
+        "path.acceleration=\"20 m/s^2\"",
+        "path.acceleration=12 m/s^2",
+        "axis.a.gear=10",
+        "gcode.origins.g59_3=[\"1 mm\", \"2 mm\"]",
+        "name=Other",
+    ]);
+    let machine = Machine::parse("corexy.toml", COREXY, &settings).unwrap();
+    assert_eq!(machine.path.jerk, 5000.0);
+    assert_eq!(machine.path.acceleration, 12.0);
+    assert_eq!(machine.axes[0].ratio, 0.001);
+    assert_eq!(machine.axes[1].ratio, 0.00125);
+    assert_eq!(machine.gcode.origins[8], [0.001, 0.002, 0.0]);
+    assert_eq!(machine.name, "Other");
+}
+
+#[track_caller]
+fn override_refused(setting: &str, expected: &str) {
+    let error = Machine::parse("corexy.toml", COREXY, &set(&[setting])).unwrap_err();
+    assert_eq!((error.line(), error.column()), (None, None));
+    assert_eq!(error.to_string(), expected);
+}
+
+#[test]
+fn an_error_in_an_override_names_the_override() {
+    override_refused(
+        "path.jerk=500 m/s^2",
+        "--set machine.path.jerk=500 m/s^2: `500 m/s^2` is an acceleration, a jerk is due",
+    );
+    override_refused("path.jrk=3", "--set machine.path.jrk=3: unknown key `jrk`");
+    override_refused(
+        "name.first=x",
+        "--set machine.name.first=x: `first` is looked for in a text, not in a table",
+    );
+    override_refused("path..jerk=1", "--set machine.path..jerk=1: `path..jerk` has an empty part");
+    override_refused("path.jerk=", "--set machine.path.jerk=: `` does not start with a number");
+    override_refused("path=3", "--set machine.path=3: this is a number, a table is due");
+    assert_eq!(
+        "path.jerk".parse::<Override>().unwrap_err().to_string(),
+        "`path.jerk` is not KEY=VALUE, such as path.jerk=\"500 m/s^3\"",
+    );
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_named() {
+    let error = Machine::load(Path::new("/nowhere/machine.toml"), &[]).unwrap_err();
+    assert!(error.to_string().starts_with("/nowhere/machine.toml cannot be read: "), "{error}");
+    assert_eq!(error.line(), None);
+}
+
+#[test]
+fn text_that_is_not_utf8_is_refused_at_its_place() {
+    let folder = std::env::temp_dir().join(format!("graver-machine-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("latin1.toml");
+    std::fs::write(&path, b"name = \"x\"\n# caf\xe9\n").unwrap();
+    let error = Document::read(&path).unwrap_err();
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert_eq!((error.line(), error.column()), (Some(2), Some(6)));
+}
+
+/// Source 003 table 3-3: 0.2 N·m need 9.5 A, 22 V; at 12 V there are 0.049 N·m at 3000 rpm.
+#[test]
+fn the_contradiction_in_the_printed_motor_table_is_a_warning() {
+    let machine = Machine::parse("corexy.toml", COREXY, &[]).unwrap();
+    let [a, b] = machine.warnings.as_slice() else { panic!("{:?}", machine.warnings) };
+    assert_eq!(
+        a.text,
+        "axis `a`: the nominal torque of 0.200 N·m at 3000 rpm needs 9.5 A and 28.5 V (21.9 V \
+         even at standstill), the supply gives 12 V: at that speed it drives 0.049 N·m, at \
+         standstill 0.110 N·m"
+    );
+    assert_eq!((a.line, a.column), (51, 18));
+    assert!(b.text.starts_with("axis `b`") && b.line == 81, "{b:?}");
+
+    // Table 3-4 of the EC020 is right to its rounding: 12.08 V for 12 V.
+    let cartesian = include_str!("../../machines/cartesian.toml");
+    let machine = Machine::parse("cartesian.toml", cartesian, &[]).unwrap();
+    let texts: Vec<&str> = machine.warnings.iter().map(|w| w.text.as_str()).collect();
+    assert!(matches!(texts[..], [x] if x.starts_with("axis `x`")), "{texts:?}");
+
+    let settings = set(&["axis.a.motor.dc.current=6 A", "axis.a.motor.dc.nominal_torque=40 mN m"]);
+    let machine = Machine::parse("corexy.toml", COREXY, &settings).unwrap();
+    assert_eq!(
+        machine.warnings[0].text,
+        "--set machine.axis.a.motor.dc.current=6 A: axis `a`: 12.0 V across 2.300 Ω drive at most \
+         5.22 A, so the current limit of 6.00 A is never reached"
+    );
+    assert_eq!((machine.warnings[0].line, machine.warnings[0].column), (0, 0));
+}
+
+#[test]
+fn a_path_speed_beyond_the_motors_is_a_warning() {
+    let machine = Machine::parse("corexy.toml", COREXY, &set(&["path.rapid=0.5 m/s"])).unwrap();
+    let texts: Vec<&str> = machine.warnings.iter().map(|w| w.text.as_str()).collect();
+    assert_eq!(texts.len(), 4);
+    assert_eq!(
+        texts[1],
+        "--set machine.path.rapid=0.5 m/s: axis `a` reaches 0.643 m/s, but a path at 0.5 m/s may \
+         ask it for 0.707 m/s: jobs that do will be refused"
+    );
+}
+
+#[test]
+fn the_built_in_machine_is_the_shipped_corexy() {
+    let machine = Machine::builtin();
+    let parsed = Machine::parse("corexy.toml", COREXY, &[]).unwrap();
+    assert_eq!(machine, parsed);
+    assert_eq!(machine.mechanism.name(), "corexy");
+    assert_eq!(machine.mechanism.axes(), machine.axes.len());
+    assert_eq!(machine.home, [0.1, 0.1, 0.0]);
+    assert_eq!(machine.area.upper, [0.2, 0.2, 0.0]);
+    let path = &machine.path;
+    let limits = [path.speed, path.rapid, path.acceleration, path.jerk, path.tolerance];
+    assert_eq!(limits, [0.25, 0.25, 10.0, 500.0, 5e-6]);
+    assert_eq!(machine.gcode.origins, [[0.1, 0.1, 0.0]; 9]);
+    // 0.9 of 12 V over 0.021 V·s/rad through the belt's ratio.
+    let speed = 0.9 * 12.0 / 0.021 * 0.00125;
+    assert!((machine.axes[0].limits.velocity - speed).abs() < 1e-15);
+    assert_eq!(machine.axes[0].limits.position, [-0.001, 0.401]);
+    assert_eq!(machine.axes[1].limits.position, [-0.201, 0.201]);
+}
+
+#[test]
+fn a_cartesian_with_a_z_axis_focuses() {
+    let axis_y: String = include_str!("../../machines/cartesian.toml").to_owned();
+    let z_axis = axis_y
+        .split_once("[axis.y]")
+        .unwrap()
+        .1
+        .split_once("# From the gate")
+        .unwrap()
+        .0
+        .replace("axis.y", "axis.z");
+    let text = format!(
+        "{}\n[axis.z]{z_axis}\n[mechanism.cartesian.z]\nmass = \"0.2 kg\"\nlead = \"5 mm/rev\"\n\
+         stiffness = \"600 N m/rad\"\n",
+        axis_y
+            .replace(
+                "y = [\"0 mm\", \"200 mm\"]",
+                "y = [\"0 mm\", \"200 mm\"]\nz = [\"-10 mm\", \"10 mm\"]"
+            )
+            .replace("z = \"ignored\"", "z = \"focus\"")
+    );
+    let machine = Machine::parse("lift.toml", &text, &[]).unwrap();
+    assert!(matches!(machine.mechanism, MechanismKind::CartesianLift(_)));
+    let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+    assert_eq!(names, ["x", "y", "z"]);
+    assert_eq!(machine.axes[2].limits.position, [-0.011, 0.011]);
+}
