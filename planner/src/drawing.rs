@@ -61,7 +61,7 @@ pub enum Action {
         /// Largest speed [m/s].
         speed: f64,
     },
-    /// Stand still.
+    /// Stand still; with no time, only come to rest, so that marks before and after are apart.
     Dwell {
         /// How long [s].
         time: f64,

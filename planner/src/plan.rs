@@ -1,11 +1,21 @@
 //! From a job to a checked stream of setpoints.
 
-use machine::Machine;
-use signals::Setpoint;
-use signals::artwork::Artwork;
+use std::sync::Arc;
 
+use machine::kinematics::KinematicsError;
+use machine::{Axis, Machine, Mechanism, MechanismKind, MechanismVisitor, PathLimits};
+use signals::artwork::Artwork;
+use signals::time::CYCLE_PERIOD;
+use signals::{MAX_EDGES, Setpoint};
+
+use crate::artwork::artwork;
+use crate::check::{Breach, Checker};
 use crate::drawing::Note;
+use crate::itinerary::itinerary;
 use crate::job::Job;
+use crate::sampler::{Sampler, Unreachable};
+use crate::speed;
+use crate::trajectory::Trajectory;
 
 /// A job, planned and checked for one machine.
 #[derive(Debug, Clone)]
@@ -14,6 +24,10 @@ pub struct Plan {
     pub artwork: Artwork,
     /// What the plan comes to.
     pub facts: PlanFacts,
+    /// The motion and the laser as functions of stream time.
+    pub trajectory: Arc<Trajectory>,
+    mechanism: MechanismKind,
+    axes: Vec<Axis>,
 }
 
 /// What a plan comes to.
@@ -64,6 +78,95 @@ pub enum PlanError {
     /// The job is a comparison on paper.
     #[error("this job can be planned, not run: {0}")]
     IdealOnly(&'static str),
+    /// A stroke bends so sharply that no speed is low enough.
+    #[error(
+        "this line turns too sharply to be marked without a stop: its curvature allows {speed:e} m/s"
+    )]
+    TooSharp {
+        /// Line of the job file, 0 for none.
+        line: u64,
+        /// The speed that its curvature allows [m/s].
+        speed: f64,
+    },
+    /// The laser source cannot switch on and off in the time of a stroke.
+    #[error(
+        "this stroke lasts {:.3} ms, too short for the laser's switching delays or too close to \
+         the stroke before",
+        duration * 1e3
+    )]
+    TooShort {
+        /// Line of the job file, 0 for none.
+        line: u64,
+        /// How long it lasts [s].
+        duration: f64,
+    },
+    /// The laser changes more often in one cycle than a setpoint can say.
+    #[error("the laser would change more than {MAX_EDGES} times in the millisecond at {time:.3} s")]
+    TooManyEdges {
+        /// Line of the job file, 0 for none.
+        line: u64,
+        /// Stream time [s].
+        time: f64,
+    },
+    /// The tool cannot get there.
+    #[error("{place}: the tool cannot be there: {cause}")]
+    Unreachable {
+        /// Line of the job file, 0 for none.
+        line: u64,
+        /// Where in the job.
+        place: Place,
+        /// Why.
+        cause: KinematicsError,
+    },
+    /// A limit of path, area, axis or motor.
+    #[error(
+        "{place}{}: {} of {:.6} {unit} is beyond the limit of {:.6} {unit}",
+        breach.axis.as_ref().map(|axis| format!(", axis {axis}")).unwrap_or_default(),
+        breach.quantity,
+        breach.value,
+        breach.limit,
+        unit = breach.unit
+    )]
+    Limit {
+        /// Line of the job file, 0 for none.
+        line: u64,
+        /// Where in the job.
+        place: Place,
+        /// Which limit, and by how much.
+        breach: Breach,
+    },
+}
+
+/// Where in a job something is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// The stroke that is marked, approached or left, from 1; 0 for none.
+    pub stroke: u64,
+    /// Stream time [s].
+    pub time: f64,
+}
+
+impl core::fmt::Display for Place {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self.stroke {
+            0 => write!(formatter, "at {:.3} s", self.time),
+            stroke => write!(formatter, "stroke {stroke}, at {:.3} s", self.time),
+        }
+    }
+}
+
+impl PlanError {
+    /// Line of the job file that it concerns, from 1; 0 for none.
+    pub fn line(&self) -> u64 {
+        match self {
+            Self::IdealOnly(_) => 0,
+            Self::TooSharp { line, .. }
+            | Self::TooShort { line, .. }
+            | Self::TooManyEdges { line, .. }
+            | Self::Unreachable { line, .. }
+            | Self::Limit { line, .. } => *line,
+        }
+    }
 }
 
 /// Plans `job` for `machine` and checks every sample against the limits of path and axes.
@@ -71,10 +174,10 @@ pub enum PlanError {
 /// # Errors
 /// The first limit that it breaks, with line, stroke, time, axis, value and limit.
 pub fn plan(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
-    if let Some(reason) = job.ideal_only {
-        return Err(PlanError::IdealOnly(reason));
+    match job.ideal_only {
+        Some(reason) => Err(PlanError::IdealOnly(reason)),
+        None => plan_within(machine, job, false),
     }
-    plan_ideal(machine, job)
 }
 
 /// Plans `job` and checks it against the limits of the path only: what the tool's motion would be
@@ -82,25 +185,128 @@ pub fn plan(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
 ///
 /// # Errors
 /// As [`plan`], without axes and area.
-pub fn plan_ideal(_machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
-    Ok(Plan {
-        artwork: Artwork::default(),
-        facts: PlanFacts {
-            name: job.drawing.name.clone(),
-            strokes: 0,
-            length: 0.0,
-            duration: 0.0,
-            samples: 0,
-            speed: 0.0,
-            notes: job.drawing.notes.clone(),
-            uses: Uses::default(),
-        },
-    })
+pub fn plan_ideal(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
+    plan_within(machine, job, true)
+}
+
+fn plan_within(machine: &Machine, job: &Job, ideal: bool) -> Result<Plan, PlanError> {
+    let drawing = &job.drawing;
+    let limits = PathLimits {
+        rapid: job.rapid.unwrap_or(machine.path.rapid),
+        tolerance: job.marking.tolerance.unwrap_or(machine.path.tolerance),
+        ..machine.path
+    };
+    let stops = itinerary(drawing, &limits);
+    let chosen = speed::choose(drawing.start, &stops, &limits, &job.marking)
+        .map_err(|sharp| PlanError::TooSharp { line: sharp.line, speed: sharp.speed })?;
+    let trajectory =
+        Trajectory::new(drawing.start, &stops, &limits, &machine.laser, &chosen.speeds)
+            .map_err(|short| PlanError::TooShort { line: short.line, duration: short.duration })?;
+    check_edges(&trajectory)?;
+    let artwork = artwork(&stops);
+    let facts = PlanFacts {
+        name: drawing.name.clone(),
+        strokes: artwork.strokes.len(),
+        length: speed::outlines(&stops).map(crate::outline::Outline::length).sum(),
+        duration: trajectory.duration(),
+        samples: 0,
+        speed: chosen.speeds.iter().copied().fold(0.0, f64::max),
+        notes: drawing.notes.iter().cloned().chain(chosen.notes).collect(),
+        uses: Uses::default(),
+    };
+    let mut plan = Plan {
+        artwork,
+        facts,
+        trajectory: Arc::new(trajectory),
+        mechanism: machine.mechanism.clone(),
+        axes: machine.axes.clone(),
+    };
+    let checker = Checker::new(machine, limits, ideal);
+    let (samples, uses) = plan.visit(CheckAll { plan: &plan, checker })?;
+    plan.facts.samples = samples;
+    plan.facts.uses = uses;
+    Ok(plan)
+}
+
+/// That no cycle needs more changes of the laser than a sample can hold.
+fn check_edges(trajectory: &Trajectory) -> Result<(), PlanError> {
+    let cycle = |index: usize| trajectory.laser[index].time.0.div_euclid(CYCLE_PERIOD.0);
+    for last in MAX_EDGES..trajectory.laser.len() {
+        if cycle(last) == cycle(last - MAX_EDGES) {
+            let time = trajectory.laser[last].time.seconds();
+            let line = trajectory.piece_at(time).map_or(0, |piece| piece.line);
+            return Err(PlanError::TooManyEdges { line, time });
+        }
+    }
+    Ok(())
+}
+
+/// Samples the whole plan and checks every sample.
+struct CheckAll<'a> {
+    plan: &'a Plan,
+    checker: Checker<'a>,
+}
+
+impl MechanismVisitor for CheckAll<'_> {
+    type Output = Result<(u64, Uses), PlanError>;
+
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
+        let Self { plan, mut checker } = self;
+        let unreachable = |found: Unreachable| {
+            let (line, place) = plan.place(found.time);
+            PlanError::Unreachable { line, place, cause: found.cause }
+        };
+        let trajectory = Arc::clone(&plan.trajectory);
+        let mut sampler =
+            Sampler::new(mechanism, &plan.axes, trajectory, 1).map_err(unreachable)?;
+        let mut samples = 0;
+        for setpoint in sampler.by_ref() {
+            samples += 1;
+            checker.look(&setpoint).map_err(|breach| {
+                let (line, place) = plan.place(breach.time);
+                PlanError::Limit { line, place, breach }
+            })?;
+        }
+        match sampler.broken() {
+            Some(found) => Err(unreachable(found)),
+            None => Ok((samples, checker.uses())),
+        }
+    }
+}
+
+/// Makes the stream of a plan that was checked.
+struct Stream<'a> {
+    plan: &'a Plan,
+    stream: u64,
+}
+
+impl MechanismVisitor for Stream<'_> {
+    type Output = Box<dyn Iterator<Item = Setpoint> + Send>;
+
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
+        let trajectory = Arc::clone(&self.plan.trajectory);
+        match Sampler::new(mechanism, &self.plan.axes, trajectory, self.stream) {
+            Ok(sampler) => Box::new(sampler),
+            // The checker has made every sample of this plan.
+            Err(_) => Box::new(core::iter::empty()),
+        }
+    }
 }
 
 impl Plan {
-    /// The stream of setpoints, numbered `stream`, ahead of any time.
-    pub fn setpoints(&self, _stream: u64) -> Box<dyn Iterator<Item = Setpoint> + Send> {
-        Box::new(std::iter::empty())
+    /// The stream of setpoints, numbered `stream`, from the first to the one flagged as last.
+    pub fn setpoints(&self, stream: u64) -> Box<dyn Iterator<Item = Setpoint> + Send> {
+        self.visit(Stream { plan: self, stream })
+    }
+
+    fn visit<V: MechanismVisitor>(&self, visitor: V) -> V::Output {
+        self.mechanism.visit(visitor)
+    }
+
+    /// Line and place in the job at `time` [s].
+    fn place(&self, time: f64) -> (u64, Place) {
+        let piece = self.trajectory.piece_at(time);
+        let stroke = piece.map_or(0, |piece| piece.stroke);
+        (piece.map_or(0, |piece| piece.line), Place { stroke, time })
     }
 }

@@ -1,8 +1,17 @@
 //! Job readers: each turns one kind of file into a drawing.
 
+pub mod file;
 pub mod gcode;
+pub mod letters;
+pub mod points;
+
+use std::path::{Path, PathBuf};
+
+use machine::document::{Document, nearest};
+use machine::{DocumentError, Machine, Override};
 
 use crate::drawing::Drawing;
+use gcode::GcodeError;
 
 /// A job, read and understood, but not planned.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,4 +46,113 @@ pub enum MarkingSpeed {
     Optimum,
     /// This speed [m/s].
     Constant(f64),
+}
+
+/// Why a job could not be read.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum JobError {
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {cause}", path.display())]
+    #[diagnostic(help("give the path of a job file (.toml) or a G-code program (.ngc, .nc, .gcode, .tap)"))]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: std::io::Error,
+    },
+    /// The name does not say what kind of job it is.
+    #[error("{}: no kind of job has this extension", path.display())]
+    #[diagnostic(help("{help}"))]
+    UnknownExtension {
+        /// The file.
+        path: PathBuf,
+        /// What would be right.
+        help: String,
+    },
+    /// A job file or an override that is not sound.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Document(#[from] DocumentError),
+    /// A G-code program that is not sound.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Gcode(#[from] Box<GcodeError>),
+}
+
+/// Extensions of G-code programs.
+const GCODE: [&str; 4] = ["ngc", "nc", "gcode", "tap"];
+
+/// Extension of job files.
+const JOB_FILE: &str = "toml";
+
+/// The job of the built-in machine.
+const BUILTIN: &str = include_str!("../../../jobs/letters.toml");
+
+impl Job {
+    /// Reads the job at `path` for `machine`, with `overrides` of its keys laid over it.
+    ///
+    /// # Errors
+    /// Where it cannot be read or is not sound, with the place.
+    pub fn read(path: &Path, overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or("");
+        let extension = extension.to_ascii_lowercase();
+        if GCODE.contains(&extension.as_str()) {
+            return file::program(path, overrides, machine);
+        }
+        if extension != JOB_FILE {
+            let known = || GCODE.into_iter().chain([JOB_FILE]);
+            let help = match nearest(&extension, known()) {
+                Some(near) => format!("did you mean `.{near}`?"),
+                None => {
+                    let names: Vec<String> = known().map(|name| format!(".{name}")).collect();
+                    format!("known are {}", names.join(", "))
+                }
+            };
+            return Err(JobError::UnknownExtension { path: path.to_owned(), help });
+        }
+        let text = read_text(path)?;
+        let name = path.display().to_string();
+        let document = Document::parse(&name, &text)?.override_with(overrides, "")?;
+        let folder = path.parent().unwrap_or_else(|| Path::new(""));
+        file::job(document, folder, machine)
+    }
+
+    /// The built-in job, letters at 20 mm, with `overrides` of its keys laid over it.
+    ///
+    /// # Errors
+    /// Where an override is not sound.
+    pub fn builtin(overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
+        let document = Document::parse("letters.toml", BUILTIN)?.override_with(overrides, "")?;
+        file::job(document, Path::new(""), machine)
+    }
+}
+
+impl JobError {
+    /// The file that it speaks of.
+    pub fn file(&self) -> String {
+        match self {
+            Self::Unreadable { path, .. } | Self::UnknownExtension { path, .. } => {
+                path.display().to_string()
+            }
+            Self::Document(error) => error.file().to_owned(),
+            Self::Gcode(error) => error.file.clone(),
+        }
+    }
+
+    /// Line and column from 1; `None` where an override or the whole file is meant.
+    pub fn position(&self) -> Option<(u64, u64)> {
+        match self {
+            Self::Unreadable { .. } | Self::UnknownExtension { .. } => None,
+            Self::Document(error) => {
+                error.line().zip(error.column()).map(|(line, column)| (line as u64, column as u64))
+            }
+            Self::Gcode(error) => Some((error.line, error.column)),
+        }
+    }
+}
+
+/// The text of the file at `path`.
+fn read_text(path: &Path) -> Result<String, JobError> {
+    std::fs::read_to_string(path)
+        .map_err(|cause| JobError::Unreadable { path: path.to_owned(), cause })
 }

@@ -1,0 +1,200 @@
+//! Every sample of a plan against every limit of path, area and axes, before the first one is sent.
+
+use machine::{Axis, Machine, PathLimits};
+use signals::Setpoint;
+use signals::time::CYCLE_TIME;
+
+use crate::plan::Uses;
+
+/// What a sample may use of a limit of the path. Norms along smoothed joins are held to it by
+/// measure between samples, not by construction, and speed along them is even to a part in 10⁴.
+const ALLOWANCE: f64 = 1.001;
+
+/// What a sample in the dark may use of the speed limit: the swing of a curved run-in adds to the
+/// ramp up to 0.3 % shortly before the stroke.
+const DARK_ALLOWANCE: f64 = 1.005;
+
+/// Rounding allowed at the edge of an area or a soft limit [m or rad].
+const ROUNDING: f64 = 1e-9;
+
+/// Which limit was broken, by how much.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Breach {
+    /// Stream time [s].
+    pub time: f64,
+    /// The axis, if it is one's limit.
+    pub axis: Option<String>,
+    /// What exceeds its limit.
+    pub quantity: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// The limit that it breaks.
+    pub limit: f64,
+    /// The unit of both.
+    pub unit: &'static str,
+}
+
+/// Holds samples to limits, one after the other.
+pub(crate) struct Checker<'a> {
+    path: PathLimits,
+    dark: f64,
+    area: Option<&'a machine::WorkArea>,
+    axes: &'a [Axis],
+    /// The motors at the sample before: angle [rad] and current [A].
+    before: Option<Vec<(f64, f64)>>,
+    uses: Uses,
+}
+
+impl<'a> Checker<'a> {
+    /// Against all of a machine's limits, or the path's alone.
+    pub(crate) fn new(machine: &'a Machine, path: PathLimits, ideal: bool) -> Self {
+        let axes: &[Axis] = if ideal { &[] } else { &machine.axes };
+        let none = || vec![0.0; axes.len()];
+        Self {
+            path,
+            dark: path.rapid.max(path.speed),
+            area: (!ideal).then_some(&machine.area),
+            axes,
+            before: None,
+            uses: Uses {
+                velocity: none(),
+                acceleration: none(),
+                jerk: none(),
+                current: none(),
+                voltage: none(),
+                ..Uses::default()
+            },
+        }
+    }
+
+    /// Largest shares of all limits so far.
+    pub(crate) fn uses(self) -> Uses {
+        self.uses
+    }
+
+    /// Looks at the next sample.
+    pub(crate) fn look(&mut self, setpoint: &Setpoint) -> Result<(), Breach> {
+        let time = setpoint.sequence as f64 * CYCLE_TIME;
+        self.path(setpoint, time)?;
+        if let Some(area) = self.area {
+            for (index, name) in ["x", "y", "z"].into_iter().enumerate() {
+                let value = setpoint.tool[index];
+                let limit = value.clamp(area.lower[index], area.upper[index]);
+                within(value, limit, time, None, position_of(name), "m")?;
+            }
+        }
+        self.joints(setpoint, time)?;
+        self.motors(setpoint, time)
+    }
+
+    fn path(&mut self, setpoint: &Setpoint, time: f64) -> Result<(), Breach> {
+        let (path, uses) = (&self.path, &mut self.uses);
+        let (speed, allowance) = if setpoint.laser.is_lit() {
+            (path.speed, ALLOWANCE)
+        } else {
+            (self.dark, DARK_ALLOWANCE)
+        };
+        let value = setpoint.path_velocity;
+        let share = below(value, speed, allowance, time, None, "speed of the tool", "m/s")?;
+        uses.path_speed = uses.path_speed.max(share);
+        let (value, limit) = (setpoint.path_acceleration, path.acceleration);
+        let quantity = "acceleration of the tool";
+        let share = below(value, limit, ALLOWANCE, time, None, quantity, "m/s²")?;
+        uses.path_acceleration = uses.path_acceleration.max(share);
+        let (value, limit) = (setpoint.path_jerk, path.jerk);
+        let share = below(value, limit, ALLOWANCE, time, None, "jerk of the tool", "m/s³")?;
+        uses.path_jerk = uses.path_jerk.max(share);
+        Ok(())
+    }
+
+    fn joints(&mut self, setpoint: &Setpoint, time: f64) -> Result<(), Breach> {
+        let uses = &mut self.uses;
+        for (index, axis) in self.axes.iter().enumerate() {
+            let limits = &axis.limits;
+            let name = Some(axis.name.as_str());
+            let position = setpoint.position[index];
+            let nearest = position.clamp(limits.position[0], limits.position[1]);
+            within(position, nearest, time, name, "joint position", "m or rad")?;
+            let demands = [
+                (setpoint.velocity[index], limits.velocity, "joint velocity", "1/s"),
+                (setpoint.acceleration[index], limits.acceleration, "joint acceleration", "1/s²"),
+                (setpoint.jerk[index], limits.jerk, "joint jerk", "1/s³"),
+            ];
+            let most =
+                [&mut uses.velocity[index], &mut uses.acceleration[index], &mut uses.jerk[index]];
+            for ((value, limit, quantity, unit), most) in demands.into_iter().zip(most) {
+                let share = below(value.abs(), limit, 1.0, time, name, quantity, unit)?;
+                *most = most.max(share);
+            }
+        }
+        Ok(())
+    }
+
+    /// Current and voltage that the motion needs, friction included: what the controller will
+    /// feed forward for the cycle between the sample before and this one.
+    fn motors(&mut self, setpoint: &Setpoint, time: f64) -> Result<(), Breach> {
+        let mut now = Vec::with_capacity(self.axes.len());
+        for (index, axis) in self.axes.iter().enumerate() {
+            let motor = &axis.motor;
+            let angle = (setpoint.position[index] + setpoint.lead[index]) / axis.ratio;
+            let before = self.before.as_ref().map(|motors| motors[index]);
+            let speed = before.map_or(0.0, |(earlier, _)| (angle - earlier) / CYCLE_TIME);
+            // Below the speed at which no setpoint moves, friction takes no side.
+            let side = if speed.abs() > 1e-9 { speed.signum() } else { 0.0 };
+            let friction = axis.friction.coulomb * side + axis.friction.viscous * speed;
+            let current = (setpoint.effort[index] + friction) / motor.torque_constant;
+            let earlier = before.map_or(current, |(_, current)| current);
+            let voltage = motor.resistance * (current + earlier) / 2.0
+                + motor.inductance * (current - earlier) / CYCLE_TIME
+                + motor.torque_constant * speed;
+            let name = Some(axis.name.as_str());
+            let share = below(current.abs(), motor.current, 1.0, time, name, "motor current", "A")?;
+            self.uses.current[index] = self.uses.current[index].max(share);
+            let share = below(voltage.abs(), motor.voltage, 1.0, time, name, "motor voltage", "V")?;
+            self.uses.voltage[index] = self.uses.voltage[index].max(share);
+            now.push((angle, current));
+        }
+        self.before = Some(now);
+        Ok(())
+    }
+}
+
+fn position_of(name: &str) -> &'static str {
+    match name {
+        "x" => "x of the tool",
+        "y" => "y of the tool",
+        _ => "z of the tool",
+    }
+}
+
+fn within(
+    value: f64,
+    limit: f64,
+    time: f64,
+    axis: Option<&str>,
+    quantity: &'static str,
+    unit: &'static str,
+) -> Result<(), Breach> {
+    if (value - limit).abs() <= ROUNDING {
+        return Ok(());
+    }
+    Err(Breach { time, axis: axis.map(str::to_owned), quantity, value, limit, unit })
+}
+
+/// The share of `limit` that `value` uses, at most `allowance`.
+fn below(
+    value: f64,
+    limit: f64,
+    allowance: f64,
+    time: f64,
+    axis: Option<&str>,
+    quantity: &'static str,
+    unit: &'static str,
+) -> Result<f64, Breach> {
+    let share = value / limit;
+    // Put this way a value that is no number breaks the limit.
+    if share <= allowance {
+        return Ok(share);
+    }
+    Err(Breach { time, axis: axis.map(str::to_owned), quantity, value, limit, unit })
+}

@@ -1,0 +1,158 @@
+//! A drawing as the tool will go through it: marks gathered into strokes, and what comes between.
+
+use core::f64::consts::PI;
+
+use machine::PathLimits;
+use nalgebra::Vector3;
+use signals::math;
+
+use crate::drawing::{Action, Curve, Drawing};
+use crate::outline::Outline;
+use crate::profile::Move;
+use crate::track::Track;
+
+/// Marks whose tangents meet within this angle are one stroke [rad].
+pub const CORNER: f64 = PI / 180.0;
+
+/// Shorter curves are dropped [m]: a thousandth of what an encoder can tell.
+const NOTHING: f64 = 1e-9;
+
+/// One thing to do, at rest before and after.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Item {
+    /// Mark in one go.
+    Stroke(Outline),
+    /// Go there in the dark.
+    Rapid(Vector3<f64>),
+    /// Follow a curve in the dark.
+    Feed(Feed),
+    /// Stand still in the dark for some time [s].
+    Rest(f64),
+    /// Mark a dot.
+    Dot(Dot),
+    /// Switch an output.
+    Output { bit: u32, on: bool },
+    /// Wait for a person.
+    Pause,
+}
+
+/// An item and the line of the job that it comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Stop {
+    pub(crate) item: Item,
+    pub(crate) line: u64,
+}
+
+/// A curve followed in the dark from rest to rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Feed {
+    pub(crate) track: Track,
+    pub(crate) profile: Move,
+    /// How many times slower than the profile, so that curvature leaves every limit kept [1].
+    pub(crate) pace: f64,
+}
+
+/// Light while the tool stands still.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Dot {
+    pub(crate) at: Vector3<f64>,
+    /// Times [s] and powers [fraction of full scale], one after the other.
+    pub(crate) exposures: Vec<(f64, f64)>,
+}
+
+impl Feed {
+    fn new(track: Track, speed: f64, limits: &PathLimits) -> Self {
+        let speed = speed.min(limits.rapid);
+        let profile = Move::new(track.length(), speed, limits.acceleration, limits.jerk);
+        let mut feed = Self { track, profile, pace: 1.0 };
+        if matches!(feed.track, Track::Line { .. }) {
+            return feed;
+        }
+        // Played c times slower, speed falls by c, acceleration by c² and jerk by c³.
+        let samples = 512;
+        let mut pace: f64 = 1.0;
+        for index in 0..=samples {
+            let time = feed.profile.duration() * f64::from(index) / f64::from(samples);
+            let motion = feed.at(time);
+            pace = pace
+                .max((motion.acceleration.norm() / limits.acceleration).sqrt())
+                .max(math::cbrt(motion.jerk.norm() / limits.jerk));
+        }
+        // Between samples the norms rise by less than a thousandth.
+        feed.pace = if pace > 1.0 { pace * 1.001 } else { 1.0 };
+        feed
+    }
+
+    /// [s].
+    pub fn duration(&self) -> f64 {
+        self.profile.duration() * self.pace
+    }
+
+    /// The tool's motion at `time` since the start [s].
+    pub fn at(&self, time: f64) -> machine::kinematics::ToolMotion {
+        let rate = 1.0 / self.pace;
+        let along = self.profile.at(time * rate);
+        self.track.at(along.position).motion(
+            along.velocity * rate,
+            along.acceleration * rate * rate,
+            along.jerk * rate * rate * rate,
+        )
+    }
+}
+
+/// Gathers the steps of `drawing`: marks that go on into each other become one stroke, free moves
+/// that only lead to a stroke are left to its approach, and lit dwells in one place become one dot.
+pub(crate) fn itinerary(drawing: &Drawing, limits: &PathLimits) -> Vec<Stop> {
+    let cosine = math::cos(CORNER);
+    let mut stops: Vec<Stop> = Vec::new();
+    let mut place = drawing.start;
+    for step in &drawing.steps {
+        let line = step.line;
+        let item = match &step.action {
+            Action::Mark { curve, speed, power } => {
+                place = curve.to();
+                if let Some(Stop { item: Item::Stroke(stroke), .. }) = stops.last_mut()
+                    && stroke.speed == *speed
+                    && stroke.extend(curve, *power, cosine, limits.tolerance)
+                {
+                    continue;
+                }
+                if Track::new(curve).length() <= NOTHING {
+                    continue;
+                }
+                if matches!(stops.last(), Some(Stop { item: Item::Rapid(_), .. })) {
+                    stops.pop();
+                }
+                Item::Stroke(Outline::new(curve, *speed, *power, line))
+            }
+            Action::Rapid { to } => {
+                place = *to;
+                Item::Rapid(*to)
+            }
+            Action::Feed { curve, speed } => {
+                place = curve.to();
+                if let Curve::Line { from, to } = curve
+                    && (to - from).norm() <= NOTHING
+                {
+                    continue;
+                }
+                Item::Feed(Feed::new(Track::new(curve), *speed, limits))
+            }
+            Action::Dwell { time, lit: Some(power) } if *time > 0.0 && *power > 0.0 => {
+                let exposure = (*time, *power);
+                if let Some(Stop { item: Item::Dot(dot), .. }) = stops.last_mut()
+                    && dot.at == place
+                {
+                    dot.exposures.push(exposure);
+                    continue;
+                }
+                Item::Dot(Dot { at: place, exposures: vec![exposure] })
+            }
+            Action::Dwell { time, .. } => Item::Rest(*time),
+            Action::Output { bit, on } => Item::Output { bit: *bit, on: *on },
+            Action::Pause => Item::Pause,
+        };
+        stops.push(Stop { item, line });
+    }
+    stops
+}

@@ -1,0 +1,262 @@
+//! The job file: its tables, and how they become a [`Job`].
+
+use std::path::{Path, PathBuf};
+
+use machine::document::{
+    Document, Either, Findings, Fraction, Keyword, Located, Point, Positive, Quantity, schema_text,
+};
+use machine::quantity::{Duration, Length, Speed};
+use machine::{DocumentError, Machine, Override, table};
+use nalgebra::Vector3;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+
+use super::letters::{self, Letter, Style};
+use super::{Job, JobError, Marking, MarkingSpeed, gcode, points};
+use crate::drawing::{Drawing, Power};
+
+table! {
+    /// What to mark, and how: exactly one of `letters`, `points` and `gcode`.
+    pub struct JobTable {
+        /// Letters of the thesis.
+        pub letters: Option<LettersTable>,
+        /// A list of points, each marked by a dwell.
+        pub points: Option<PointsTable>,
+        /// A G-code program.
+        pub gcode: Option<GcodeTable>,
+        /// How to mark; what is left out, the machine file's `[path]` table rules.
+        pub marking: MarkingTable,
+    }
+}
+
+table! {
+    /// How to mark a G-code program, whose S words are its power.
+    pub struct ProgramTable {
+        /// How to mark; what is left out, the program and the machine file rule.
+        pub marking: MarkingTable,
+    }
+}
+
+table! {
+    /// Letters of the thesis, in a row around the machine's home.
+    pub struct LettersTable {
+        /// Any of N, A, S, O.
+        pub text: Located<String>,
+        /// Height of a letter.
+        pub height: Quantity<Length, Positive> = "20 mm",
+        /// curves: no stop on a curve; h1, h2: chord by chord, the thesis's conventions.
+        pub style: Located<Style> = "curves",
+    }
+}
+
+table! {
+    /// A list of points, each marked by a dwell.
+    pub struct PointsTable {
+        /// Points [x, y] or [x, y, z] as seen from the machine's home.
+        pub points: Vec<Point>,
+        /// How long the laser stays on each.
+        pub dwell: Quantity<Duration, Positive> = "10 ms",
+    }
+}
+
+table! {
+    /// A G-code program.
+    pub struct GcodeTable {
+        /// The file, relative to this one.
+        pub file: Located<String>,
+    }
+}
+
+table! {
+    /// How to mark.
+    pub struct MarkingTable {
+        /// "optimum", or a speed: constant while the laser is on.
+        pub speed: Option<Either<Optimum, Quantity<Speed, Positive>>>,
+        /// Largest speed while the laser is on.
+        pub max_speed: Option<Quantity<Speed, Positive>>,
+        /// How far a smoothed join may lie from the drawn line.
+        pub tolerance: Option<Quantity<Length, Positive>>,
+        /// Power of the laser, full power when left out.
+        pub power: Option<Fraction<Positive>>,
+    }
+}
+
+/// The word for the speed with the least time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Optimum {
+    /// The speed that minimises the drawing's time.
+    Optimum,
+}
+
+impl Keyword for Optimum {
+    const NAME: &'static str = "a speed";
+    const WORDS: &'static [(&'static str, Self)] = &[("optimum", Self::Optimum)];
+}
+
+impl JsonSchema for Optimum {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Optimum".into()
+    }
+
+    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "enum": ["optimum"] })
+    }
+}
+
+/// Why style h2 is for paper only.
+const REPLICA: &str = "style h2 replicates a printed table with free moves of up to 0.99 m/s, which \
+                       no motor of the machine can do; use style h1 or curves, or plan it with --ideal";
+
+/// Largest speed of free moves of convention h1 [m/s].
+const H1_RAPID: f64 = 0.25;
+
+/// The JSON schema of job files, as `jobs/schema.json` holds it.
+pub fn schema() -> String {
+    schema_text::<JobTable>("Graver job file")
+}
+
+/// Reads a job file whose text is in `document`; `folder` is where its relative paths start.
+pub(super) fn job(document: Document, folder: &Path, machine: &Machine) -> Result<Job, JobError> {
+    let (table, mut findings) = document.decode::<JobTable>()?;
+    let JobTable { letters, points, gcode, marking, place } = table;
+    match (letters, points, gcode) {
+        (Some(letters), None, None) => Ok(of_letters(&letters, &marking, findings, machine)?),
+        (None, Some(points), None) => Ok(of_points(&points, &marking, findings, machine)?),
+        (None, None, Some(program)) => {
+            let path: PathBuf = folder.join(&program.file.value);
+            of_program(&path, &marking, findings, machine)
+        }
+        (None, None, None) => {
+            findings.contradict(
+                place,
+                "nothing to mark".to_owned(),
+                "add one of the tables [letters], [points] and [gcode]",
+            );
+            Ok(findings.fail()?)
+        }
+        (letters, points, gcode) => {
+            let places = [
+                letters.map(|table| table.place),
+                points.map(|table| table.place),
+                gcode.map(|table| table.place),
+            ];
+            for place in places.into_iter().flatten().skip(1) {
+                findings.contradict(
+                    place,
+                    "a job marks one thing".to_owned(),
+                    "keep one of the tables [letters], [points] and [gcode]",
+                );
+            }
+            Ok(findings.fail()?)
+        }
+    }
+}
+
+/// Reads the G-code program at `path` as a job of its own, with `overrides` of `[marking]`.
+pub(super) fn program(
+    path: &Path,
+    overrides: &[Override],
+    machine: &Machine,
+) -> Result<Job, JobError> {
+    let empty = Document::parse(&path.display().to_string(), "")?;
+    let (table, findings) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
+    of_program(path, &table.marking, findings, machine)
+}
+
+fn of_letters(
+    table: &LettersTable,
+    marking: &MarkingTable,
+    mut findings: Findings,
+    machine: &Machine,
+) -> Result<Job, DocumentError> {
+    let mut text = Vec::new();
+    for character in table.text.value.chars() {
+        match Letter::from_character(character) {
+            Some(letter) => text.push(letter),
+            None => findings.contradict(
+                table.text.place,
+                format!("there is no letter `{character}`"),
+                "write any of N, A, S, O",
+            ),
+        }
+    }
+    if table.text.value.is_empty() {
+        let help = "write any of N, A, S, O";
+        findings.contradict(table.text.place, "there is no letter to mark".to_owned(), help);
+    }
+    let line = line(&findings, table.text.place);
+    let (style, home) = (table.style.value, Vector3::from(machine.home));
+    let power = Power { level: power(marking), follows_speed: false };
+    let drawing = letters::draw(&text, table.height.value, style, power, home, line);
+    let (rapid, ideal_only) = match style {
+        Style::Curves => (None, None),
+        Style::H1 => (Some(H1_RAPID), None),
+        Style::H2 => (Some(f64::INFINITY), Some(REPLICA)),
+    };
+    findings.finish(Job { drawing, marking: how(marking), rapid, ideal_only })
+}
+
+fn of_points(
+    table: &PointsTable,
+    marking: &MarkingTable,
+    mut findings: Findings,
+    machine: &Machine,
+) -> Result<Job, DocumentError> {
+    if table.points.is_empty() {
+        let help = "write points such as [[\"10 mm\", \"5 mm\"]]";
+        findings.contradict(table.place, "there is no point to mark".to_owned(), help);
+    }
+    let home = Vector3::from(machine.home);
+    let places: Vec<Vector3<f64>> =
+        table.points.iter().map(|point| home + Vector3::from(point.value)).collect();
+    let line = line(&findings, table.place);
+    let stem = Path::new(findings.file()).file_stem().and_then(|stem| stem.to_str());
+    let name = stem.unwrap_or("points");
+    let drawing = points::draw(name, &places, table.dwell.value, power(marking), home, line);
+    findings.finish(job_of(drawing, marking))
+}
+
+fn of_program(
+    path: &Path,
+    marking: &MarkingTable,
+    mut findings: Findings,
+    machine: &Machine,
+) -> Result<Job, JobError> {
+    if let Some(power) = &marking.power {
+        findings.contradict(
+            power.place,
+            "the power of a G-code program is its S words'".to_owned(),
+            "leave `power` out",
+        );
+    }
+    findings.finish(())?;
+    let text = super::read_text(path)?;
+    let program = gcode::read(&path.display().to_string(), &text, machine)?;
+    Ok(job_of(program.drawing, marking))
+}
+
+fn job_of(drawing: Drawing, marking: &MarkingTable) -> Job {
+    Job { drawing, marking: how(marking), rapid: None, ideal_only: None }
+}
+
+fn how(table: &MarkingTable) -> Marking {
+    Marking {
+        speed: table.speed.as_ref().map(|speed| match speed {
+            Either::Word(_) => MarkingSpeed::Optimum,
+            Either::Value(speed) => MarkingSpeed::Constant(speed.value),
+        }),
+        max_speed: table.max_speed.as_ref().map(|speed| speed.value),
+        tolerance: table.tolerance.as_ref().map(|tolerance| tolerance.value),
+    }
+}
+
+fn power(table: &MarkingTable) -> f64 {
+    table.power.as_ref().map_or(1.0, |power| power.value)
+}
+
+fn line(findings: &Findings, place: machine::document::Place) -> u64 {
+    findings.position(place).map_or(0, |(line, _)| line as u64)
+}

@@ -1,0 +1,142 @@
+//! A stroke before its speed is known: the curves that are marked in one go, and their joins.
+
+use machine::PathLimits;
+
+use crate::blend::Join;
+use crate::drawing::{Curve, Power};
+use crate::jet::Jet;
+use crate::stroke::StrokePath;
+use crate::track::{Bend, Track};
+
+/// A smoothed join that stays within this share of the tolerance is made gentler than it must be.
+const GENTLE: f64 = 0.2;
+
+/// Curves that meet within this distance are taken to meet [m].
+pub(crate) const GAP: f64 = 1e-8;
+
+/// Curves that are marked in one go, with the same speed asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Outline {
+    tracks: Vec<Track>,
+    joins: Vec<Join>,
+    /// What the laser does from each track on.
+    pub(crate) powers: Vec<Power>,
+    /// The speed that the job asks for [m/s].
+    pub(crate) speed: Option<f64>,
+    /// Line of the job file.
+    pub(crate) line: u64,
+    length: f64,
+    bend: Bend,
+}
+
+impl Outline {
+    /// Starts with one curve.
+    pub(crate) fn new(curve: &Curve, speed: Option<f64>, power: Power, line: u64) -> Self {
+        let track = Track::new(curve);
+        let (length, bend) = (track.length(), track.bend());
+        Self {
+            tracks: vec![track],
+            joins: Vec::new(),
+            powers: vec![power],
+            speed,
+            line,
+            length,
+            bend,
+        }
+    }
+
+    /// Goes on with `curve` if it continues the stroke: it starts at its end, with a tangent within
+    /// the angle whose cosine is `cosine`. Says whether it does.
+    pub(crate) fn extend(
+        &mut self,
+        curve: &Curve,
+        power: Power,
+        cosine: f64,
+        tolerance: f64,
+    ) -> bool {
+        let track = Track::new(curve);
+        let (before, after) = (self.end(), track.at(0.0));
+        if (after.point - before.point).norm() > GAP || before.first.dot(&after.first) < cosine {
+            return false;
+        }
+        // The first and last curve of a stroke have no other join to leave room for, but may get
+        // one later; half of each keeps joins apart in every case.
+        let room = self.last().length().min(track.length()) / 2.0;
+        self.joins.push(Join::new(&before, &after, room, tolerance));
+        self.length += track.length();
+        self.bend = self.bend.or(track.bend());
+        self.tracks.push(track);
+        self.powers.push(power);
+        true
+    }
+
+    /// Length of the drawn line [m].
+    pub(crate) fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// The first point.
+    pub(crate) fn start(&self) -> Jet {
+        self.tracks[0].at(0.0)
+    }
+
+    /// The last point.
+    pub(crate) fn end(&self) -> Jet {
+        let last = self.last();
+        last.at(last.length())
+    }
+
+    fn last(&self) -> &Track {
+        &self.tracks[self.tracks.len() - 1]
+    }
+
+    /// The curves in order.
+    pub(crate) fn tracks(&self) -> &[Track] {
+        &self.tracks
+    }
+
+    /// The largest constant speed [m/s]: V²κ ≤ A, V³|p‴| ≤ J, smoothed joins included.
+    pub(crate) fn top_speed(&self, limits: &PathLimits) -> f64 {
+        let (acceleration, jerk) = (limits.acceleration, limits.jerk);
+        let mut speed = self.bend.speed(acceleration, jerk);
+        for join in self.joins.iter().filter(|join| !join.is_smooth()) {
+            speed = speed.min(join.sharpest(join.room).speed(acceleration, jerk));
+        }
+        if self.joins.is_empty() {
+            return speed;
+        }
+        // The bound above takes the curves' bend at the joins alone; the smoothed path is measured
+        // and has the last word. Each round shortens less than the one before.
+        for _ in 0..8 {
+            let measured = self.trace(speed, limits).bend().speed(acceleration, jerk);
+            if measured >= speed {
+                break;
+            }
+            speed = measured * (1.0 - 1e-9);
+        }
+        speed
+    }
+
+    /// The path of the stroke at `speed` [m/s], its joins smoothed as that speed needs.
+    pub(crate) fn trace(&self, speed: f64, limits: &PathLimits) -> StrokePath {
+        let mut path = StrokePath::default();
+        let mut from = 0.0;
+        for (index, track) in self.tracks.iter().enumerate() {
+            let join = self.joins.get(index).filter(|join| !join.is_smooth());
+            let Some(join) = join else {
+                path.push_track(track, from, track.length() - from);
+                from = 0.0;
+                continue;
+            };
+            let shortest = join.shortest(speed, limits.acceleration, limits.jerk);
+            let gentle = join.reach_at(limits.tolerance * GENTLE);
+            let reach = shortest.max(gentle).min(join.room);
+            path.push_track(track, from, track.length() - reach - from);
+            for (quarter, length) in join.quarters(track, &self.tracks[index + 1], reach) {
+                path.push_quarter(quarter, length);
+            }
+            from = reach;
+        }
+        path
+    }
+}

@@ -1,0 +1,284 @@
+//! The setpoint of every cycle: the tool's motion, the joints', the motors' lead and torque, the
+//! laser.
+//!
+//! The trajectory is looked at four times a cycle, for the lead. The effort of a sample is the mean
+//! over the cycle centred on it: the motor's torque steps with the jerk, up to a tenth of its
+//! peak, and a value at one instant would lose or double up to half a cycle of such a step.
+
+use std::sync::Arc;
+
+use machine::kinematics::{Joints, KinematicsError, ToolMotion};
+use machine::{Axis, Mechanism};
+use signals::time::CYCLE_TIME;
+use signals::{GateEdge, LaserCycle, Setpoint, axis::axis_array, setpoint::flags};
+
+use crate::lead::Lead;
+use crate::trajectory::Trajectory;
+
+/// Looks at the trajectory in a cycle; even, so that a sample lies on one.
+const STEPS: usize = 4;
+
+/// Time between two looks [s].
+const STEP: f64 = CYCLE_TIME / STEPS as f64;
+
+/// A stream ends once no motor is farther than this from where it will stay [joint units].
+const SETTLED: f64 = 1e-9;
+
+/// Nanoseconds in a cycle.
+const CYCLE: i64 = signals::time::CYCLE_PERIOD.0;
+
+/// Setpoints of one trajectory, in order.
+pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
+    mechanism: M,
+    trajectory: Arc<Trajectory>,
+    drives: [Drive; N],
+    stream: u64,
+    sequence: u64,
+    /// Index of the next look, in steps of [`STEP`] from the first sample.
+    look: i64,
+    cursor: usize,
+    joints: Joints<N>,
+    lead: Lead<N>,
+    /// Speed of the motor side [joint units/s], and effort on the load side, at the last look.
+    motor_velocity: Joints<N>,
+    effort: Joints<N>,
+    laser: Gate,
+    next_output: usize,
+    outputs: u64,
+    next_pause: usize,
+    end: i64,
+    state: Stream,
+}
+
+/// Where the stream is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stream {
+    Running,
+    /// Samples left after the motion has settled.
+    Ended,
+    /// A sample could not be made.
+    Broken(KinematicsError),
+}
+
+/// What the effort of an axis is made of.
+#[derive(Debug, Clone, Copy)]
+struct Drive {
+    ratio: f64,
+    inertia: f64,
+}
+
+/// The laser as the samples so far left it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gate {
+    next: usize,
+    power: f64,
+    stroke: u64,
+}
+
+/// The joints at one look.
+struct Look<const N: usize> {
+    tool: ToolMotion,
+    motion: machine::kinematics::JointMotion<N>,
+    effort: Joints<N>,
+}
+
+/// Why sampling stopped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Unreachable {
+    pub(crate) time: f64,
+    pub(crate) cause: KinematicsError,
+}
+
+impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
+    pub(crate) fn new(
+        mechanism: M,
+        axes: &[Axis],
+        trajectory: Arc<Trajectory>,
+        stream: u64,
+    ) -> Result<Self, Unreachable> {
+        let mut cursor = 0;
+        let tool = trajectory.at(0.0, &mut cursor);
+        let motion = mechanism
+            .joint_motion(&tool, M::Branch::default(), &Joints::zeros())
+            .map_err(|cause| Unreachable { time: 0.0, cause })?;
+        let effort = mechanism.inverse_dynamics(&motion);
+        let lead = Lead::new(&mechanism, effort, STEP);
+        let end = (trajectory.end() / CYCLE_TIME).ceil() as i64;
+        Ok(Self {
+            mechanism,
+            drives: std::array::from_fn(|axis| Drive {
+                ratio: axes[axis].ratio,
+                inertia: axes[axis].motor.rotor_inertia,
+            }),
+            trajectory,
+            stream,
+            sequence: 0,
+            look: -(STEPS as i64) / 2,
+            cursor,
+            joints: motion.position,
+            lead,
+            motor_velocity: Joints::zeros(),
+            effort,
+            laser: Gate::default(),
+            next_output: 0,
+            outputs: 0,
+            next_pause: 0,
+            end,
+            state: Stream::Running,
+        })
+    }
+
+    /// Why it ended early, if it did.
+    pub(crate) fn broken(&self) -> Option<Unreachable> {
+        match self.state {
+            Stream::Broken(cause) => {
+                Some(Unreachable { time: self.sequence as f64 * CYCLE_TIME, cause })
+            }
+            Stream::Running | Stream::Ended => None,
+        }
+    }
+
+    /// Goes on to the next look.
+    fn advance(&mut self) -> Result<Look<N>, KinematicsError> {
+        self.look += 1;
+        let tool = self.trajectory.at(self.look as f64 * STEP, &mut self.cursor);
+        let motion = self.mechanism.joint_motion(&tool, M::Branch::default(), &self.joints)?;
+        let effort = self.mechanism.inverse_dynamics(&motion);
+        // Inertia changes slowly beside the jerk: its own rate is left out where only a spring
+        // without damper asks for it.
+        let effort_rate = self.mechanism.mass_matrix(&motion.position) * motion.jerk;
+        self.lead.advance(&effort, &effort_rate);
+        self.joints = motion.position;
+        self.effort = effort;
+        self.motor_velocity = motion.velocity + self.lead.rate();
+        Ok(Look { tool, motion, effort })
+    }
+
+    fn setpoint(&mut self) -> Result<Setpoint, KinematicsError> {
+        let before = self.motor_velocity;
+        let mut mean = self.effort / 2.0;
+        let mut add = |effort: &Joints<N>, weight: f64| mean += effort * weight;
+        for _ in 1..STEPS / 2 {
+            let look = self.advance()?;
+            add(&look.effort, 1.0);
+        }
+        let Look { tool, motion, effort } = self.advance()?;
+        add(&effort, 1.0);
+        let lead = *self.lead.value();
+        for _ in 1..STEPS / 2 {
+            let look = self.advance()?;
+            add(&look.effort, 1.0);
+        }
+        let look = self.advance()?;
+        add(&look.effort, 0.5);
+        mean /= STEPS as f64;
+        let acceleration = (self.motor_velocity - before) / CYCLE_TIME;
+
+        let gravity = self.mechanism.gravity(&motion.position);
+        let impulse = self.mechanism.mass_matrix(&motion.position) * motion.velocity;
+        let per_axis = |value: &dyn Fn(usize, &Drive) -> f64| {
+            let values: [f64; N] = std::array::from_fn(|axis| value(axis, &self.drives[axis]));
+            axis_array(&values)
+        };
+        Ok(Setpoint {
+            tool: tool.position.into(),
+            path_velocity: tool.velocity.norm(),
+            path_acceleration: tool.acceleration.norm(),
+            path_jerk: tool.jerk.norm(),
+            position: axis_array(motion.position.as_slice()),
+            velocity: axis_array(motion.velocity.as_slice()),
+            acceleration: axis_array(motion.acceleration.as_slice()),
+            jerk: axis_array(motion.jerk.as_slice()),
+            lead: axis_array(lead.as_slice()),
+            effort: per_axis(&|axis, drive| {
+                drive.inertia * acceleration[axis] / drive.ratio + drive.ratio * mean[axis]
+            }),
+            static_effort: per_axis(&|axis, drive| drive.ratio * gravity[axis]),
+            momentum: per_axis(&|axis, drive| {
+                drive.inertia * motion.velocity[axis] / drive.ratio + drive.ratio * impulse[axis]
+            }),
+            ..Setpoint::default()
+        })
+    }
+
+    /// The laser in the cycle that starts with sample `sequence`, and the stroke it lights; `None`
+    /// when the cycle cannot hold its changes, which the checker has refused.
+    fn laser(&mut self) -> (LaserCycle, u64) {
+        let start = self.sequence as i64 * CYCLE;
+        let mut cycle = LaserCycle {
+            gate: u32::from(self.laser.power > 0.0),
+            power: self.laser.power,
+            ..LaserCycle::OFF
+        };
+        let mut stroke = self.laser.stroke;
+        while let Some(change) = self.trajectory.laser.get(self.laser.next) {
+            let offset = change.time.0 - start;
+            if offset >= CYCLE {
+                break;
+            }
+            let edge = GateEdge {
+                offset: u32::try_from(offset).unwrap_or(0),
+                gate: u32::from(change.power > 0.0),
+                power: change.power,
+            };
+            if !cycle.push(edge) {
+                break;
+            }
+            self.laser =
+                Gate { next: self.laser.next + 1, power: change.power, stroke: change.stroke };
+            if change.stroke != 0 {
+                stroke = change.stroke;
+            }
+        }
+        (cycle, stroke)
+    }
+
+    /// Outputs and flags of the sample at `time`.
+    fn switch(&mut self, setpoint: &mut Setpoint, time: f64) {
+        while let Some(&(from, outputs)) = self.trajectory.outputs.get(self.next_output) {
+            if from > time {
+                break;
+            }
+            self.outputs = outputs;
+            self.next_output += 1;
+        }
+        setpoint.outputs = self.outputs;
+        if self.trajectory.pauses.get(self.next_pause).is_some_and(|&pause| pause <= time) {
+            self.next_pause += 1;
+            setpoint.flags |= flags::PAUSE;
+        }
+    }
+
+    /// Whether everything has come to rest.
+    fn is_settled(&self) -> bool {
+        self.sequence as i64 > self.end
+            && (self.lead.value() - self.lead.settled(&self.effort)).amax() <= SETTLED
+    }
+}
+
+impl<const N: usize, M: Mechanism<N>> Iterator for Sampler<N, M> {
+    type Item = Setpoint;
+
+    fn next(&mut self) -> Option<Setpoint> {
+        if self.state != Stream::Running {
+            return None;
+        }
+        let mut setpoint = match self.setpoint() {
+            Ok(setpoint) => setpoint,
+            Err(cause) => {
+                self.state = Stream::Broken(cause);
+                return None;
+            }
+        };
+        setpoint.stream = self.stream;
+        setpoint.sequence = self.sequence;
+        (setpoint.laser, setpoint.stroke) = self.laser();
+        self.switch(&mut setpoint, self.sequence as f64 * CYCLE_TIME);
+        if self.is_settled() {
+            setpoint.flags |= flags::LAST;
+            self.state = Stream::Ended;
+        }
+        self.sequence += 1;
+        Some(setpoint)
+    }
+}

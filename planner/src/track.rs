@@ -1,0 +1,177 @@
+//! One curve of a drawing taken by arc length.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use signals::math;
+
+use crate::arc_length::{ByArcLength, Parametric};
+use crate::drawing::Curve;
+use crate::jet::Jet;
+
+/// Steps of the table for a whole turn of an ellipse, before it is refined.
+const STEPS_PER_TURN: f64 = 64.0;
+
+/// How far the two semi-axes of a circle may differ, and how far from perpendicular its helix
+/// axis may be, before the arc is taken by a table [1].
+const ROUND: f64 = 1e-12;
+
+/// A curve by arc length.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Track {
+    /// Straight.
+    Line { from: Vector3<f64>, direction: Vector3<f64>, length: f64 },
+    /// A circle or helix, whose angle goes evenly with arc length.
+    Circle { arc: Arc<Ellipse>, length: f64 },
+    /// Any other arc.
+    Ellipse(Arc<ByArcLength<Ellipse>>),
+}
+
+/// An arc of a [`Curve`] by the angle from its start, which is positive whatever its sense.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ellipse {
+    centre: Vector3<f64>,
+    major: Vector3<f64>,
+    minor: Vector3<f64>,
+    start: f64,
+    sense: f64,
+    sweep: f64,
+    rise: Vector3<f64>,
+}
+
+/// The largest curvature [1/m] and the largest third derivative by arc length [1/m²].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Bend {
+    pub(crate) curvature: f64,
+    pub(crate) third: f64,
+}
+
+impl Parametric for Ellipse {
+    fn end(&self) -> f64 {
+        self.sweep
+    }
+
+    fn jet(&self, parameter: f64) -> Jet {
+        let (sine, cosine) = math::sin_cos(self.start + self.sense * parameter);
+        let out = self.major * cosine + self.minor * sine;
+        let onward = (self.minor * cosine - self.major * sine) * self.sense;
+        Jet {
+            point: self.centre + out + self.rise * parameter,
+            first: onward + self.rise,
+            second: -out,
+            third: -onward,
+        }
+    }
+}
+
+impl Track {
+    /// Takes `curve` by arc length.
+    pub(crate) fn new(curve: &Curve) -> Self {
+        match *curve {
+            Curve::Line { from, to } => {
+                let length = (to - from).norm();
+                let direction = if length > 0.0 { (to - from) / length } else { Vector3::zeros() };
+                Self::Line { from, direction, length }
+            }
+            Curve::Arc { centre, major, minor, start, sweep, rise } => {
+                let rise = rise / sweep.abs();
+                let sense = sweep.signum();
+                let arc = Ellipse { centre, major, minor, start, sense, sweep: sweep.abs(), rise };
+                let (square, other) = (major.norm_squared(), minor.norm_squared());
+                let scale = square.max(other);
+                let round = (square - other).abs() <= ROUND * scale
+                    && major.dot(&minor).abs() <= ROUND * scale
+                    && rise.dot(&major).abs() <= ROUND * scale
+                    && rise.dot(&minor).abs() <= ROUND * scale;
+                if round {
+                    let length = (square + rise.norm_squared()).sqrt() * arc.sweep;
+                    return Self::Circle { arc: Arc::new(arc), length };
+                }
+                let steps = (arc.sweep / math::TURN * STEPS_PER_TURN).ceil() as usize;
+                Self::Ellipse(Arc::new(ByArcLength::new(arc, steps)))
+            }
+        }
+    }
+
+    /// [m].
+    pub(crate) fn length(&self) -> f64 {
+        match self {
+            Self::Line { length, .. } | Self::Circle { length, .. } => *length,
+            Self::Ellipse(table) => table.length(),
+        }
+    }
+
+    /// The point and its derivatives at `distance` from the start [m].
+    pub(crate) fn at(&self, distance: f64) -> Jet {
+        match self {
+            Self::Line { from, direction, .. } => Jet {
+                point: from + direction * distance,
+                first: *direction,
+                second: Vector3::zeros(),
+                third: Vector3::zeros(),
+            },
+            Self::Circle { arc, length } => {
+                let rate = arc.sweep / length;
+                let jet = arc.jet(distance * rate);
+                Jet {
+                    point: jet.point,
+                    first: jet.first * rate,
+                    second: jet.second * (rate * rate),
+                    third: jet.third * (rate * rate * rate),
+                }
+            }
+            Self::Ellipse(table) => table.at(distance),
+        }
+    }
+
+    /// How sharply it bends at most.
+    pub(crate) fn bend(&self) -> Bend {
+        match self {
+            Self::Line { .. } => Bend::default(),
+            Self::Circle { .. } => Bend::of(&self.at(0.0)),
+            Self::Ellipse(table) => {
+                // An ellipse's curvature and its derivative have their extremes where sin 2φ or
+                // cos 2φ is a simple ratio of its axes: well inside steps this fine.
+                let steps = 8 * table.steps();
+                let step = self.length() / steps as f64;
+                let mut bend = Bend::default();
+                for index in 0..=steps {
+                    bend = bend.or(Bend::of(&self.at(step * index as f64)));
+                }
+                bend
+            }
+        }
+    }
+
+    /// Points on the curve from its start (left out) to its end such that no chord is farther
+    /// than `chord_error` from it.
+    pub(crate) fn sample(&self, chord_error: f64, points: &mut Vec<[f64; 3]>) {
+        let curvature = self.bend().curvature;
+        // Sagitta of a chord of length c on curvature κ: κ·c²/8.
+        let chord =
+            if curvature > 0.0 { (8.0 * chord_error / curvature).sqrt() } else { f64::INFINITY };
+        let count = ((self.length() / chord).ceil() as usize).max(1);
+        for index in 1..=count {
+            let point = self.at(self.length() * index as f64 / count as f64).point;
+            points.push([point.x, point.y, point.z]);
+        }
+    }
+}
+
+impl Bend {
+    /// That of one point.
+    pub(crate) fn of(jet: &Jet) -> Self {
+        Self { curvature: jet.second.norm(), third: jet.third.norm() }
+    }
+
+    /// The larger of both.
+    pub(crate) fn or(self, other: Self) -> Self {
+        Self { curvature: self.curvature.max(other.curvature), third: self.third.max(other.third) }
+    }
+
+    /// The largest constant speed within `acceleration` and `jerk`: V²κ ≤ A and V³|p‴| ≤ J.
+    pub(crate) fn speed(&self, acceleration: f64, jerk: f64) -> f64 {
+        let lateral = (acceleration / self.curvature).sqrt();
+        lateral.min(math::cbrt(jerk / self.third))
+    }
+}

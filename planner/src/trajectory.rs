@@ -1,0 +1,290 @@
+//! A job as exact functions of time: pieces of motion, the instants at which the laser changes,
+//! and those of outputs and pauses.
+//!
+//! Position, velocity and acceleration are continuous over all pieces; the jerk steps. Stream time
+//! starts with [`BEFORE`] of rest.
+
+use std::sync::Arc;
+
+use machine::kinematics::ToolMotion;
+use machine::{LaserSource, PathLimits};
+use nalgebra::Vector3;
+use signals::Nanoseconds;
+
+use crate::drawing::Power;
+use crate::itinerary::{Feed, Stop};
+use crate::outline::Outline;
+use crate::run_in::{RunIn, RunOut};
+use crate::stroke::StrokePath;
+use crate::timing::{Leg, OUTPUT_REST, Straight, Way, travel};
+
+/// Rest at the start of a stream [s], so that its first samples are at rest.
+pub const BEFORE: f64 = 2.0 * signals::time::CYCLE_TIME;
+
+/// A stretch of motion of one kind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Piece {
+    /// When it starts, stream time [s].
+    pub start: f64,
+    /// [s].
+    pub duration: f64,
+    /// What happens.
+    pub course: Course,
+    /// Line of the job file, 0 for none.
+    pub line: u64,
+    /// The stroke or dot that it marks, leads to or comes from, from 1; 0 for none.
+    pub stroke: u64,
+}
+
+/// The motion of a piece.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Course {
+    /// At rest.
+    Rest(Vector3<f64>),
+    /// Straight from rest to rest.
+    Straight(Straight),
+    /// Along a curve from rest to rest, in the dark.
+    Feed(Box<Feed>),
+    /// Into a stroke.
+    RunIn(Box<RunIn>),
+    /// Along a stroke at constant speed.
+    Stroke {
+        /// The path.
+        path: Arc<StrokePath>,
+        /// [m/s].
+        speed: f64,
+    },
+    /// Out of a stroke.
+    RunOut(Box<RunOut>),
+}
+
+/// A change of the laser.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LaserChange {
+    /// Stream time at which the source is told.
+    pub time: Nanoseconds,
+    /// Fraction of full scale from then on; 0 closes the gate.
+    pub power: f64,
+    /// The stroke that this lights, from 1; 0 with the gate closed.
+    pub stroke: u64,
+}
+
+/// A job as functions of stream time.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Trajectory {
+    /// The pieces, each starting where the one before ends; never empty.
+    pub pieces: Vec<Piece>,
+    /// Changes of the laser in order.
+    pub laser: Vec<LaserChange>,
+    /// Stream times [s] from which all outputs are as given.
+    pub outputs: Vec<(f64, u64)>,
+    /// Stream times at which to wait for a person [s].
+    pub pauses: Vec<f64>,
+}
+
+/// A stroke shorter than the laser source can switch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct TooShort {
+    pub(crate) line: u64,
+    pub(crate) duration: f64,
+}
+
+impl Trajectory {
+    /// Goes through `stops` from `start` with the strokes at `speeds`.
+    pub(crate) fn new(
+        start: Vector3<f64>,
+        stops: &[Stop],
+        limits: &PathLimits,
+        laser: &LaserSource,
+        speeds: &[f64],
+    ) -> Result<Self, TooShort> {
+        let mut before = BEFORE;
+        while before < laser.on_delay + BEFORE {
+            before += signals::time::CYCLE_TIME;
+        }
+        let mut builder = Builder {
+            trajectory: Self::default(),
+            time: before,
+            stroke: 0,
+            outputs: 0,
+            limits: *limits,
+            laser: *laser,
+            refused: None,
+        };
+        builder.trajectory.pieces.push(Piece {
+            start: 0.0,
+            duration: before,
+            course: Course::Rest(start),
+            line: 0,
+            stroke: 0,
+        });
+        travel(start, stops, limits, |stroke| speeds[stroke], |leg| builder.add(leg));
+        match builder.refused {
+            Some(refused) => Err(refused),
+            None => Ok(builder.trajectory),
+        }
+    }
+
+    /// When the last piece ends, stream time [s].
+    pub fn end(&self) -> f64 {
+        self.pieces.last().map_or(0.0, |piece| piece.start + piece.duration)
+    }
+
+    /// From the first motion to the last, or to the last dot [s].
+    pub fn duration(&self) -> f64 {
+        self.end() - self.pieces.first().map_or(0.0, |piece| piece.duration)
+    }
+
+    /// The tool's motion at `time` [s]; at rest before the start and after the end. `cursor` is the
+    /// piece to look at first: searching goes on from there in either direction.
+    pub fn at(&self, time: f64, cursor: &mut usize) -> ToolMotion {
+        let last = self.pieces.len() - 1;
+        let mut index = (*cursor).min(last);
+        while index > 0 && time < self.pieces[index].start {
+            index -= 1;
+        }
+        while index < last && time >= self.pieces[index + 1].start {
+            index += 1;
+        }
+        *cursor = index;
+        let piece = &self.pieces[index];
+        let since = time - piece.start;
+        if index == last && since >= piece.duration {
+            return rest(piece.course.at(piece.duration).position);
+        }
+        piece.course.at(since.max(0.0))
+    }
+
+    /// The piece at `time` [s].
+    pub fn piece_at(&self, time: f64) -> Option<&Piece> {
+        let after = self.pieces.partition_point(|piece| piece.start <= time);
+        self.pieces.get(after.max(1) - 1)
+    }
+}
+
+fn rest(position: Vector3<f64>) -> ToolMotion {
+    let zero = Vector3::zeros();
+    ToolMotion { position, velocity: zero, acceleration: zero, jerk: zero }
+}
+
+impl Course {
+    /// The tool's motion at `time` since the start of the piece [s].
+    pub fn at(&self, time: f64) -> ToolMotion {
+        match self {
+            Self::Rest(place) => rest(*place),
+            Self::Straight(straight) => straight.at(time),
+            Self::Feed(feed) => feed.at(time),
+            Self::RunIn(run_in) => run_in.at(time),
+            Self::Stroke { path, speed } => path.at(time * speed).motion(*speed, 0.0, 0.0),
+            Self::RunOut(run_out) => run_out.at(time),
+        }
+    }
+}
+
+/// Lays legs end to end.
+struct Builder {
+    trajectory: Trajectory,
+    time: f64,
+    stroke: u64,
+    outputs: u64,
+    limits: PathLimits,
+    laser: LaserSource,
+    refused: Option<TooShort>,
+}
+
+impl Builder {
+    fn add(&mut self, leg: Leg<'_>) {
+        let Leg { line, duration, way } = leg;
+        let start = self.time;
+        let mut stroke = 0;
+        let course = match way {
+            Way::Rest(place) => Course::Rest(place),
+            Way::Straight(straight) => Course::Straight(straight),
+            Way::Feed(feed) => Course::Feed(Box::new(feed.clone())),
+            Way::RunIn(run_in) => {
+                stroke = self.stroke + 1;
+                Course::RunIn(Box::new(run_in))
+            }
+            Way::Stroke { outline, speed } => {
+                self.stroke += 1;
+                stroke = self.stroke;
+                self.light(line, start, duration, exposures(outline, speed));
+                Course::Stroke { path: Arc::new(outline.trace(speed, &self.limits)), speed }
+            }
+            Way::RunOut(run_out) => {
+                stroke = self.stroke;
+                Course::RunOut(Box::new(run_out))
+            }
+            Way::Dot(dot) => {
+                self.stroke += 1;
+                stroke = self.stroke;
+                self.light(line, start, duration, dot.exposures.iter().copied());
+                Course::Rest(dot.at)
+            }
+            Way::Output { at, bit, on } => {
+                let mask = 1_u64.checked_shl(bit).unwrap_or(0);
+                self.outputs = if on { self.outputs | mask } else { self.outputs & !mask };
+                self.trajectory.outputs.push((start + OUTPUT_REST, self.outputs));
+                Course::Rest(at)
+            }
+            Way::Pause(place) => {
+                // One cycle before the end, so that the sample that pauses is at rest.
+                self.trajectory.pauses.push(start + duration - signals::time::CYCLE_TIME);
+                Course::Rest(place)
+            }
+        };
+        self.trajectory.pieces.push(Piece { start, duration, course, line, stroke });
+        self.time += duration;
+    }
+
+    /// Lights the stroke from `start` on with the given times and powers, dark after `duration`.
+    /// The source is told ahead of time by its own delays.
+    fn light(
+        &mut self,
+        line: u64,
+        start: f64,
+        duration: f64,
+        exposures: impl Iterator<Item = (f64, f64)>,
+    ) {
+        let LaserSource { on_delay, off_delay } = self.laser;
+        let stroke = self.stroke;
+        let on = Nanoseconds::from_seconds(start - on_delay);
+        let off = Nanoseconds::from_seconds(start + duration - off_delay);
+        let previous = self.trajectory.laser.last().map_or(Nanoseconds(0), |change| change.time);
+        if off <= on || on < previous {
+            self.refused.get_or_insert(TooShort { line, duration });
+            return;
+        }
+        let mut since = 0.0;
+        for (index, (time, power)) in exposures.enumerate() {
+            let at = if index == 0 {
+                on
+            } else {
+                Nanoseconds::from_seconds(start + since - on_delay).max(on).min(off)
+            };
+            since += time;
+            self.trajectory.laser.push(LaserChange { time: at, power, stroke });
+        }
+        self.trajectory.laser.push(LaserChange { time: off, power: 0.0, stroke: 0 });
+    }
+}
+
+/// Times and powers along a stroke at `speed`, tracks of one power put together.
+fn exposures(outline: &Outline, speed: f64) -> impl Iterator<Item = (f64, f64)> {
+    let asked = outline.speed;
+    let level = move |power: &Power| {
+        // Power that follows the speed is told for the speed that was asked for.
+        let share =
+            if power.follows_speed { asked.map_or(1.0, |asked| speed / asked) } else { 1.0 };
+        (power.level * share).min(1.0)
+    };
+    let mut exposures: Vec<(f64, f64)> = Vec::new();
+    for (track, power) in outline.tracks().iter().zip(&outline.powers) {
+        let (time, power) = (track.length() / speed, level(power));
+        match exposures.last_mut() {
+            Some((whole, same)) if *same == power => *whole += time,
+            _ => exposures.push((time, power)),
+        }
+    }
+    exposures.into_iter()
+}
