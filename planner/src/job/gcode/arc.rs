@@ -1,11 +1,11 @@
 //! Arcs of G2 and G3: from what a program writes to centre, semi-axes, sweep and rise.
 
-use core::f64::consts::{FRAC_PI_2, PI, TAU};
+use core::f64::consts::{FRAC_PI_2, PI, SQRT_2, TAU};
 
 use nalgebra::Vector3;
 use signals::math;
 
-use super::codes::{MILLIMETRE, Plane};
+use super::codes::{INCH, MILLIMETRE, Plane};
 use crate::drawing::Curve;
 
 /// Below this two points are one [m].
@@ -14,14 +14,19 @@ pub(super) const SAME_POINT: f64 = 1e-9;
 /// Below this a gap is the arithmetic's own, and a circle stays a circle [m].
 const ROUND_OFF: f64 = 1e-12;
 
-// The two radii of an arc may differ by what rounding in a file leaves. The limits are those that
-// LinuxCNC and Grbl document for G2 and G3, so a file that runs there is read here.
+// The two radii of an arc may differ by what rounding in a file leaves, as in LinuxCNC and Grbl, so
+// that a file which runs there is read here.
 /// Difference of the radii that is never accepted [m].
 const MISMATCH: f64 = 0.5e-3;
-/// Difference of the radii that is always accepted [m].
-const ROUNDING: f64 = 5e-6;
-/// Difference relative to the radius that is accepted between the two.
+/// Difference relative to the radius that is accepted up to there.
 const RELATIVE: f64 = 1e-3;
+
+/// Difference of the radii that is always accepted [m]: what centre and end leave when they are
+/// rounded to 0.01 mm or 0.001 in, in the worst direction.
+pub(super) fn rounding(unit: f64) -> f64 {
+    let last_digit = if unit == INCH { 1e-3 } else { 1e-2 };
+    2.0 * SQRT_2 * last_digit * unit
+}
 
 /// How a program says where an arc's centre is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,8 +43,8 @@ pub(super) enum Form {
 pub(super) enum NoArc {
     /// The centre is the start.
     ZeroRadius,
-    /// The radii at start and end.
-    Radii(f64, f64),
+    /// The radii at start and end, and what they may differ by.
+    Radii(f64, f64, f64),
     /// R, and half the distance between the ends.
     TooFar(f64, f64),
     /// R with both ends in one point.
@@ -56,18 +61,16 @@ impl NoArc {
                 "I, J and K lead from the start to the centre (G91.1), or are the centre (G90.1)"
                     .to_owned(),
             ),
-            Self::Radii(start, end) => (
+            Self::Radii(start, end, allowed) => (
                 format!(
                     "the arc's radius is {:.6} mm at its start and {:.6} mm at its end",
                     millimetres(start),
                     millimetres(end)
                 ),
                 format!(
-                    "they may differ by {} mm, or {} % up to {} mm: is the centre incremental \
-                     (G91.1) or absolute (G90.1)?",
-                    millimetres(ROUNDING),
-                    RELATIVE * 100.0,
-                    millimetres(MISMATCH)
+                    "they may differ by {:.3} mm: is the centre incremental (G91.1) or absolute \
+                     (G90.1)?",
+                    millimetres(allowed)
                 ),
             ),
             Self::TooFar(radius, half) => (
@@ -116,6 +119,7 @@ impl Arc {
         end: Vector3<f64>,
         form: Form,
         turns: f64,
+        rounding: f64,
     ) -> Result<Self, NoArc> {
         let [u, v, w] = axes(plane);
         let from = [start[u], start[v]];
@@ -125,15 +129,18 @@ impl Arc {
         let closed = distance < SAME_POINT;
         let mut centre = match form {
             Form::Centre(centre) => [centre[u], centre[v]],
-            Form::Radius(radius) => by_radius(counterclockwise, from, chord, distance, radius)?,
+            Form::Radius(radius) => {
+                by_radius(counterclockwise, from, chord, distance, radius, rounding)?
+            }
         };
         let (radius, end_radius) = (span(centre, from), span(centre, to));
         if radius < SAME_POINT {
             return Err(NoArc::ZeroRadius);
         }
         let mismatch = (end_radius - radius).abs();
-        if mismatch > MISMATCH || mismatch > ROUNDING && mismatch > RELATIVE * radius {
-            return Err(NoArc::Radii(radius, end_radius));
+        let allowed = rounding.max((RELATIVE * radius).min(MISMATCH));
+        if mismatch > allowed {
+            return Err(NoArc::Radii(radius, end_radius, allowed));
         }
         let first = if closed { TAU } else { angle(centre, from, to, counterclockwise) };
         let extra = TAU * (turns - 1.0);
@@ -236,13 +243,14 @@ fn by_radius(
     chord: [f64; 2],
     distance: f64,
     radius: f64,
+    rounding: f64,
 ) -> Result<[f64; 2], NoArc> {
     if distance < SAME_POINT {
         return Err(NoArc::ClosedRadius);
     }
     let half = 0.5 * distance;
     let size = radius.abs();
-    if half - size > ROUNDING.max(RELATIVE * size).min(MISMATCH) {
+    if half - size > rounding.max((RELATIVE * size).min(MISMATCH)) {
         return Err(NoArc::TooFar(size, half));
     }
     // Factored, so that a radius near half the chord keeps its digits.

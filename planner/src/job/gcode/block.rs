@@ -56,7 +56,15 @@ impl Block {
                         "a line number is the first word of its line",
                     ));
                 }
-                return whole(&word).map(|_| ());
+                if word.number < 0.0 {
+                    return Err(Refusal::new(
+                        word.span,
+                        "a line number is negative",
+                        "line number",
+                        "line numbers count from 0, or leave them out",
+                    ));
+                }
+                return Ok(());
             }
             b'F' | b'I' | b'J' | b'K' | b'P' | b'Q' | b'R' | b'S' | b'X' | b'Y' | b'Z' => {}
             b'T' => {
@@ -169,7 +177,7 @@ fn bit(letter: u8) -> u32 {
 }
 
 /// Refuses a word whose number is not 0, 1, 2 …
-pub(super) fn whole(word: &Word) -> Result<(), Box<Refusal>> {
+fn whole(word: &Word) -> Result<(), Box<Refusal>> {
     if word.number >= 0.0 && word.number.floor() == word.number {
         return Ok(());
     }

@@ -16,8 +16,6 @@ pub(super) enum Motion {
     Clockwise,
     /// G3.
     Counterclockwise,
-    /// G80.
-    Cancelled,
 }
 
 /// Group 0: in force on its own line only.
@@ -123,6 +121,8 @@ pub(super) struct Codes {
     pub(super) laser: Option<Chosen<Laser>>,
     pub(super) air_assist: Option<Chosen<bool>>,
     pub(super) stop: Option<Chosen<Stop>>,
+    /// G80. RS-274 has it in group 1, but preambles write it beside G0, and LinuxCNC allows that.
+    pub(super) cancelled: Option<Chosen<()>>,
     cutter_radius: Option<Chosen<()>>,
     tool_length: Option<Chosen<()>>,
     cycle_return: Option<Chosen<()>>,
@@ -163,7 +163,7 @@ impl Codes {
             10 => choose(&mut self.motion, Motion::Line, span, text, "motion"),
             20 => choose(&mut self.motion, Motion::Clockwise, span, text, "motion"),
             30 => choose(&mut self.motion, Motion::Counterclockwise, span, text, "motion"),
-            800 => choose(&mut self.motion, Motion::Cancelled, span, text, "motion"),
+            800 => choose(&mut self.cancelled, (), span, text, "canned cycle"),
             40 => choose(&mut self.once, Once::Dwell, span, text, "non-modal"),
             280 => choose(&mut self.once, Once::Home, span, text, "non-modal"),
             530 => choose(&mut self.once, Once::MachineFrame, span, text, "non-modal"),

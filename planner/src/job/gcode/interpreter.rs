@@ -6,7 +6,7 @@ use machine::Machine;
 use machine::process::{GcodeSettings, ZMeaning};
 use nalgebra::Vector3;
 
-use super::arc::{Arc, Form, NoArc, axes};
+use super::arc::{Arc, Form, NoArc, axes, rounding};
 use super::block::Block;
 use super::codes::{
     Chosen, FeedMode, Laser, MILLIMETRE, Motion, Once, PathControl, Plane, Reference, Stop, spell,
@@ -145,13 +145,13 @@ impl<'a> Interpreter<'a> {
             self.modal.arc_distance = chosen.code;
         }
         let motion = codes.motion.clone();
-        if let Some(chosen) = &motion {
-            self.modal.motion = Some(chosen.code);
+        if motion.is_some() || codes.cancelled.is_some() {
+            self.modal.motion = motion.as_ref().map(|chosen| chosen.code);
         }
         self.shift_or_home(block, once.as_ref(), motion.as_ref())?;
         self.motion(block, once.as_ref(), motion.as_ref())?;
         block.check_used()?;
-        self.stop(block)
+        Ok(self.stop(block))
     }
 
     /// Puts what a program left on out, and completes its facts.
@@ -163,7 +163,8 @@ impl<'a> Interpreter<'a> {
         self.tracer.facts.end = end.into();
     }
 
-    /// G93, G94, G20, G21 and F: the units of a line hold for all its numbers.
+    /// G93, G94, G20, G21 and F: as in Grbl the units of a line hold for all its numbers, where
+    /// LinuxCNC still reads an F beside G20 or G21 in the old ones.
     fn settle_feed(&mut self, block: &mut Block) -> Result<(), Box<Refusal>> {
         if let Some(chosen) = &block.codes.unit {
             self.modal.unit = chosen.code;
@@ -297,7 +298,6 @@ impl<'a> Interpreter<'a> {
             return Ok(());
         }
         if let Some(motion) = motion
-            && motion.code != Motion::Cancelled
             && block.has_axes()
         {
             return Err(Refusal::new(
@@ -371,7 +371,7 @@ impl<'a> Interpreter<'a> {
             return Ok(());
         }
         match now {
-            None | Some(Motion::Cancelled) => Ok(()),
+            None => Ok(()),
             Some(Motion::Rapid) => {
                 let to = self.target(block, frame.is_some());
                 self.note_height(to);
@@ -403,12 +403,13 @@ impl<'a> Interpreter<'a> {
         let form = self.form(block, place.clone())?;
         let turns = self.turns(block)?;
         let start = self.tracer.arc_start();
-        let arc = Arc::new(self.modal.plane, counterclockwise, start, to, form, turns).map_err(
-            |fault: NoArc| {
-                let (message, help) = fault.explain();
-                Refusal::new(place, message, "this arc", help)
-            },
-        )?;
+        let refuse = |fault: NoArc| {
+            let (message, help) = fault.explain();
+            Refusal::new(place, message, "this arc", help)
+        };
+        let Modal { plane, unit, .. } = self.modal;
+        let arc = Arc::new(plane, counterclockwise, start, to, form, turns, rounding(unit))
+            .map_err(refuse)?;
         self.note_height(to);
         if self.modal.plane != Plane::Xy && self.settings.z == ZMeaning::Ignored {
             self.remark(Remark::Height);
@@ -546,20 +547,15 @@ impl<'a> Interpreter<'a> {
         }
     }
 
-    /// M0, M1, M2, M30.
-    fn stop(&mut self, block: &Block) -> Result<bool, Box<Refusal>> {
+    /// M0, M1, M2, M30. Gives back whether the program ends.
+    fn stop(&mut self, block: &Block) -> bool {
         match block.codes.stop.as_ref().map(|chosen| chosen.code) {
-            None => Ok(false),
-            Some(Stop::Pause) => {
-                self.tracer.push(Action::Pause);
-                Ok(false)
-            }
-            Some(Stop::Optional) => {
-                self.remark(Remark::OptionalStop);
-                Ok(false)
-            }
-            Some(Stop::End) => Ok(true),
+            None => {}
+            Some(Stop::Pause) => self.tracer.push(Action::Pause),
+            Some(Stop::Optional) => self.remark(Remark::OptionalStop),
+            Some(Stop::End) => return true,
         }
+        false
     }
 }
 

@@ -184,7 +184,10 @@ impl<'a> Words<'a> {
 
     /// What stands where the number of a word was due.
     fn no_number(&self, name: char, start: usize, digits: usize) -> Box<Refusal> {
-        let wanted = format!("write a decimal number after {name}, such as {name}10 or {name}-2.5");
+        let wanted = match name {
+            'G' | 'M' => format!("write a number after {name}, such as {name}1"),
+            _ => format!("write a decimal number after {name}, such as {name}10 or {name}2.5"),
+        };
         match self.text.as_bytes()[..self.end].get(digits) {
             Some(b'#') => Refusal::new(
                 digits..digits + 1,
