@@ -113,3 +113,65 @@ impl PeriodicClock {
         late
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MILLISECOND: Nanoseconds = Nanoseconds(1_000_000);
+
+    #[test]
+    fn a_sleep_never_ends_before_its_deadline() {
+        for margin in [0, 50_000, 2_000_000] {
+            let deadline = now() + MILLISECOND;
+            sleep_then_spin_until(deadline, Nanoseconds(margin));
+            assert!(now() >= deadline, "margin {margin}");
+        }
+        sleep_until(Nanoseconds(-5));
+        sleep_until(Nanoseconds(0));
+    }
+
+    #[test]
+    fn deadlines_do_not_drift() {
+        let mut clock = PeriodicClock::new(MILLISECOND, Nanoseconds(0));
+        let start = clock.deadline();
+        for cycle in 0..20 {
+            assert_eq!(clock.cycle(), cycle);
+            assert_eq!(clock.deadline(), start + Nanoseconds(cycle as i64 * MILLISECOND.0));
+            clock.wait();
+            assert!(now() >= clock.deadline());
+            clock.advance();
+        }
+    }
+
+    #[test]
+    fn a_passed_deadline_is_an_overrun_and_no_cycle_is_left_out() {
+        let mut clock = PeriodicClock::new(MILLISECOND, Nanoseconds(0));
+        let start = clock.deadline();
+        // Five deadlines pass during the work of the first cycle.
+        clock.wait();
+        sleep_until(start + Nanoseconds(5 * MILLISECOND.0));
+        for cycle in 1..=5 {
+            let before = clock.overruns();
+            clock.advance();
+            clock.wait();
+            assert_eq!((clock.cycle(), clock.overruns()), (cycle, before + 1));
+        }
+    }
+
+    #[test]
+    fn a_slip_moves_all_later_deadlines() {
+        let mut clock = PeriodicClock::new(MILLISECOND, Nanoseconds(0));
+        let start = clock.deadline();
+        sleep_until(start + Nanoseconds(3 * MILLISECOND.0));
+        let overruns = clock.overruns();
+        let late = clock.slip();
+        assert!(late.0 >= 3 * MILLISECOND.0);
+        assert_eq!(clock.deadline(), start + late);
+        assert_eq!(clock.advance(), start + late + MILLISECOND);
+        assert_eq!((clock.cycle(), clock.overruns()), (1, overruns));
+
+        let mut early = PeriodicClock::new(Nanoseconds(1_000_000_000_000), Nanoseconds(0));
+        assert_eq!(early.slip(), Nanoseconds(0));
+    }
+}

@@ -46,3 +46,21 @@ impl<E: Copy> Clone for EventRing<E> {
         Self { queue: self.queue.clone(), dropped: self.dropped.clone() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_ring_keeps_the_first_events_and_counts_the_others() {
+        let ring = EventRing::new(3);
+        let writer = ring.clone();
+        for event in 0..5 {
+            writer.push(event);
+        }
+        assert_eq!(std::iter::from_fn(|| ring.pop()).collect::<Vec<_>>(), [0, 1, 2]);
+        assert_eq!(ring.dropped(), 2);
+        writer.push(9);
+        assert_eq!((ring.pop(), ring.pop(), ring.dropped()), (Some(9), None, 2));
+    }
+}

@@ -14,9 +14,12 @@ pub const MAX_NAME: usize = 32;
 /// Longest path of a Unix socket, its terminating zero included [bytes]; unix(7).
 const MAX_SOCKET_PATH: usize = 108;
 
-/// Room that sockets need below the root directory: iceoryx2 0.10 puts its event sockets at
-/// `events/PREFIX` (24 bytes), 40 digits and `.event_connection`.
-const SOCKET_ROOM: usize = 90 - 58;
+/// Hexadecimal digits of the hash in all names: 48 bits.
+const HASH_DIGITS: usize = 12;
+
+/// Room that the longest socket needs below the root directory [bytes]: iceoryx2 0.10 puts its
+/// event sockets at `/PREFIX`, up to 39 digits of a port's 128-bit number, `.event`.
+const SOCKET_ROOM: usize = 1 + "graver__".len() + HASH_DIGITS + 39 + ".event".len();
 
 /// Where the shared memory of every process on this computer shows as files.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
@@ -77,7 +80,7 @@ impl Instance {
         }
         let mut identity = Vec::from(base.as_os_str().as_bytes());
         identity.extend_from_slice(format!("\0{}\0{name}", user()).as_bytes());
-        let hash = format!("{:016x}", fnv1a(&identity));
+        let hash = format!("{:016x}", fnv1a(&identity))[..HASH_DIGITS].to_owned();
         let instance = Self { name: name.into(), base: base.into(), hash };
         let length = instance.root().as_os_str().len() + SOCKET_ROOM;
         if length >= MAX_SOCKET_PATH {
@@ -133,5 +136,55 @@ pub(crate) fn user() -> u32 {
     #[allow(unsafe_code)]
     unsafe {
         libc::geteuid()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn names_are_checked() {
+        for name in ["default", "a", "cell-1_b", &"x".repeat(MAX_NAME)] {
+            assert_eq!(Instance::new(name).unwrap().name(), name);
+        }
+        for name in ["", "Cell", "a b", "../a", "ä", "a/b", "a.b", &"x".repeat(MAX_NAME + 1)] {
+            let error = Instance::new(name).unwrap_err();
+            assert_eq!(error, InstanceError::Name { name: name.into() });
+        }
+    }
+
+    #[test]
+    fn no_prefix_begins_another() {
+        let base = Path::new("/dev/shm/graver-1000");
+        let names = ["a", "aa", "default", "default1", "default-1"];
+        let prefixes: Vec<_> =
+            names.iter().map(|name| Instance::below(base, name).unwrap().prefix()).collect();
+        for (index, prefix) in prefixes.iter().enumerate() {
+            assert_eq!(prefix.len(), "graver_".len() + HASH_DIGITS + 1);
+            for other in &prefixes[index + 1..] {
+                assert!(!other.starts_with(prefix.as_str()) && !prefix.starts_with(other.as_str()));
+            }
+        }
+        let elsewhere = Instance::below(Path::new("/run/user/1000/graver"), "a").unwrap();
+        assert_ne!(elsewhere.prefix(), prefixes[0]);
+    }
+
+    #[test]
+    fn the_longest_user_number_fits_and_a_deep_directory_is_refused() {
+        // unix(7): 108 bytes with the terminating zero.
+        let widest = format!("/run/user/{}/graver", u32::MAX);
+        let instance = Instance::below(Path::new(&widest), "default").unwrap();
+        assert!(instance.root().as_os_str().len() + SOCKET_ROOM < MAX_SOCKET_PATH);
+
+        let deep = PathBuf::from(format!("/{}", "d".repeat(40)));
+        match Instance::below(&deep, "default").unwrap_err() {
+            InstanceError::TooLong { directory, length, limit } => {
+                assert_eq!((directory, length, limit), (deep, 41 + 13 + SOCKET_ROOM, 107));
+            }
+            error => panic!("{error}"),
+        }
     }
 }

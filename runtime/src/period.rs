@@ -40,3 +40,18 @@ impl PeriodRecorder {
         self.dropped
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn periods_are_differences_and_a_full_recorder_counts() {
+        let mut recorder = PeriodRecorder::new(3);
+        for instant in [100, 110, 130, 131, 150, 180] {
+            recorder.record(Nanoseconds(instant));
+        }
+        assert_eq!(recorder.periods(), [Nanoseconds(10), Nanoseconds(20), Nanoseconds(1)]);
+        assert_eq!(recorder.dropped(), 2);
+    }
+}
