@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::actuator::Axis;
+use crate::document::{DocumentError, Override};
 use crate::limits::{PathLimits, WorkArea};
 use crate::mechanisms::MechanismKind;
 use crate::process::{GcodeSettings, LaserSource};
@@ -49,10 +50,18 @@ impl Machine {
     /// # Panics
     /// Never: the file is part of the build, and a test holds it to be sound.
     pub fn builtin() -> Self {
-        let text = include_str!("../../machines/corexy.toml");
-        match Self::parse("machines/corexy.toml", text, &[]) {
+        match Self::builtin_with(&[]) {
             Ok(machine) => machine,
             Err(error) => panic!("{error}"),
         }
+    }
+
+    /// The built-in machine with `overrides` laid over it.
+    ///
+    /// # Errors
+    /// Everything in the overrides that is not sound.
+    pub fn builtin_with(overrides: &[Override]) -> Result<Self, DocumentError> {
+        let text = include_str!("../../machines/corexy.toml");
+        Self::parse("machines/corexy.toml", text, overrides)
     }
 }

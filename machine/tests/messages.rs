@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use machine::document::{Document, Override};
+use machine::document::{Document, Override, Place, Position};
 use machine::{Machine, MechanismKind};
 
 const COREXY: &str = include_str!("../../machines/corexy.toml");
@@ -134,6 +134,7 @@ fn overrides_change_values_and_the_last_one_counts() {
 fn override_refused(setting: &str, expected: &str) {
     let error = Machine::parse("corexy.toml", COREXY, &set(&[setting])).unwrap_err();
     assert_eq!((error.line(), error.column()), (None, None));
+    assert_eq!(Place::of(&error), Position::default());
     assert_eq!(error.to_string(), expected);
 }
 
@@ -214,6 +215,17 @@ fn a_path_speed_beyond_the_motors_is_a_warning() {
         texts[1],
         "--set machine.path.rapid=0.5 m/s: axis `a` reaches 0.643 m/s, but a path at 0.5 m/s may \
          ask it for 0.707 m/s: jobs that do will be refused"
+    );
+}
+
+#[test]
+fn a_ringing_belt_is_a_warning() {
+    let settings = set(&["mechanism.corexy.belt.damping_ratio=0.05"]);
+    let machine = Machine::builtin_with(&settings).unwrap();
+    assert_eq!(
+        machine.warnings[2].text,
+        "--set machine.mechanism.corexy.belt.damping_ratio=0.05: a damping ratio of 0.05 lets the \
+         transmission ring: below 0.1 the feedforward at 1 kHz cannot lead it"
     );
 }
 

@@ -7,6 +7,9 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
 use super::node::Place;
 
+/// The name of a text that came with `--set`.
+pub(super) const COMMAND_LINE: &str = "--set";
+
 /// A text that values come from: the file, or one override.
 #[derive(Debug)]
 pub(crate) struct Source {
@@ -22,7 +25,7 @@ impl Source {
     }
 
     pub(crate) fn command_line(text: String) -> Self {
-        Self::new("--set", text, false)
+        Self::new(COMMAND_LINE, text, false)
     }
 
     fn new(name: &str, text: String, is_file: bool) -> Self {

@@ -30,6 +30,7 @@ mod field;
 mod findings;
 mod node;
 mod overrides;
+mod position;
 mod schema;
 mod table;
 
@@ -44,6 +45,7 @@ pub use field::{
 pub use findings::Findings;
 pub use node::{Literal, Node, Place};
 pub use overrides::{MalformedOverride, Override};
+pub use position::Position;
 pub use schema::schema_text;
 #[doc(hidden)]
 pub use schemars::{JsonSchema, Schema, SchemaGenerator};

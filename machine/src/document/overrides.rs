@@ -16,7 +16,7 @@ pub struct Override {
 }
 
 /// A setting that has no `=` or no key.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, miette::Diagnostic)]
 #[error("`{0}` is not KEY=VALUE, such as path.jerk=\"500 m/s^3\"")]
 pub struct MalformedOverride(String);
 

@@ -1,8 +1,8 @@
 //! The machine file: what its tables are (`tables`), and how they become a [`Machine`]
-//! (`validate`, `axes`, `motor_check`).
+//! (`validate`, `axes`), or are doubted (`doubts`).
 
 mod axes;
-mod motor_check;
+mod doubts;
 pub mod tables;
 mod validate;
 

@@ -104,7 +104,7 @@ table! {
         /// Torsional stiffness from gear to nut, the axial one in series; rigid when left out.
         pub stiffness: Option<Above<unit::TorsionalStiffness>>,
         /// Damping of that spring, as a share of critical damping under the carriage.
-        pub damping_ratio: Number<NonNegative> = 0.9,
+        pub damping_ratio: Number<Positive> = 0.9,
     }
 }
 
@@ -128,7 +128,7 @@ table! {
         /// Stiffness in x and in y, both belts together.
         pub stiffness: Above<unit::Stiffness>,
         /// Damping between motor and tool, as a share of critical damping in each direction.
-        pub damping_ratio: Number<NonNegative> = 0.9,
+        pub damping_ratio: Number<Positive> = 0.9,
     }
 }
 

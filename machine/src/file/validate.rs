@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 
 use super::axes::{Joint, axis};
-use super::motor_check;
+use super::doubts;
 use super::tables::{
-    AreaTable, AxisTable, CartesianTable, CoreXyTable, MachineTable, OriginsTable, ScrewTable,
+    AreaTable, AxisTable, CartesianTable, CoreXyTable, MachineTable, MechanismTable, OriginsTable,
+    ScrewTable,
 };
 use crate::document::{
-    Document, DocumentError, Findings, Located, Named, Place, Point, ProblemKind, nearest,
+    Document, DocumentError, Findings, Located, Named, Number, Place, Point, Positive, ProblemKind,
+    nearest,
 };
 use crate::limits::{PathLimits, WorkArea};
 use crate::machine::Machine;
@@ -29,11 +31,14 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let mut warnings = Vec::new();
     for (axis_table, joint) in tables.into_iter().zip(&joints) {
         let axis = axis(axis_table, joint, &mut findings);
-        warnings.extend(motor_check::check(joint.name, &axis_table.motor.dc, &findings));
+        warnings.extend(doubts::of_motor(joint.name, &axis_table.motor.dc, &findings));
         let speeds = [&table.path.speed, &table.path.rapid];
-        warnings.extend(motor_check::check_speeds(speeds, joint, &axis, &findings));
+        warnings.extend(doubts::of_speeds(speeds, joint, &axis, &findings));
         axes.push(axis);
     }
+    warnings.extend(
+        damping_ratios(&table.mechanism).filter_map(|ratio| doubts::of_damping(ratio, &findings)),
+    );
     if table.area.z.is_none() && mechanism.axes() == 3 {
         findings.contradict(
             table.area.place,
@@ -159,6 +164,17 @@ fn mechanism(
             None
         }
     }
+}
+
+/// The damping ratios of the springs that there are.
+fn damping_ratios(table: &MechanismTable) -> impl Iterator<Item = &Number<Positive>> {
+    let screws = table
+        .cartesian
+        .iter()
+        .flat_map(|cartesian| [&cartesian.x, &cartesian.y].into_iter().chain(&cartesian.z));
+    let sprung = screws.filter(|screw| screw.stiffness.is_some());
+    let belt = table.corexy.iter().flat_map(|corexy| &corexy.belt);
+    sprung.map(|screw| &screw.damping_ratio).chain(belt.map(|belt| &belt.damping_ratio))
 }
 
 fn cartesian_kind(

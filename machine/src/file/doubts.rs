@@ -1,14 +1,15 @@
-//! Motor data that contradict themselves: doubts for a person, not errors.
+//! What is sound enough to run but should be looked at: doubts for a person, not errors.
 //!
-//! Source 003's own table 3-3 promises a torque that its supply cannot drive, so the voltage limit
-//! line `R·i + k·ω ≤ V` is what counts, and nominal values are never used.
+//! Foremost motor data that contradict themselves. Source 003's own table 3-3 promises a torque
+//! that its supply cannot drive, so the voltage limit line `R·i + k·ω ≤ V` is what counts, and
+//! nominal values are never used.
 
 use core::f64::consts::TAU;
 
 use super::axes::Joint;
 use super::tables::DcMotorTable;
 use crate::actuator::Axis;
-use crate::document::{Findings, Place, Positive, Quantity};
+use crate::document::{Findings, Number, Place, Positive, Quantity};
 use crate::machine::Warning;
 use crate::quantity::Speed;
 
@@ -17,7 +18,7 @@ use crate::quantity::Speed;
 const ROUNDING: f64 = 0.02;
 
 /// Doubts about the motor of `axis`.
-pub(super) fn check(axis: &str, motor: &DcMotorTable, findings: &Findings) -> Vec<Warning> {
+pub(super) fn of_motor(axis: &str, motor: &DcMotorTable, findings: &Findings) -> Vec<Warning> {
     let voltage = motor.voltage.value;
     let resistance = motor.resistance.value;
     let constant = motor.torque_constant.value;
@@ -59,7 +60,7 @@ pub(super) fn check(axis: &str, motor: &DcMotorTable, findings: &Findings) -> Ve
 }
 
 /// Doubts about path speeds that `axis` cannot follow in every direction.
-pub(super) fn check_speeds(
+pub(super) fn of_speeds(
     speeds: [&Quantity<Speed, Positive>; 2],
     joint: &Joint,
     axis: &Axis,
@@ -80,6 +81,21 @@ pub(super) fn check_speeds(
             warning(speed.place, text, findings)
         })
         .collect()
+}
+
+/// Doubts about the damping of a spring: a spring that rings cannot be led by inverting it
+/// once a millisecond, as a pilot of both machines found.
+pub(super) fn of_damping(ratio: &Number<Positive>, findings: &Findings) -> Option<Warning> {
+    /// Share of critical damping below which the inversion fails.
+    const RINGING: f64 = 0.1;
+    (ratio.value < RINGING).then(|| {
+        let text = format!(
+            "a damping ratio of {} lets the transmission ring: below {RINGING} the feedforward \
+             at 1 kHz cannot lead it",
+            ratio.value
+        );
+        warning(ratio.place, text, findings)
+    })
 }
 
 fn warning(place: Place, text: String, findings: &Findings) -> Warning {
