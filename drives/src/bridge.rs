@@ -23,7 +23,8 @@ use signals::{
 };
 
 use crate::port::{Actuation, Freshness, Measurement, Port, Power};
-use crate::watchdog::{GatePermission, Watch, Watchdog};
+pub use crate::watchdog::GatePermission;
+use crate::watchdog::{Watch, Watchdog};
 
 /// Cycles without a single encoder count after which an axis counts as at rest: at one count
 /// (1/4096 of a turn) in 20 ms it would turn with less than 0.08 rad/s.

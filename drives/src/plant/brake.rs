@@ -6,8 +6,9 @@
 //! A speed reference ramps to zero, the position reference is its integral, and a cascade with
 //! the bandwidths of the machine file follows them: position P, velocity PI, then the current's
 //! voltage from the motor's data. It runs at every substep on the motor's own angle, speed and
-//! current, as a drive's firmware does at a rate far above the bridge's. Within one encoder count
-//! the position counts as reached, so that integral action and stiction do not hunt.
+//! current, as a drive's firmware does at a rate far above the bridge's. Where stiction stops a
+//! motor after its ramp, there it is held; within one encoder count the position counts as
+//! reached. So integral action and stiction do not hunt.
 //!
 //! Deceleration: what half the current limit gives to rotor and load seen at the shaft, leaving
 //! the other half to the loops, and never more than the axis's own limit of acceleration.
@@ -73,7 +74,9 @@ impl<const N: usize> Brake<N> {
             let change = (self.deceleration[row] * step).min(speed.abs()) * speed.signum();
             self.speed[row] = speed - change;
             self.angle[row] += (speed - 0.5 * change) * step;
-
+            if self.speed[row] == 0.0 && state.speed[row] == 0.0 {
+                self.angle[row] = state.angle[row];
+            }
             let distance = self.angle[row] - state.angle[row];
             let distance = if distance.abs() < self.resolution[row] { 0.0 } else { distance };
             let wanted = self.speed[row] + self.position_gain[row] * distance;

@@ -1,0 +1,99 @@
+//! A motor with nothing but its shaft and a constant load torque: the one-axis mechanism of the
+//! motor's own tests.
+
+use machine::kinematics::{
+    Jacobian, JointMotion, Joints, KinematicsError, Mechanism, Pose, ToolMotion,
+};
+use machine::{AxisLimits, DcMotor, Encoder, Friction, LoopGains};
+use nalgebra::{SMatrix, Vector1, Vector3};
+
+/// A rigid joint of 1 rad per radian whose load has no inertia of its own.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shaft {
+    /// Torque against positive motion [N·m].
+    pub(crate) load: f64,
+}
+
+impl Mechanism<1> for Shaft {
+    type Branch = ();
+    const NAME: &'static str = "shaft";
+
+    fn forward(&self, q: &Joints<1>, _branch: ()) -> Result<Pose, KinematicsError> {
+        Ok(Pose::at(Vector3::new(q[0], 0.0, 0.0)))
+    }
+
+    fn inverse(
+        &self,
+        pose: &Pose,
+        _branch: (),
+        _previous: &Joints<1>,
+    ) -> Result<Joints<1>, KinematicsError> {
+        Ok(Vector1::new(pose.position.x))
+    }
+
+    fn jacobian(&self, _q: &Joints<1>) -> Jacobian<1> {
+        Jacobian::<1>::from_column_slice(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    }
+
+    fn joint_motion(
+        &self,
+        tool: &ToolMotion,
+        _branch: (),
+        _previous: &Joints<1>,
+    ) -> Result<JointMotion<1>, KinematicsError> {
+        Ok(JointMotion {
+            position: Vector1::new(tool.position.x),
+            velocity: Vector1::new(tool.velocity.x),
+            acceleration: Vector1::new(tool.acceleration.x),
+            jerk: Vector1::new(tool.jerk.x),
+        })
+    }
+
+    fn mass_matrix(&self, _q: &Joints<1>) -> SMatrix<f64, 1, 1> {
+        SMatrix::zeros()
+    }
+
+    fn bias(&self, _q: &Joints<1>, _velocity: &Joints<1>) -> Joints<1> {
+        Vector1::new(self.load)
+    }
+
+    fn gravity(&self, _q: &Joints<1>) -> Joints<1> {
+        Vector1::new(self.load)
+    }
+
+    fn stiffness(&self) -> Option<SMatrix<f64, 1, 1>> {
+        None
+    }
+
+    fn damping(&self) -> SMatrix<f64, 1, 1> {
+        SMatrix::zeros()
+    }
+}
+
+/// The axis of a bare motor: EC035.120 with `inertia` [kg·m²] and `friction` at its shaft.
+pub(crate) fn axis(inertia: f64, friction: Friction) -> machine::Axis {
+    machine::Axis {
+        name: "shaft".to_owned(),
+        ratio: 1.0,
+        efficiency: 1.0,
+        motor: DcMotor {
+            resistance: 2.3,
+            inductance: 2.3e-3,
+            torque_constant: 0.021,
+            rotor_inertia: inertia,
+            voltage: 12.0,
+            current: 5.2,
+            continuous_current: None,
+        },
+        friction,
+        encoder: Encoder { counts: 4096.0 },
+        gains: LoopGains { position: 40.0, velocity: 160.0, current: 349.0, inertia },
+        limits: AxisLimits {
+            position: [-1e9, 1e9],
+            velocity: 500.0,
+            acceleration: f64::INFINITY,
+            jerk: f64::INFINITY,
+            following_error: 1.0,
+        },
+    }
+}

@@ -1,0 +1,329 @@
+//! The bridge with the plant behind it: latching, freshness, the watchdog's stops and how they
+//! are cleared, stamps and counts.
+#![allow(clippy::unwrap_used)]
+
+use drives::{
+    Bridge, BridgeOptions, Deadlines, Freshness, GatePermission, PlantOptions, SimulatedPlant,
+};
+use machine::Machine;
+use signals::feedback::status;
+use signals::laser::{GateEdge, LaserCycle, MAX_EDGES};
+use signals::{
+    Command, CommandMode, Cycle, FaultCode, Feedback, Nanoseconds, RealtimeFacts, axis::axis_array,
+};
+
+const EPOCH: u64 = 77;
+const PERIOD: i64 = 1_000_000;
+
+/// A bridge over the built-in machine, run in virtual time.
+struct Run {
+    bridge: Bridge,
+    deadline: Nanoseconds,
+}
+
+impl Run {
+    fn new(deadlines: Deadlines) -> Self {
+        let port = SimulatedPlant::new(&Machine::builtin(), PlantOptions::default()).unwrap();
+        let bridge = Bridge::new(port, BridgeOptions { epoch: EPOCH, deadlines });
+        Self { bridge, deadline: Nanoseconds(5_000_000_000) }
+    }
+
+    /// One cycle, answered by what `answer` makes of the feedback.
+    fn cycle(&mut self, answer: impl FnOnce(&Feedback) -> Option<Command>) -> Feedback {
+        let deadline = self.deadline;
+        self.deadline = deadline + Nanoseconds(PERIOD);
+        self.bridge.begin(deadline + Nanoseconds(100), deadline);
+        let feedback = *self.bridge.stamp(deadline + Nanoseconds(4_100));
+        match answer(&feedback) {
+            Some(command) => {
+                self.bridge.latch(&command, deadline + Nanoseconds(20_000));
+            }
+            None => self.bridge.miss(),
+        }
+        self.bridge.finish(deadline + Nanoseconds(21_000));
+        feedback
+    }
+
+    fn answered(&mut self, mode: CommandMode, laser: LaserCycle) -> Feedback {
+        self.cycle(|feedback| Some(command(feedback, mode, laser)))
+    }
+
+    fn missed(&mut self) -> Feedback {
+        self.cycle(|_| None)
+    }
+
+    /// The handshake, and 30 cycles under voltage in the dark.
+    fn moving() -> Self {
+        let mut run = Self::new(Deadlines::Strict);
+        run.answered(CommandMode::Disabled, LaserCycle::OFF);
+        for _ in 0..30 {
+            run.answered(CommandMode::Voltage, LaserCycle::OFF);
+        }
+        run
+    }
+
+    fn is_moving(&mut self) -> bool {
+        let before = self.missed().counts;
+        self.missed().counts != before
+    }
+}
+
+fn command(feedback: &Feedback, mode: CommandMode, laser: LaserCycle) -> Command {
+    Command {
+        epoch: feedback.epoch,
+        cycle: feedback.cycle,
+        published: feedback.published + Nanoseconds(10_000),
+        mode: mode as u32,
+        voltage: axis_array(&[4.0, -2.0]),
+        laser,
+        ..Command::default()
+    }
+}
+
+fn lit() -> LaserCycle {
+    LaserCycle { gate: 1, power: 1.0, ..LaserCycle::OFF }
+}
+
+fn facts() -> RealtimeFacts {
+    RealtimeFacts::default()
+}
+
+#[test]
+fn a_command_acts_one_cycle_after_the_feedback_it_answers() {
+    let mut run = Run::new(Deadlines::Strict);
+    let first = run.answered(CommandMode::Disabled, LaserCycle::OFF);
+    assert_eq!((first.epoch, first.cycle, first.command_received.0), (EPOCH, Cycle(0), 0));
+    assert_eq!(first.exchange, Nanoseconds(4_000));
+    let second = run.answered(CommandMode::Voltage, lit());
+    assert_eq!(second.command_cycle, Cycle(0));
+    assert!(!second.has(status::POWERED));
+    let third = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+    // In force since the third deadline, so nothing has been fired yet.
+    assert_eq!(third.command_cycle, Cycle(1));
+    assert_eq!(third.command_received, second.deadline + Nanoseconds(20_000));
+    assert_eq!(third.command_published, second.published + Nanoseconds(10_000));
+    assert_eq!(third.command_applied, third.deadline + Nanoseconds(100));
+    assert!(third.has(status::POWERED) && !third.laser.is_lit());
+    let fourth = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+    assert_eq!(fourth.laser, lit());
+    assert!(!run.answered(CommandMode::Voltage, LaserCycle::OFF).laser.is_lit());
+    assert_eq!(run.bridge.report(facts()).gate_trips, 0);
+}
+
+#[test]
+fn velocity_is_the_difference_of_positions_over_a_cycle() {
+    let mut run = Run::moving();
+    let before = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+    let after = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+    for axis in 0..2 {
+        assert_eq!(after.velocity[axis], (after.position[axis] - before.position[axis]) / 1e-3);
+        assert!(after.velocity[axis].abs() > 1.0);
+    }
+    assert_eq!(after.velocity[2..], [0.0; 6]);
+}
+
+#[test]
+fn the_first_stale_cycle_is_dark_for_every_pattern_of_edges() {
+    // Every subset of eight instants at which the gate may change, from either state.
+    let mut run = Run::moving();
+    let mut trips = 0;
+    for bits in 0..512_u32 {
+        let mut laser = LaserCycle { gate: bits & 1, power: 1.0, ..LaserCycle::OFF };
+        let mut gate = laser.gate;
+        for slot in 0..8 {
+            if bits >> (slot + 1) & 1 != 0 {
+                gate = 1 - gate;
+                assert!(laser.push(GateEdge { offset: slot * 120_000, gate, power: 1.0 }));
+            }
+        }
+        run.answered(CommandMode::Voltage, laser);
+        // In force from here; the answer is lost.
+        run.missed();
+        let stale = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+        assert_eq!(stale.laser, laser, "{bits:#b}");
+        assert!(stale.has(status::COMMAND_MISSED));
+        let after = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+        assert!(!after.laser.is_lit(), "{bits:#b}: {:?}", after.laser);
+        assert!(!after.has(status::COMMAND_MISSED) && !after.has(status::STOPPED_ALONE));
+        trips += u64::from(laser.last().0 != 0);
+        assert_eq!(run.bridge.report(facts()).gate_trips, trips, "{bits:#b}");
+    }
+    assert_eq!(run.bridge.report(facts()).missed, 512);
+    const { assert!(MAX_EDGES >= 8) };
+}
+
+#[test]
+fn commands_of_another_cycle_or_epoch_are_stale() {
+    let mut run = Run::moving();
+    let feedback = *run.bridge.feedback();
+    let good = command(&feedback, CommandMode::Voltage, lit());
+    for stale in [
+        Command { cycle: Cycle(feedback.cycle.0 - 1), ..good },
+        Command { cycle: feedback.cycle.next(), ..good },
+        Command { epoch: EPOCH + 1, ..good },
+    ] {
+        assert_eq!(run.bridge.latch(&stale, feedback.published), Freshness::Stale);
+    }
+    assert_eq!(run.bridge.latch(&good, feedback.published), Freshness::Fresh);
+    run.bridge.miss();
+    let stale = Command { epoch: EPOCH + 1, ..good };
+    let next = run.cycle(|_| Some(stale));
+    assert!(next.has(status::COMMAND_MISSED));
+    assert!(run.missed().has(status::COMMAND_MISSED));
+}
+
+#[test]
+fn three_misses_stop_the_axes_until_a_reset_and_a_new_start() {
+    let mut run = Run::moving();
+    run.missed();
+    for expected in [false, false, true] {
+        let feedback = run.missed();
+        assert!(feedback.has(status::COMMAND_MISSED));
+        assert_eq!(feedback.has(status::STOPPED_ALONE), expected);
+    }
+    let fault = run.bridge.feedback().fault;
+    assert_eq!((fault.code(), fault.value, fault.limit), (FaultCode::StaleCommand, 3.0, 3.0));
+    for _ in 0..300 {
+        run.missed();
+    }
+    assert!(!run.is_moving());
+    let report = run.bridge.report(facts());
+    assert_eq!((report.stops, report.at_rest, report.lit), (1, 1, 0));
+
+    // Neither commands, nor disabling, nor a restarted controller that knows of no reset.
+    for mode in [CommandMode::Voltage, CommandMode::Disabled, CommandMode::Voltage] {
+        let feedback = run.answered(mode, lit());
+        assert!(feedback.has(status::STOPPED_ALONE) && !feedback.laser.is_lit());
+    }
+    let reset = |run: &mut Run, mode, reset| {
+        run.cycle(|feedback| Some(Command { reset, ..command(feedback, mode, lit()) }))
+    };
+    // A reset while it still asks for voltage does not start it.
+    reset(&mut run, CommandMode::Voltage, 9);
+    assert!(reset(&mut run, CommandMode::Voltage, 9).has(status::STOPPED_ALONE));
+    reset(&mut run, CommandMode::Disabled, 9);
+    let cleared = reset(&mut run, CommandMode::Voltage, 9);
+    assert!(!cleared.has(status::STOPPED_ALONE) && !cleared.fault.is_some());
+    assert!(reset(&mut run, CommandMode::Voltage, 9).has(status::POWERED));
+    assert!(reset(&mut run, CommandMode::Voltage, 9).laser.is_lit());
+
+    // The same ticket does not clear the next stop.
+    for _ in 0..300 {
+        run.missed();
+    }
+    reset(&mut run, CommandMode::Disabled, 9);
+    assert!(reset(&mut run, CommandMode::Disabled, 9).has(status::STOPPED_ALONE));
+    assert_eq!(run.bridge.report(facts()).stops, 2);
+}
+
+#[test]
+fn power_needs_a_command_that_starts_from_disabled() {
+    let mut run = Run::new(Deadlines::Strict);
+    run.answered(CommandMode::Voltage, lit());
+    let refused = run.answered(CommandMode::Voltage, lit());
+    assert!(refused.has(status::STOPPED_ALONE) && !refused.has(status::POWERED));
+    assert!(!run.answered(CommandMode::Voltage, lit()).laser.is_lit());
+}
+
+#[test]
+fn a_controller_that_leaves_unpowered_stops_nothing() {
+    let mut run = Run::new(Deadlines::Strict);
+    for _ in 0..10 {
+        run.missed();
+    }
+    assert_eq!(run.bridge.feedback().missed, 0);
+    run.answered(CommandMode::Disabled, LaserCycle::OFF);
+    for _ in 0..10 {
+        run.missed();
+    }
+    let feedback = run.missed();
+    assert!(!feedback.fault.is_some() && !feedback.has(status::STOPPED_ALONE));
+    assert_eq!(feedback.missed, 3);
+}
+
+#[test]
+fn a_command_that_makes_no_sense_stops_at_once() {
+    for number in [f64::NAN, f64::INFINITY] {
+        let mut run = Run::moving();
+        run.answered(CommandMode::Voltage, lit());
+        run.cycle(|feedback| {
+            let good = command(feedback, CommandMode::Voltage, lit());
+            Some(Command { voltage: axis_array(&[1.0, number]), ..good })
+        });
+        let feedback = run.answered(CommandMode::Voltage, lit());
+        assert_eq!((feedback.fault.code(), feedback.fault.axis), (FaultCode::NotFinite, 2));
+        assert!(feedback.has(status::STOPPED_ALONE));
+        assert!(!run.answered(CommandMode::Voltage, lit()).laser.is_lit());
+        assert_eq!(run.bridge.report(facts()).gate_trips, 1);
+        for _ in 0..300 {
+            run.answered(CommandMode::Voltage, lit());
+        }
+        assert!(!run.is_moving());
+    }
+}
+
+#[test]
+fn a_mode_without_drive_stops_with_the_ports_fault() {
+    let mut run = Run::moving();
+    run.answered(CommandMode::Position, lit());
+    let feedback = run.answered(CommandMode::Voltage, lit());
+    assert_eq!(feedback.fault.code(), FaultCode::DriveFault);
+    assert_eq!(feedback.fault.value, f64::from(CommandMode::Position as u32));
+    assert_eq!(feedback.fault.at, feedback.measured);
+    assert!(!run.answered(CommandMode::Voltage, lit()).laser.is_lit());
+    assert!(run.bridge.feedback().has(status::STOPPED_ALONE));
+}
+
+#[test]
+fn a_dead_peer_closes_the_gate_and_leaves_the_axes_to_the_controller() {
+    let mut run = Run::moving();
+    run.answered(CommandMode::Voltage, lit());
+    run.answered(CommandMode::Voltage, lit());
+    run.bridge.permit(GatePermission::Inhibited);
+    // At this deadline the gate closes, though a fresh command asks for light.
+    let feedback = run.answered(CommandMode::Voltage, lit());
+    assert!(feedback.laser.is_lit() && feedback.has(status::GATE_INHIBITED));
+    for _ in 0..5 {
+        let feedback = run.answered(CommandMode::Voltage, lit());
+        assert!(!feedback.laser.is_lit() && !feedback.has(status::STOPPED_ALONE));
+    }
+    assert_eq!(run.bridge.report(facts()).gate_trips, 1);
+    assert_eq!(run.bridge.feedback().missed, 0);
+}
+
+#[test]
+fn a_stop_from_outside_overrides_a_fresh_command() {
+    let mut run = Run::moving();
+    run.answered(CommandMode::Voltage, lit());
+    let now = run.deadline;
+    run.bridge.stop(FaultCode::ControllerLost, now);
+    let feedback = run.missed();
+    assert_eq!(feedback.fault.code(), FaultCode::ControllerLost);
+    assert!(!run.missed().laser.is_lit());
+    // The first cause stays.
+    run.bridge.stop(FaultCode::SupervisorLost, now);
+    assert_eq!(run.missed().fault.code(), FaultCode::ControllerLost);
+}
+
+#[test]
+fn overruns_and_slips_are_counted_once() {
+    for (deadlines, slips, skipped) in [(Deadlines::Slipping, 1, 1), (Deadlines::Strict, 0, 4)] {
+        let mut run = Run::new(deadlines);
+        let feedback = run.answered(CommandMode::Disabled, LaserCycle::OFF);
+        assert_eq!(feedback.has(status::SLIPPING), deadlines == Deadlines::Slipping);
+        // Late by the work, then the clock goes on four periods later.
+        let start = run.deadline;
+        run.bridge.begin(start, start);
+        run.bridge.finish(start + Nanoseconds(PERIOD + 1));
+        assert_eq!(run.bridge.feedback().overruns, 1);
+        run.bridge.begin(start + Nanoseconds(5 * PERIOD), start + Nanoseconds(5 * PERIOD));
+        assert_eq!(run.bridge.feedback().overruns, skipped);
+        assert_eq!(run.bridge.report(facts()).slips, slips);
+        // A jump that no late work announced counts too.
+        run.bridge.finish(start + Nanoseconds(5 * PERIOD + 10));
+        let next = start + Nanoseconds(6 * PERIOD + 5);
+        run.bridge.begin(next, next);
+        assert_eq!(run.bridge.feedback().overruns, skipped + 1);
+        assert_eq!(run.bridge.feedback().cycle, Cycle(3));
+    }
+}
