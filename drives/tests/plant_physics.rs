@@ -188,7 +188,8 @@ fn a_sliding_rotor_stops_where_and_when_friction_says() {
     let (inertia, coulomb, speed) = (2e-6, 5e-3, 97.3);
     let axis = shaft::axis(inertia, Friction { coulomb, viscous: 0.0 });
     let mut dynamics =
-        Dynamics::new(Shaft { load: 0.0 }, Motors::of(&[axis]), &Vector1::zeros()).unwrap();
+        Dynamics::new(Shaft { load: 0.0, spread: 0.0 }, Motors::of(&[axis]), &Vector1::zeros())
+            .unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let zero = Vector1::zeros();
     let mut state = State {
@@ -211,6 +212,27 @@ fn a_sliding_rotor_stops_where_and_when_friction_says() {
     }
     let distance = speed * speed * inertia / (2.0 * coulomb);
     assert!((state.angle[0] / distance - 1.0).abs() < 1e-12, "{} {distance}", state.angle[0]);
+}
+
+#[test]
+fn an_inertia_that_grows_slows_the_shaft_by_its_energy() {
+    let (rotor, spread, speed) = (2e-6, 5e-6, 40.0);
+    let axis = shaft::axis(rotor, SMOOTH);
+    let mut dynamics =
+        Dynamics::new(Shaft { load: 0.0, spread }, Motors::of(&[axis]), &Vector1::zeros()).unwrap();
+    let weights = dynamics.motors().windings.weights(SUBSTEP);
+    let zero = Vector1::zeros();
+    let start = Vector1::new(speed);
+    let mut state =
+        State { current: zero, angle: zero, speed: start, load: zero, load_speed: start };
+    for _ in 0..10_000 {
+        state = friction::advance(&mut dynamics, &state, &Phases::Open, &weights);
+    }
+    let angle = state.angle[0];
+    assert!(angle > 2.0, "{angle}");
+    let inertia = |angle: f64| rotor + spread * (1.0 + angle * angle);
+    let exact = speed * (inertia(0.0) / inertia(angle)).sqrt();
+    assert!((state.speed[0] / exact - 1.0).abs() < 1e-9, "{} {exact}", state.speed[0]);
 }
 
 #[test]

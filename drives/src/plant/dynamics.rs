@@ -71,11 +71,11 @@ impl<const N: usize> Motors<N> {
     pub fn of(axes: &[Axis; N]) -> Self {
         let each = |value: fn(&Axis) -> f64| SVector::from_fn(|row, _| value(&axes[row]));
         Self {
-            windings: Windings {
-                resistance: each(|axis| axis.motor.resistance),
-                inductance: each(|axis| axis.motor.inductance),
-                torque_constant: each(|axis| axis.motor.torque_constant),
-            },
+            windings: Windings::new(
+                each(|axis| axis.motor.resistance),
+                each(|axis| axis.motor.inductance),
+                each(|axis| axis.motor.torque_constant),
+            ),
             inertia: each(|axis| axis.motor.rotor_inertia),
             coulomb: each(|axis| axis.friction.coulomb),
             viscous: each(|axis| axis.friction.viscous),
@@ -108,6 +108,20 @@ pub struct Dynamics<const N: usize, M> {
     motors: Motors<N>,
     transmission: Transmission<N>,
     inertia: Inertia<N>,
+    constancy: Constancy,
+    /// 1/J of each rotor.
+    mobility: SVector<f64, N>,
+    /// ratio/J of each rotor.
+    reaction: SVector<f64, N>,
+}
+
+/// Whether the inertia has changed since the step before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Constancy {
+    /// It has not, so it is taken as it is for the whole step.
+    Steady,
+    /// It has: every stage of the step evaluates it.
+    Varying,
 }
 
 impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
@@ -125,7 +139,16 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             matrix += rotors(&motors);
         }
         let inverse = matrix.try_inverse().ok_or(PlantError::SingularMass)?;
-        Ok(Self { mechanism, motors, transmission, inertia: Inertia { matrix, inverse } })
+        let mobility = motors.inertia.map(|inertia| 1.0 / inertia);
+        Ok(Self {
+            mechanism,
+            motors,
+            transmission,
+            inertia: Inertia { matrix, inverse },
+            constancy: Constancy::Steady,
+            mobility,
+            reaction: motors.ratio.component_mul(&mobility),
+        })
     }
 
     /// The mechanism.
@@ -187,6 +210,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     }
 
     /// Effort that the transmission puts on the joints [N or N·m]; zero when it is rigid.
+    #[inline(always)]
     pub fn transmitted(&self, state: &State<N>) -> Joints<N> {
         match &self.transmission {
             Transmission::Rigid => Joints::zeros(),
@@ -199,6 +223,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     }
 
     /// Accelerations of motors [rad/s²] and load [m/s² or rad/s²].
+    #[inline(always)] // Four calls a step through memory cost as much as the arithmetic.
     fn accelerations(
         &mut self,
         state: &State<N>,
@@ -212,17 +237,21 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         match self.transmission {
             Transmission::Elastic { .. } => {
                 let effort = self.transmitted(state);
-                let motor = (torque - motors.ratio.component_mul(&effort))
-                    .component_div(&motors.inertia)
-                    .component_mul(contacts.free());
-                self.refresh(&state.load);
+                let motor = (self.mobility.component_mul(&torque)
+                    - self.reaction.component_mul(&effort))
+                .component_mul(contacts.free());
+                if self.constancy == Constancy::Varying {
+                    self.refresh(&state.load);
+                }
                 (motor, self.inertia.inverse * (effort - bias))
             }
             Transmission::Rigid => {
                 let push =
                     (torque.component_div(&motors.ratio) - bias).component_mul(contacts.free());
                 let ratio = motors.ratio;
-                self.refresh(&state.load);
+                if self.constancy == Constancy::Varying {
+                    self.refresh(&state.load);
+                }
                 let load = if contacts.any_held() {
                     self.partly_held(&push, contacts.free())
                 } else {
@@ -245,16 +274,18 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
 
     /// Follows a mass matrix that depends on the position. One that cannot be inverted, at a
     /// singular position, leaves the last good one in force.
-    fn refresh(&mut self, load: &Joints<N>) {
+    fn refresh(&mut self, load: &Joints<N>) -> Constancy {
         let mut matrix = self.mechanism.mass_matrix(load);
         if self.transmission == Transmission::Rigid {
             matrix += rotors(&self.motors);
         }
-        if matrix != self.inertia.matrix
-            && let Some(inverse) = matrix.try_inverse()
-        {
+        if matrix == self.inertia.matrix {
+            return Constancy::Steady;
+        }
+        if let Some(inverse) = matrix.try_inverse() {
             self.inertia = Inertia { matrix, inverse };
         }
+        Constancy::Varying
     }
 
     /// Where `start` is after one step of the length of `weights`.
@@ -282,6 +313,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
              speed: &SVector<f64, N>| {
                 course.as_ref().map_or_else(SVector::zeros, |course| value(course, weights, speed))
             };
+        self.constancy = self.refresh(&start.load);
         let mut first = *start;
         if course.is_none() {
             first.current = SVector::zeros();

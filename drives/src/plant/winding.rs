@@ -23,6 +23,10 @@ pub struct Windings<const N: usize> {
     pub inductance: SVector<f64, N>,
     /// [N·m/A] and [V·s/rad].
     pub torque_constant: SVector<f64, N>,
+    /// 1/R [S].
+    conductance: SVector<f64, N>,
+    /// k/R, current per speed [A·s/rad].
+    back: SVector<f64, N>,
 }
 
 /// The weights of a step of one length.
@@ -53,6 +57,17 @@ pub struct Course<const N: usize> {
 }
 
 impl<const N: usize> Windings<N> {
+    /// Windings of `resistance` [Ω], `inductance` [H] and `torque_constant` [N·m/A].
+    pub fn new(
+        resistance: SVector<f64, N>,
+        inductance: SVector<f64, N>,
+        torque_constant: SVector<f64, N>,
+    ) -> Self {
+        let conductance = resistance.map(|resistance| 1.0 / resistance);
+        let back = torque_constant.component_mul(&conductance);
+        Self { resistance, inductance, torque_constant, conductance, back }
+    }
+
     /// The weights for steps of `step` [s].
     pub fn weights(&self, step: f64) -> Weights<N> {
         let rate = self.resistance.component_div(&self.inductance) * step;
@@ -73,14 +88,8 @@ impl<const N: usize> Windings<N> {
         speed: &SVector<f64, N>,
         voltage: &SVector<f64, N>,
     ) -> Course<N> {
-        let settled =
-            (voltage - self.torque_constant.component_mul(speed)).component_div(&self.resistance);
-        Course {
-            speed: *speed,
-            settled,
-            excess: current - settled,
-            back: self.torque_constant.component_div(&self.resistance),
-        }
+        let settled = self.conductance.component_mul(voltage) - self.back.component_mul(speed);
+        Course { speed: *speed, settled, excess: current - settled, back: self.back }
     }
 }
 
@@ -145,11 +154,7 @@ mod tests {
     use nalgebra::Vector1;
 
     fn winding(time_constant: f64) -> Windings<1> {
-        Windings {
-            resistance: Vector1::new(2.3),
-            inductance: Vector1::new(2.3 * time_constant),
-            torque_constant: Vector1::new(0.021),
-        }
+        Windings::new(Vector1::new(2.3), Vector1::new(2.3 * time_constant), Vector1::new(0.021))
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! A motor with nothing but its shaft and a constant load torque: the one-axis mechanism of the
-//! motor's own tests.
+//! A motor with nothing but its shaft, a load torque and perhaps an arm: the one-axis mechanism of
+//! the motor's own tests.
 
 use machine::kinematics::{
     Jacobian, JointMotion, Joints, KinematicsError, Mechanism, Pose, ToolMotion,
@@ -7,11 +7,13 @@ use machine::kinematics::{
 use machine::{AxisLimits, DcMotor, Encoder, Friction, LoopGains};
 use nalgebra::{SMatrix, Vector1, Vector3};
 
-/// A rigid joint of 1 rad per radian whose load has no inertia of its own.
+/// A rigid joint of 1 rad per radian.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shaft {
     /// Torque against positive motion [N·m].
     pub(crate) load: f64,
+    /// Inertia that grows as the shaft turns, `spread·(1 + q²)` [kg·m²]: an arm that reaches out.
+    pub(crate) spread: f64,
 }
 
 impl Mechanism<1> for Shaft {
@@ -49,12 +51,13 @@ impl Mechanism<1> for Shaft {
         })
     }
 
-    fn mass_matrix(&self, _q: &Joints<1>) -> SMatrix<f64, 1, 1> {
-        SMatrix::zeros()
+    fn mass_matrix(&self, q: &Joints<1>) -> SMatrix<f64, 1, 1> {
+        SMatrix::from_element(self.spread * (1.0 + q[0] * q[0]))
     }
 
-    fn bias(&self, _q: &Joints<1>, _velocity: &Joints<1>) -> Joints<1> {
-        Vector1::new(self.load)
+    fn bias(&self, q: &Joints<1>, velocity: &Joints<1>) -> Joints<1> {
+        // Lagrange: ½·dM/dq·q̇².
+        Vector1::new(self.load + self.spread * q[0] * velocity[0] * velocity[0])
     }
 
     fn gravity(&self, _q: &Joints<1>) -> Joints<1> {
