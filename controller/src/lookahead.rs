@@ -13,6 +13,9 @@ pub const CAPACITY: usize = 2048;
 /// starts 232 before the point where the gate was closed.
 pub const HISTORY: usize = 640;
 
+/// Lead below which a transmission counts as relaxed [m or rad]: a tenth of any encoder count.
+const RELAXED: f64 = 1e-7;
+
 /// Setpoints that share one summary.
 const BLOCK: usize = 64;
 
@@ -162,6 +165,16 @@ impl Lookahead {
     /// Whether there may be light between `from` and `to`, or up to a block outside.
     pub fn may_be_lit(&self, from: StreamTime, to: StreamTime) -> bool {
         self.blocks(from, to).any(|block| block.lit)
+    }
+
+    /// Whether the stream itself is at rest at `time`, its transmissions relaxed.
+    pub fn is_resting(&self, time: StreamTime) -> bool {
+        let sequence = time.sequence();
+        [sequence, sequence + 1].map(|sequence| self.setpoint(sequence)).iter().all(|setpoint| {
+            let motion = setpoint.velocity.iter().chain(&setpoint.acceleration);
+            motion.chain(&setpoint.jerk).all(|value| *value == 0.0)
+                && setpoint.lead.iter().all(|lead| lead.abs() < RELAXED)
+        })
     }
 
     fn blocks(&self, from: StreamTime, to: StreamTime) -> impl Iterator<Item = &Block> {

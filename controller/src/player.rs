@@ -7,8 +7,8 @@
 //! once, the rate up to `after`.
 //!
 //! A hold closes the gate at `next` and brakes. The point where it closed stays the boundary of
-//! the dark: a resume goes back far enough to be at full rate there again, and lights exactly
-//! there. What was not lit anyway is not played again.
+//! the dark. A resume goes back far enough to be at full rate again where light was first left
+//! out, and lights exactly there. Where none was left out, nothing is played again.
 
 use crate::gate::{self, Stretch};
 use crate::lookahead::Lookahead;
@@ -82,9 +82,9 @@ pub struct Player {
     /// Whether the stretch from `next` to `after` may be lit.
     marking: bool,
     dark_until: StreamTime,
-    /// Whether light beyond `dark_until` was left out.
-    owes_light: bool,
-    /// Whether the stream itself is at rest here, so that the rate may jump.
+    /// Where light beyond `dark_until` was first left out.
+    owes_light_from: Option<StreamTime>,
+    /// Whether the stream promises to be at rest here: its start, or a pause.
     at_planned_rest: bool,
     /// Pauses below this sequence number have been kept.
     paused_until: u64,
@@ -102,7 +102,7 @@ impl Player {
             activity: Activity::Resting,
             marking: false,
             dark_until: StreamTime::default(),
-            owes_light: false,
+            owes_light_from: None,
             at_planned_rest: true,
             paused_until: 0,
             wanted: Rate::ONE,
@@ -162,7 +162,7 @@ impl Player {
                 // `after` is what the coming `advance` makes `next`.
                 if self.after.time >= self.dark_until {
                     self.dark_until = self.after.time;
-                    self.owes_light = false;
+                    self.owes_light_from = None;
                 }
                 self.activity = Activity::Braking;
             }
@@ -180,23 +180,24 @@ impl Player {
         let here = self.after.time;
         let rate = self.rate_allowed(lookahead, here);
         let start = Ramp::starting_distance(rate, Slew::STOP) + STEADY;
-        let steady_from = if self.owes_light {
-            Some(self.dark_until)
-        } else if !self.at_planned_rest && lookahead.may_be_lit(here, here + start) {
-            Some(here)
-        } else {
-            None
-        };
-        let oldest = lookahead.beginning();
-        self.activity = match steady_from.map(|light| (light - start).max(oldest)) {
-            Some(back) if back < here => Activity::Rewinding(back),
-            None if self.at_planned_rest => {
-                self.ramp.jump(rate);
-                Activity::Playing(Slew::OVERRIDE)
-            }
-            _ => Activity::Playing(Slew::STOP),
-        };
+        let resting = self.at_planned_rest || lookahead.is_resting(here);
+        let light_ahead = !resting && lookahead.may_be_lit(here, here + start);
+        let light_from = self.owes_light_from.or(light_ahead.then_some(here));
+        match light_from.map(|light| light - start) {
+            Some(back) if back < here => self.activity = Activity::Rewinding(back),
+            _ => self.set_off(lookahead, resting),
+        }
         self.at_planned_rest = false;
+    }
+
+    /// From rest forward: where the stream rests too, the rate may jump.
+    fn set_off(&mut self, lookahead: &Lookahead, resting: bool) {
+        self.activity = if resting {
+            self.ramp.jump(self.rate_allowed(lookahead, self.after.time));
+            Activity::Playing(Slew::OVERRIDE)
+        } else {
+            Activity::Playing(Slew::STOP)
+        };
     }
 
     /// Goes on by one cycle.
@@ -242,7 +243,15 @@ impl Player {
         let time = from + self.ramp.advance(rate);
         let reached = self.ramp.rate();
         self.after = Instant { time, rate: reached, rate_change: self.rate_change(reached) };
-        if let Some(found) = self.planned_rest(lookahead) {
+        if time < StreamTime::default() {
+            // Back at the first setpoint, where the stream rests.
+            self.stop_at(StreamTime::default());
+            if self.activity == Activity::Braking {
+                self.activity = Activity::Resting;
+            } else {
+                self.set_off(lookahead, true);
+            }
+        } else if let Some(found) = self.planned_rest(lookahead) {
             // A planned rest on the way is as good a place to stop as any.
             let playing = matches!(self.activity, Activity::Playing(_));
             self.activity = Activity::Resting;
@@ -251,11 +260,13 @@ impl Player {
                 event = found;
             }
         } else if self.ramp.is_still() {
-            self.activity = match self.activity {
-                Activity::Turning => Activity::Playing(Slew::STOP),
-                Activity::Braking => Activity::Resting,
-                other => other,
-            };
+            match self.activity {
+                Activity::Turning => {
+                    self.set_off(lookahead, lookahead.is_resting(self.after.time));
+                }
+                Activity::Braking => self.activity = Activity::Resting,
+                _ => {}
+            }
         }
         event
     }
@@ -267,7 +278,9 @@ impl Player {
         if self.marking {
             return cycle;
         }
-        self.owes_light |= cycle.is_lit();
+        if cycle.is_lit() && self.owes_light_from.is_none() {
+            self.owes_light_from = Some(stretch.from.max(self.dark_until));
+        }
         LaserCycle::OFF
     }
 
@@ -285,13 +298,17 @@ impl Player {
             let ends = lookahead.is_complete() && StreamTime::of(sequence) >= lookahead.end();
             if pauses || ends {
                 self.paused_until = sequence + 1;
-                self.ramp.jump(Rate::ZERO);
-                let time = StreamTime::of(sequence);
-                self.after = Instant { time, rate: 0.0, rate_change: 0.0 };
+                self.stop_at(StreamTime::of(sequence));
                 return Some(if ends { Event::Ended } else { Event::Paused });
             }
         }
         None
+    }
+
+    /// Rests at `time` at once; only where the stream rests.
+    fn stop_at(&mut self, time: StreamTime) {
+        self.ramp.jump(Rate::ZERO);
+        self.after = Instant { time, rate: 0.0, rate_change: 0.0 };
     }
 
     fn rate_change(&self, reached: f64) -> f64 {

@@ -58,9 +58,11 @@ impl Finding {
         finding
     }
 
-    /// The same, found at `now`.
+    /// The same, found at `now` unless somebody found it before.
     pub fn at(mut self, now: Nanoseconds) -> Self {
-        self.fault.at = now;
+        if self.fault.at == Nanoseconds(0) {
+            self.fault.at = now;
+        }
         self
     }
 }

@@ -1,0 +1,230 @@
+//! Any doubt: dark with the very next command, then to rest, then latched until a reset.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use controller::Presence;
+use machine::Machine;
+use signals::feedback::status;
+use signals::{
+    CommandMode, ControllerState, Fault, FaultCode, Feedback, Nanoseconds, OperatorVerb, Setpoint,
+};
+use support::{Bench, Job, two_marks};
+
+/// In the middle of the first mark, lit.
+fn marking(machine: &Machine, job: &Job) -> Bench {
+    let mut bench = Bench::enabled(machine);
+    assert!(bench.ask(Some(job), OperatorVerb::Start, 1.0));
+    while !bench.last().command.laser.is_lit() {
+        bench.run(Some(job), 1);
+    }
+    bench.run(Some(job), 30);
+    assert!(bench.last().command.laser.is_lit());
+    bench
+}
+
+/// After one cycle with `spoil`: dark at once, then at rest and latched with `code`.
+fn check(code: FaultCode, axis: u32, mode: CommandMode, spoil: impl Fn(&mut Feedback) + Copy) {
+    let machine = Machine::builtin();
+    let job = two_marks(&machine, 0.25, 0.5);
+    let mut bench = marking(&machine, &job);
+    bench.cycle(Some(&job), None, spoil);
+    let command = bench.last().command;
+    assert!(!command.laser.is_lit(), "{code:?}: lit in the very next command");
+    assert_eq!((command.fault.code(), command.fault.axis), (code, axis));
+    assert_eq!((command.state(), command.mode()), (ControllerState::Stopping, mode), "{code:?}");
+    settle(&mut bench, &job, code);
+}
+
+/// Faulted in good time and latched; a reset and an enable later idle again.
+fn settle(bench: &mut Bench, job: &Job, code: FaultCode) {
+    bench.until(Some(job), ControllerState::Faulted, 1100);
+    for _ in 0..50 {
+        bench.run(Some(job), 1);
+        let command = bench.last().command;
+        assert_eq!((command.mode(), command.fault.code()), (CommandMode::Disabled, code));
+        assert!(!command.laser.is_lit() && command.voltage.iter().all(|voltage| *voltage == 0.0));
+    }
+    let report = bench.reports.last().unwrap();
+    assert_eq!((report.is_final, report.completed, report.fault.code()), (1, 0, code));
+    for verb in [OperatorVerb::Enable, OperatorVerb::Start, OperatorVerb::Resume] {
+        assert!(!bench.ask(Some(job), verb, 2.0), "{code:?}: {verb:?} without a reset");
+    }
+    bench.peers = controller::Peers::default();
+    assert!(bench.ask(Some(job), OperatorVerb::Reset, 0.0));
+    assert!(!bench.last().command.fault.is_some());
+    assert!(bench.last().command.reset > 0);
+    assert!(bench.ask(None, OperatorVerb::Enable, 0.0));
+    bench.until(None, ControllerState::Idle, 60);
+    assert!(!bench.ask(None, OperatorVerb::Start, 1.0), "{code:?}: a stream given up stays so");
+}
+
+#[test]
+fn a_feedback_that_cannot_be_trusted_brakes_the_drives() {
+    let quick = CommandMode::QuickStop;
+    check(FaultCode::NotFinite, 2, quick, |feedback| feedback.position[1] = f64::NAN);
+    check(FaultCode::NotFinite, 1, quick, |feedback| feedback.current[0] = f64::INFINITY);
+    check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.cycle.0 += 3);
+    check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.cycle.0 -= 1);
+    check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.epoch += 1);
+    check(FaultCode::StaleCommand, 0, quick, |feedback| feedback.status |= status::STOPPED_ALONE);
+    check(FaultCode::DriveFault, 0, quick, |feedback| feedback.status = 0);
+    // 1 mm of following error is 0.8 rad at the motor.
+    check(FaultCode::FollowingError, 2, quick, |feedback| feedback.position[1] += 0.81);
+    check(FaultCode::FollowingError, 1, quick, |feedback| feedback.position[0] -= 0.81);
+}
+
+#[test]
+fn a_fault_of_the_drives_is_passed_on_as_it_is() {
+    let machine = Machine::builtin();
+    let job = two_marks(&machine, 0.25, 0.5);
+    let mut bench = marking(&machine, &job);
+    let code = FaultCode::DriveFault as u32;
+    let at = Nanoseconds(123);
+    let fault = Fault { code, axis: 2, value: 7.5, at, ..Fault::default() };
+    bench.cycle(Some(&job), None, |feedback| feedback.fault = fault);
+    assert_eq!(bench.last().command.fault, fault);
+    bench.cycle(Some(&job), None, |feedback| feedback.fault = Fault::default());
+    assert_eq!(bench.last().command.fault, fault, "the first cause stays");
+}
+
+#[test]
+fn one_or_two_missing_feedbacks_are_caught_up_with() {
+    let machine = Machine::builtin();
+    let job = two_marks(&machine, 0.25, 0.5);
+    let mut bench = marking(&machine, &job);
+    let before = bench.last().command.stream_time;
+    bench.cycle(Some(&job), None, |feedback| feedback.cycle.0 += 2);
+    let after = bench.last().command.stream_time;
+    assert!((after - before - 3e-3).abs() < 1e-12, "stream time goes with the cycles");
+    assert_eq!(bench.state(), ControllerState::Running);
+}
+
+#[test]
+fn a_lost_peer_stops_the_axes_along_the_path() {
+    for (code, lose) in
+        [(FaultCode::PlannerLost, 0), (FaultCode::SupervisorLost, 1), (FaultCode::DrivesLost, 2)]
+    {
+        let machine = Machine::builtin();
+        let job = two_marks(&machine, 0.25, 0.5);
+        let mut bench = marking(&machine, &job);
+        let peer = match lose {
+            0 => &mut bench.peers.planner,
+            1 => &mut bench.peers.supervisor,
+            _ => &mut bench.peers.drives,
+        };
+        *peer = Presence::Lost;
+        bench.run(Some(&job), 1);
+        let command = bench.last().command;
+        assert!(!command.laser.is_lit(), "{code:?}");
+        assert_eq!(command.fault.code(), code);
+        if lose < 2 {
+            assert_eq!(command.mode(), CommandMode::Voltage);
+            bench.until(Some(&job), ControllerState::Faulted, 200);
+            let worst = bench.played().map(|record| record.tracking).fold(0.0, f64::max);
+            assert!(worst < 20e-6, "{worst} m off the path with {code:?}");
+        }
+        settle(&mut bench, &job, code);
+    }
+}
+
+#[test]
+fn a_dry_stream_ends_at_rest_on_what_is_in_hand() {
+    let machine = Machine::builtin();
+    let job = two_marks(&machine, 0.25, 0.5);
+    // From inside the run-in to after the first mark.
+    for supply in [251, 270, 300, 333, 400] {
+        let mut bench = Bench::enabled(&machine);
+        bench.supply = supply;
+        assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+        bench.until(Some(&job), ControllerState::Running, 30);
+        bench.until(Some(&job), ControllerState::Stopping, 600);
+        let fault = bench.last().command.fault;
+        assert_eq!(fault.code(), FaultCode::StreamStarved);
+        assert!(!bench.last().command.laser.is_lit());
+        bench.until(Some(&job), ControllerState::Faulted, 200);
+        let furthest = bench.played().map(|record| record.command.stream_time).fold(0.0, f64::max);
+        assert!(furthest <= (supply - 1) as f64 * 1e-3, "played beyond the {supply} in hand");
+        assert!(furthest >= (supply - 5) as f64 * 1e-3, "{furthest}: stopped too soon");
+        let worst = bench.played().map(|record| record.tracking).fold(0.0, f64::max);
+        assert!(worst < 20e-6, "{worst} m off the path");
+        settle(&mut bench, &job, FaultCode::StreamStarved);
+    }
+}
+
+#[test]
+fn setpoints_that_break_the_stream_or_a_limit_are_never_played() {
+    let cases: [(FaultCode, fn(&mut Setpoint)); 7] = [
+        (FaultCode::StreamBroken, |setpoint| setpoint.sequence += 1),
+        (FaultCode::StreamBroken, |setpoint| setpoint.stream = 2),
+        (FaultCode::SetpointLimit, |setpoint| setpoint.velocity[1] = 0.7),
+        (FaultCode::SetpointLimit, |setpoint| setpoint.position[0] = 0.5),
+        (FaultCode::NotFinite, |setpoint| setpoint.jerk[0] = f64::NAN),
+        (FaultCode::NotFinite, |setpoint| setpoint.tool[0] = f64::NAN),
+        (FaultCode::NotFinite, |setpoint| setpoint.laser.power = 1.5),
+    ];
+    for (code, spoil) in cases {
+        let machine = Machine::builtin();
+        let mut job = two_marks(&machine, 0.25, 0.5);
+        spoil(&mut job.setpoints[420]);
+        let mut bench = Bench::enabled(&machine);
+        bench.supply = 400;
+        assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+        bench.run(Some(&job), 60);
+        bench.run(Some(&job), 100);
+        bench.supply = usize::MAX;
+        bench.run(Some(&job), 1);
+        assert_eq!(bench.last().command.fault.code(), code);
+        assert!(!bench.last().command.laser.is_lit());
+        bench.until(Some(&job), ControllerState::Faulted, 200);
+        let furthest = bench.played().map(|record| record.command.stream_time).fold(0.0, f64::max);
+        assert!(furthest < 0.419, "{furthest}");
+        settle(&mut bench, &job, code);
+    }
+}
+
+#[test]
+fn overruns_are_bounded_on_a_clock_that_does_not_slip() {
+    for slipping in [false, true] {
+        let machine = Machine::builtin();
+        let job = two_marks(&machine, 0.25, 0.5);
+        let mut bench = marking(&machine, &job);
+        for _ in 0..4 {
+            bench.cycle(Some(&job), None, |feedback| {
+                feedback.overruns += 1;
+                feedback.status |= if slipping { status::SLIPPING } else { 0 };
+            });
+        }
+        let fault = bench.last().command.fault.code();
+        assert_eq!(fault, if slipping { FaultCode::None } else { FaultCode::Overrun });
+    }
+}
+
+#[test]
+fn an_overloaded_winding_stops_the_machine() {
+    let mut machine = Machine::builtin();
+    for axis in &mut machine.axes {
+        axis.motor.continuous_current = Some(0.05);
+    }
+    let job = two_marks(&machine, 0.25, 0.5);
+    let mut bench = Bench::enabled(&machine);
+    assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+    bench.until(Some(&job), ControllerState::Stopping, 700);
+    assert_eq!(bench.last().command.fault.code(), FaultCode::Overload);
+}
+
+#[test]
+fn a_stream_must_start_where_the_axes_stand() {
+    let machine = Machine::builtin();
+    let mut job = two_marks(&machine, 0.25, 0.5);
+    for setpoint in &mut job.setpoints {
+        setpoint.position[1] += 1e-4;
+    }
+    let mut bench = Bench::enabled(&machine);
+    assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+    bench.until(Some(&job), ControllerState::Faulted, 60);
+    let fault = bench.last().command.fault;
+    assert_eq!((fault.code(), fault.axis), (FaultCode::StreamStart, 2));
+    assert!((fault.value - 1e-4).abs() < 2e-6, "{} m", fault.value);
+}

@@ -1,0 +1,106 @@
+//! Playing faster and slower: limits hold, light per length stays.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use machine::Machine;
+use signals::{ControllerReport, ControllerState, OperatorVerb};
+use support::{Bench, Move, Part, job, lit_stretches, two_marks};
+
+/// Plays a gentle job with an override set after `cycles`; its largest rate and its report.
+fn play(rate: f64, cycles: usize) -> (f64, ControllerReport) {
+    let machine = Machine::builtin();
+    let path = Move::new(0.08, 0.1, 2.0, 100.0);
+    let parts = [Part::Rest(0.01), Part::Mark(path, [0.5, 0.5]), Part::Rest(0.05)];
+    let job = job(&machine, 1, &parts, 0.5);
+    let mut bench = Bench::enabled(&machine);
+    assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+    bench.run(Some(&job), cycles);
+    assert!(bench.ask(Some(&job), OperatorVerb::Override, rate));
+    bench.until(Some(&job), ControllerState::Idle, 12_000);
+    let (stretches, exposure) = lit_stretches(&bench.records);
+    assert_eq!(stretches.len(), 1, "at rate {rate}");
+    let (on, off) = job.lit[0];
+    assert!((stretches[0].0 - on).abs() < 3e-9 && (stretches[0].1 - off).abs() < 3e-9);
+    assert!((exposure - (off - on) * 0.5).abs() < 1e-6, "{exposure} at rate {rate}");
+    let lit = bench.played().filter(|record| record.command.laser.is_lit());
+    let worst = lit.map(|record| record.tracking).fold(0.0, f64::max);
+    assert!(worst < 10e-6, "{worst} m off at rate {rate}");
+    let fastest = bench.played().map(|record| record.command.rate).fold(0.0, f64::max);
+    (fastest, *bench.reports.last().unwrap())
+}
+
+#[test]
+fn an_override_keeps_every_limit_and_the_light_per_length() {
+    // Half of the joints' sum: the tool moves at half of the path coordinate, so jerk is used to
+    // 50/500, acceleration to 1/10, speed to 0.05/0.25.
+    for (rate, cycles) in [(1.7, 10), (2.0, 300), (0.3, 400), (0.1, 10)] {
+        let (fastest, report) = play(rate, cycles);
+        let uses = [report.path_acceleration_use, report.path_jerk_use, report.velocity_use[0]];
+        assert!(uses.iter().all(|share| *share <= 1.0), "{uses:?} at rate {rate}");
+        assert!(fastest <= f64::max(rate, 1.0) + 1e-7, "{fastest} at rate {rate}");
+        if rate > 1.0 {
+            assert!((fastest - rate).abs() < 1e-7, "{fastest} instead of {rate}");
+            let expected = 0.1 * rate * rate * rate;
+            assert!(report.path_jerk_use <= expected + 1e-6);
+        }
+    }
+}
+
+#[test]
+fn an_override_stops_at_the_limits_of_what_lies_ahead() {
+    let machine = Machine::builtin();
+    // Jerk to 200/500: the cube root of 2.5 is 1.357.
+    let path = Move::new(0.08, 0.1, 4.0, 200.0);
+    let parts = [Part::Rest(0.02), Part::Mark(path, [1.0, 1.0]), Part::Rest(0.05)];
+    let job = job(&machine, 1, &parts, 0.3);
+    let mut bench = Bench::enabled(&machine);
+    assert!(bench.ask(None, OperatorVerb::Override, 2.0));
+    assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+    bench.until(Some(&job), ControllerState::Running, 30);
+    bench.until(Some(&job), ControllerState::Idle, 4000);
+    let report = bench.reports.last().unwrap();
+    assert!(report.path_jerk_use > 0.99 && report.path_jerk_use <= 1.0, "{report:?}");
+    let fastest = bench.played().map(|record| record.command.rate).fold(0.0, f64::max);
+    assert!(fastest > 1.35, "{fastest}: the cruise allows more");
+}
+
+#[test]
+fn a_job_at_its_limits_is_never_played_faster() {
+    let machine = Machine::builtin();
+    let job = two_marks(&machine, 0.25, 0.5);
+    let mut bench = Bench::enabled(&machine);
+    assert!(bench.ask(None, OperatorVerb::Override, 2.0));
+    assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+    bench.until(Some(&job), ControllerState::Running, 30);
+    bench.until(Some(&job), ControllerState::Idle, 4000);
+    let report = bench.reports.last().unwrap();
+    assert!(report.path_acceleration_use <= 1.0 && report.path_jerk_use <= 1.0, "{report:?}");
+}
+
+#[test]
+fn only_rates_from_a_tenth_to_two_are_taken() {
+    let mut bench = Bench::enabled(&Machine::builtin());
+    for rate in [0.0, 0.099, 2.001, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(!bench.ask(None, OperatorVerb::Override, rate), "{rate}");
+    }
+    let request = bench.request(OperatorVerb::Override, 0.25);
+    let reply = bench.cycle(None, Some(request), |_| {}).unwrap();
+    assert_eq!((reply.accepted, reply.value), (1, 0.25));
+}
+
+#[test]
+fn two_runs_have_one_digest() {
+    let digest = |power: f64| {
+        let machine = Machine::builtin();
+        let job = two_marks(&machine, 0.25, power);
+        let mut bench = Bench::enabled(&machine);
+        assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+        bench.until(Some(&job), ControllerState::Running, 30);
+        bench.until(Some(&job), ControllerState::Idle, 2000);
+        bench.reports.last().unwrap().digest
+    };
+    assert_eq!(digest(0.5), digest(0.5));
+    assert_ne!(digest(0.5), digest(0.25));
+}
