@@ -429,7 +429,7 @@ impl<'a> Interpreter<'a> {
             if block.has_offsets() {
                 return Err(Refusal::new(
                     block.span(b'R'),
-                    "an arc has R and a centre",
+                    "the arc has R and a centre",
                     "radius",
                     "write either R, or I, J and K",
                 ));

@@ -15,6 +15,8 @@ mod codes;
 mod error;
 mod interpreter;
 mod lexer;
+#[cfg(test)]
+mod tests;
 mod tracer;
 
 use std::ops::Range;

@@ -1,0 +1,82 @@
+//! Every refusal names its place, what is wrong, and what would be right.
+
+use miette::Diagnostic;
+
+use super::*;
+
+fn check(text: &str, line: u64, column: u64, message: &str, help: &str) {
+    let error = refused(text);
+    assert_eq!((error.line, error.column), (line, column), "{text}: {error}");
+    assert!(error.message.contains(message), "{text}: {error}");
+    assert!(error.help.contains(help), "{text}: {}", error.help);
+    assert!(error.to_string().starts_with(&format!("job.ngc:{line}:{column}: ")));
+    let label = error.labels().unwrap().next().unwrap();
+    assert!(label.offset() + label.len() <= text.len(), "{text}: {label:?}");
+}
+
+#[test]
+fn codes_that_are_not_there() {
+    check("G0 X1\nG43 H1", 2, 1, "G43 is not supported", "no tool lengths");
+    check("T1 m 6", 1, 4, "M6 is not supported", "no tool to change");
+    check("G81 X1", 1, 1, "G81 is not supported", "canned cycles");
+    check("g 59.4", 1, 1, "G59.4 is not supported", "G59.1-G59.3");
+    check("G1.05", 1, 1, "G1.05 is not supported", "supported are G0 G1");
+    check("G-1", 1, 1, "G-1 is not supported", "supported are");
+    check("M48", 1, 1, "M48 is not supported", "override");
+    check("M106 S255", 1, 1, "M106 is not supported", "M3 or M4");
+    check("(é) A1", 1, 5, "A is not an axis", "X, Y and Z");
+    check("X1e4", 1, 3, "E words are not supported", "no exponent");
+    check("D1", 1, 1, "D words are not supported", "words begin with");
+    check("o100 sub", 1, 1, "O words", "write the moves out");
+    check("G0 X#5", 1, 5, "parameters (#)", "decimal number");
+    check("G0 X[1]", 1, 5, "expressions", "decimal number");
+}
+
+#[test]
+fn codes_that_exclude_each_other() {
+    check("G0 G1 X1", 1, 4, "G0 and G1 are both of the motion group", "lines of their own");
+    check("G90 g 91", 1, 5, "G90 and G91 are both of the distance group", "lines of their own");
+    check("M3 M5", 1, 4, "M3 and M5 are both of the laser group", "lines of their own");
+    check("G4 P1 G92 X0", 1, 7, "G4 and G92 are both of the non-modal group", "lines");
+    check("G28 G1 X0", 1, 5, "G28 and G1 both take the coordinates", "lines of their own");
+    check("G4 G64 P1", 1, 8, "two codes of this line use P", "lines of their own");
+    check("G0 X1 x2", 1, 7, "X is on this line twice: X1 and X2", "line break");
+}
+
+#[test]
+fn words_that_are_missing_or_stray() {
+    check("X1", 1, 1, "nothing on this line uses X", "G0, G1, G2 or G3");
+    check("G0 X1\nG80 X2", 2, 5, "nothing on this line uses X", "G0, G1, G2 or G3");
+    check("G0 X1 I2", 1, 7, "nothing on this line uses I", "G2 and G3");
+    check("G0 X1 P2", 1, 7, "nothing on this line uses P", "G4");
+    check("G1 X1", 1, 1, "the move has no feed rate", "F600");
+    check("F0\nG1 X1", 2, 1, "the move has no feed rate", "F600");
+    check("G93 G1 X1 F2\nX2", 2, 1, "the move has no feed rate", "G93");
+    check("G93 G1 X1 F2\nG94 X2", 2, 5, "the move has no feed rate", "F600");
+    check("F-5", 1, 1, "F-5 is negative", "above 0");
+    check("M3 S1001", 1, 4, "S1001 is outside 0 to 1000", "S1000");
+    check("M3 S-1", 1, 4, "S-1 is outside 0 to 1000", "S1000");
+    check("G4", 1, 1, "G4 has no P", "seconds");
+    check("G4 P-1", 1, 4, "a dwell of -1 s", "seconds");
+    check("G64 P-1", 1, 5, "negative", "0 or above");
+    check("G92", 1, 1, "G92 has no coordinates", "G92 X0 Y0");
+    check("G53 X1", 1, 1, "G53 needs G0 or G1", "machine's zero");
+    check("G91 G53 G0 X1", 1, 5, "G53 needs G0 or G1", "G91");
+    check("G0 X1 N5", 1, 7, "N stands inside a line", "first word");
+    check("T1.5", 1, 1, "T needs a whole number", "0, 1, 2");
+    check("G0 X1 % ", 1, 7, "% is not alone", "on a line of its own");
+}
+
+#[test]
+fn arcs_that_are_not_there() {
+    check("F9 G2 X1", 1, 4, "the arc has no centre", "needs I or J, or R");
+    check("F9 G18 G2 X1 J1", 1, 14, "J is not in the plane", "K and I");
+    check("F9 G90.1 G2 X1 I1", 1, 10, "the arc has no centre", "needs I and J, or R");
+    check("F9 G2 X1 I1 R1", 1, 13, "the arc has R and a centre", "either R");
+    check("F9 G2 X0 R1", 1, 4, "ends where it starts", "full circle");
+    check("F9 G2 X3 R1", 1, 4, "radius of 1.000000 mm cannot reach an end 3.000000 mm", "1.500000");
+    check("F9 G2 X3 I1", 1, 4, "1.000000 mm at its start and 2.000000 mm at its end", "G90.1");
+    check("F9 G2 X1 I0 J0", 1, 4, "the radius is 0", "G91.1");
+    check("F9 G2 X1 I.5 P1.5", 1, 14, "P1.5 is not a number of turns", "whole number");
+    check("F9 G3 X1 I.5\nX5 I1", 2, 1, "at its start", "differ by 0.028 mm");
+}

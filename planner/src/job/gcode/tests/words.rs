@@ -1,0 +1,154 @@
+//! What single words mean.
+
+use super::*;
+use crate::drawing::Power;
+
+/// The ends of all moves [mm], a letter for each: rapid, mark or feed in the dark.
+fn moves(text: &str) -> Vec<(char, f64, f64)> {
+    let program = flat(text);
+    check_sound(&program, text);
+    let millimetres = |value: f64| (value * 1e12).round() / 1e9;
+    program
+        .drawing
+        .steps
+        .iter()
+        .filter_map(|step| match step.action {
+            Action::Rapid { to } => Some(('r', to)),
+            Action::Mark { curve, .. } => Some(('m', curve.to())),
+            Action::Feed { curve, .. } => Some(('f', curve.to())),
+            _ => None,
+        })
+        .map(|(kind, to)| (kind, millimetres(to.x), millimetres(to.y)))
+        .collect()
+}
+
+#[test]
+fn the_laser_marks_only_while_on_and_powered() {
+    assert_eq!(
+        moves("M3 S10 G0 X1\nG1 X2 F60\nS0 X3\nS10 X4\nM5 X5\nM4 X6\nG0 X7"),
+        [
+            ('r', 1.0, 0.0),
+            ('m', 2.0, 0.0),
+            ('f', 3.0, 0.0),
+            ('m', 4.0, 0.0),
+            ('f', 5.0, 0.0),
+            ('m', 6.0, 0.0),
+            ('r', 7.0, 0.0)
+        ]
+    );
+    let program = flat("G1 F60 M3 X1\nX2");
+    assert_eq!(program.drawing.notes.len(), 1);
+    assert_eq!(program.facts.mark_length, 0.0);
+}
+
+#[test]
+fn power_is_a_fraction_of_full_scale() {
+    let program = flat("M4 S250 G1 X1 F60\nM3 S1000 X2");
+    let powers: Vec<_> = program
+        .drawing
+        .steps
+        .iter()
+        .map(|step| match step.action {
+            Action::Mark { power, .. } => power,
+            _ => panic!("{step:?}"),
+        })
+        .collect();
+    assert_eq!(
+        powers,
+        [Power { level: 0.25, follows_speed: true }, Power { level: 1.0, follows_speed: false }]
+    );
+}
+
+#[test]
+fn coordinates_are_absolute_or_incremental_in_either_unit() {
+    assert_eq!(
+        moves("g90 g0 x10 y5\ng91 x-1 y.5\ny1\ng90 y0"),
+        [('r', 10.0, 5.0), ('r', 9.0, 5.5), ('r', 9.0, 6.5), ('r', 9.0, 0.0)]
+    );
+    assert_eq!(
+        moves("G20 G0 X1\nG21 X1\nG20 G91 Y1"),
+        [('r', 25.4, 0.0), ('r', 1.0, 0.0), ('r', 1.0, 25.4)]
+    );
+}
+
+#[test]
+fn origins_shift_and_machine_frame() {
+    let mut machine = machine(ZMeaning::Ignored);
+    machine.home = [0.1, 0.1, 0.0];
+    machine.gcode.origins[0] = [0.1, 0.1, 0.0];
+    machine.gcode.origins[8] = [0.02, 0.0, 0.0];
+    let text = "G0 X1\nG59.3 X1 Y2\nG53 G0 X5 Y6\nG92 X0 Y0\nX1 Y1\nG92.2 X1\nG92.3 X1\nG92.1 Y0\n\
+                G54 G28 X3\nG28";
+    let program = read("job.ngc", text, &machine).unwrap();
+    check_sound(&program, text);
+    let expected = [
+        [0.101, 0.1],
+        [0.021, 0.002],
+        [0.005, 0.006],
+        [0.006, 0.007],
+        [0.021, 0.007],
+        [0.006, 0.007],
+        [0.006, 0.0],
+        [0.103, 0.0],
+        [0.1, 0.0],
+        [0.1, 0.1],
+    ];
+    assert_eq!(program.drawing.steps.len(), expected.len());
+    for (step, [x, y]) in program.drawing.steps.iter().zip(expected) {
+        let Action::Rapid { to } = step.action else { panic!("{step:?}") };
+        assert!((to - Vector3::new(x, y, 0.0)).norm() < 1e-15, "{step:?}");
+    }
+    assert!(program.facts.end.iter().all(|end| end.abs() < 1e-15), "{:?}", program.facts);
+}
+
+#[test]
+fn a_line_without_motion_makes_no_step() {
+    let program = flat("G0 X1\nX1\nG1 F60\nX1 Z5\nX1.0000000004\nZ0\nG4 P0\n\n(nothing)\nN7\n");
+    assert_eq!(program.drawing.steps.len(), 1);
+    assert_eq!(program.facts.blocks, 8);
+    assert!((program.facts.feed_length - 0.010).abs() < 1e-12);
+    // What is too short to draw is made up for by the next move.
+    let program = flat("G1 F60 G91\nX.0000005\nX.0000004\nX.0000003\nX1");
+    let ends: Vec<_> = program.drawing.steps.iter().map(|step| step.action.clone()).collect();
+    let Action::Feed { curve: Curve::Line { from, to }, .. } = ends[1] else { panic!("{ends:?}") };
+    assert_eq!(ends.len(), 2);
+    assert!((from.x - 1.2e-9).abs() < 1e-18 && (to.x - 1.0000012e-3).abs() < 1e-15);
+}
+
+#[test]
+fn a_dwell_is_lit_under_m3_alone() {
+    let program = flat("S500 G4 P1\nM3 G4 P2\nM4 G4 P3\nM5 G4 P4");
+    let dwells: Vec<_> = program.drawing.steps.iter().map(|step| step.action.clone()).collect();
+    assert_eq!(
+        dwells,
+        [
+            Action::Dwell { time: 1.0, lit: None },
+            Action::Dwell { time: 2.0, lit: Some(0.5) },
+            Action::Dwell { time: 3.0, lit: None },
+            Action::Dwell { time: 4.0, lit: None },
+        ]
+    );
+}
+
+#[test]
+fn a_program_stops_pauses_and_ends() {
+    let program = flat("%\nG0 X1 M0\nM1\nM8\nX2 M30\nG99999 nonsense");
+    let actions: Vec<_> = program.drawing.steps.iter().map(|step| step.action.clone()).collect();
+    assert_eq!(actions.len(), 5);
+    assert_eq!(actions[1], Action::Pause);
+    assert_eq!(actions[2], Action::Output { bit: 0, on: true });
+    assert_eq!(actions[4], Action::Output { bit: 0, on: false });
+    assert_eq!(program.drawing.notes[0].line, 3);
+    assert_eq!(moves("%\nG0 X1\n%\nG0 X2"), [('r', 1.0, 0.0)]);
+    assert_eq!(moves("\u{feff}G0 X1\r\nX2\r\n"), [('r', 1.0, 0.0), ('r', 2.0, 0.0)]);
+    assert_eq!(moves(""), []);
+}
+
+#[test]
+fn a_machine_without_air_assist_says_so() {
+    let mut machine = machine(ZMeaning::Ignored);
+    machine.gcode.air_assist = false;
+    let program = read("job.ngc", "M8\nG0 X1\nM9", &machine).unwrap();
+    assert_eq!(program.drawing.steps.len(), 1);
+    assert_eq!(program.drawing.notes.len(), 1);
+}
