@@ -97,7 +97,7 @@ pub struct Judge<'a> {
     artwork: &'a Artwork,
     source: Source,
     path: ToolPath,
-    newest: Option<u64>,
+    newest: Option<Moment>,
     strokes: Vec<StrokeState>,
     line: Option<(u64, Line)>,
     run: Option<Run>,
@@ -257,12 +257,15 @@ impl<'a> Judge<'a> {
     }
 
     fn moment(&mut self, moment: Moment) {
-        if let Some(newest) = self.newest
-            && moment.cycle != newest + 1
-        {
-            self.lost += moment.cycle.checked_sub(newest + 1).unwrap_or(1).max(1);
+        if let Some(newest) = self.newest {
+            if moment.cycle != newest.cycle + 1 {
+                self.lost += moment.cycle.checked_sub(newest.cycle + 1).unwrap_or(1);
+            } else if newest.planned.is_none() && moment.in_force == Some(newest.cycle) {
+                // Drives had an answer to the cycle before that is not in the records.
+                self.lost += 1;
+            }
         }
-        self.newest = Some(moment.cycle);
+        self.newest = Some(moment);
         if let Some(interval) = self.path.push(moment) {
             self.interval(&interval);
         }

@@ -5,6 +5,7 @@ pub mod page;
 pub mod path;
 
 use crate::latency::HopHistograms;
+use crate::run_folder::{self, RunFolder};
 use crate::summary::Summary;
 use crate::trace::Trace;
 use signals::artwork::Artwork;
@@ -22,6 +23,40 @@ pub struct Report<'a> {
     pub torque_constants: &'a [f64],
     /// The latencies; empty in virtual time.
     pub histograms: &'a HopHistograms,
+}
+
+/// Why a report could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// A picture could not be drawn.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// A file could not be written.
+    #[error("cannot write {file}: {source}")]
+    File {
+        /// The file.
+        file: String,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+}
+
+impl Report<'_> {
+    /// Writes page and picture into the run folder.
+    ///
+    /// # Errors
+    /// [`ReportError`]: a picture that cannot be drawn, or a file that cannot be written.
+    pub fn write(&self, folder: &RunFolder) -> Result<(), ReportError> {
+        for (name, content) in
+            [(run_folder::PICTURE, self.picture()?), (run_folder::REPORT, self.page()?)]
+        {
+            folder.write(name, content).map_err(|source| ReportError::File {
+                file: folder.file(name).display().to_string(),
+                source,
+            })?;
+        }
+        Ok(())
+    }
 }
 
 /// A picture could not be drawn; the data it was given are at fault.

@@ -38,9 +38,9 @@ pub struct Trace {
     pub following_error: [Envelope; MAX_AXES],
     /// Measured current per axis [A].
     pub current: [Envelope; MAX_AXES],
-    /// Commanded voltage per axis [V].
+    /// Commanded voltage per axis, in volts.
     pub voltage: [Envelope; MAX_AXES],
-    /// Latency per hop, in the order of [`Hop::ALL`] [s]; empty in virtual time.
+    /// Latency per hop, in the order of [`Hop::ALL`], in seconds; empty in virtual time.
     pub latency: [Envelope; Hop::ALL.len()],
 }
 

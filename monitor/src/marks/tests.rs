@@ -4,7 +4,7 @@
 use super::*;
 use signals::artwork::Stroke;
 use signals::feedback::status;
-use signals::{Command, Cycle, Feedback, GateEdge, LaserCycle};
+use signals::{Command, Cycle, Feedback, GateEdge, LaserCycle, Nanoseconds, Sample};
 
 type Point = [f64; 3];
 
@@ -42,6 +42,7 @@ fn play(
                 feedback: Feedback {
                     cycle: Cycle(cycle + FIRST),
                     command_cycle: Cycle((cycle + FIRST).saturating_sub(1)),
+                    command_received: Nanoseconds(1),
                     status: status::TOOL_KNOWN,
                     tool: truth(time, planned),
                     laser: laser(&true_light, time - CYCLE_TIME),
@@ -299,6 +300,10 @@ fn rather_no_judgement_than_a_wrong_one() {
     gap.drain(50..53);
     assert_eq!(judge(&one_line(), &gap), Err(Unjudged::SamplesLost { count: 3 }));
 
+    let mut unanswered = records.clone();
+    unanswered[60].command = Command::zeroed();
+    assert_eq!(judge(&one_line(), &unanswered), Err(Unjudged::SamplesLost { count: 1 }));
+
     let mut blind = records;
     blind[60].feedback.status = 0;
     assert_eq!(judge(&one_line(), &blind), Err(Unjudged::ToolUnknown { cycle: FIRST + 60 }));
@@ -316,4 +321,87 @@ fn kinematics_can_tell_where_the_tool_was() {
     let marks = judge.finish().unwrap();
     near(marks.missing, 0.0, ROUNDING, "missing");
     assert_eq!(marks.source, Source::Feedback);
+}
+
+/// A closed figure of eight: it crosses itself, and ends where it starts.
+struct Eight {
+    points: Vec<Point>,
+    along: Vec<f64>,
+}
+
+impl Eight {
+    fn new() -> Self {
+        let count = 4000;
+        let points: Vec<Point> = (0..=count)
+            .map(|index| {
+                let angle = std::f64::consts::TAU * f64::from(index) / f64::from(count);
+                let (sine, cosine) = signals::math::sin_cos(angle);
+                [0.01 * cosine, 0.01 * sine * cosine, 0.0]
+            })
+            .collect();
+        let mut along = vec![0.0];
+        for pair in points.windows(2) {
+            along.push(along.last().unwrap() + signals::artwork::distance(&pair[0], &pair[1]));
+        }
+        Self { points, along }
+    }
+
+    fn length(&self) -> f64 {
+        *self.along.last().unwrap()
+    }
+
+    /// The point at an arc length, going round and round.
+    fn point(&self, at: f64) -> Point {
+        let at = at.rem_euclid(self.length());
+        let index = self.along.partition_point(|&along| along <= at).clamp(1, self.along.len() - 1);
+        let (from, to) = (self.points[index - 1], self.points[index]);
+        let part = (at - self.along[index - 1]) / (self.along[index] - self.along[index - 1]);
+        std::array::from_fn(|axis| from[axis] + part * (to[axis] - from[axis]))
+    }
+}
+
+/// Holds at random places of the eight, resumes that gap or overlap, and edges that are all late
+/// or early: what is missing and double is known from the arc lengths alone.
+#[test]
+fn holds_on_a_stroke_that_crosses_itself_are_measured_anywhere() {
+    let eight = Eight::new();
+    let length = eight.length();
+    let art = artwork(vec![Stroke { points: eight.points.clone(), line: 0 }]);
+    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut random = |low: f64, high: f64| {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for case in 0..200 {
+        let held = random(0.15, 0.85) * length;
+        let overlap = random(-1e-3, 1e-3);
+        let late = random(-4e-4, 4e-4);
+        // On by 2 mm in the dark, back by 5 mm, forward again.
+        let turn = (held + 2e-3) / SPEED;
+        let back = turn + 5e-3 / SPEED;
+        let along = |time: f64| match time {
+            t if t < turn => SPEED * t,
+            t if t < back => held + 2e-3 - SPEED * (t - turn),
+            t => held - 3e-3 + SPEED * (t - back),
+        };
+        let tool = |time: f64| eight.point(along(time));
+        let relit = back + (3e-3 - overlap) / SPEED;
+        let end = back + (length - held + 3e-3) / SPEED;
+        let light = [(1, 0.0, held / SPEED), (1, relit, end)];
+        let plan = Plan { tool: &tool, light: &light, duration: end + 0.04 };
+        let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| late)).unwrap();
+
+        let place = format!("case {case}: held {held}, overlap {overlap}, late {late}");
+        let shift = SPEED * late;
+        let beyond = shift.abs();
+        // The cubic's error in the tightest bend: v³/r² = 2500 m/s³ there, 52 nm at each edge.
+        let tolerance = 1.1e-7;
+        near(marks.missing, beyond + (-overlap).max(0.0), tolerance, &place);
+        near(marks.double, beyond + overlap.max(0.0), tolerance, &place);
+        near(marks.missing_end_max, beyond, tolerance, &place);
+        near(marks.double_end_max, beyond, tolerance, &place);
+        // Beyond an end the line goes on straight while the tool goes on curving.
+        near(marks.error_max, 0.0, beyond * beyond / 0.004 + tolerance, &place);
+    }
 }

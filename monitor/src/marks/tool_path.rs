@@ -25,8 +25,8 @@ pub struct Moment {
     pub laser: LaserCycle,
     /// Stroke of the command that answered this feedback: it is marked in `[t[k+1], t[k+2])`.
     pub stroke: u64,
-    /// Cycle of the command in force from `t[k]` on.
-    pub in_force: u64,
+    /// Cycle of the command in force from `t[k]` on; `None` before the first.
+    pub in_force: Option<u64>,
 }
 
 impl Moment {
@@ -40,7 +40,7 @@ impl Moment {
             planned: record.is_answered().then(|| Vector3::from(command.tool)),
             laser: feedback.laser,
             stroke: command.stroke,
-            in_force: feedback.command_cycle.0,
+            in_force: (feedback.command_received.0 != 0).then_some(feedback.command_cycle.0),
         }
     }
 
@@ -155,7 +155,8 @@ impl Interval {
             known.iter().flatten().find(|moment| moment.cycle == cycle).map(|moment| moment.stroke)
         };
         let usual = self.start.cycle.saturating_sub(1);
-        stroke(self.start.in_force.saturating_add_signed(shift))
+        let in_force = self.start.in_force.unwrap_or(usual);
+        stroke(in_force.saturating_add_signed(shift))
             .or_else(|| stroke(usual.saturating_add_signed(shift)))
             .unwrap_or(0)
     }
@@ -251,7 +252,7 @@ mod tests {
             planned: None,
             laser: LaserCycle::OFF,
             stroke: cycle,
-            in_force: cycle.saturating_sub(1),
+            in_force: cycle.checked_sub(1),
         }
     }
 

@@ -86,7 +86,7 @@ impl Chart<'_> {
         let (x, y) = self.ranges();
         draw(self.title, self.height, |area| {
             let mut chart = frame(area).build_cartesian_2d(x.0..x.1, y.0..y.1)?;
-            self.fill(&mut chart, &short, &short)
+            self.fill(area, &mut chart, &short, &short)
         })
     }
 
@@ -96,9 +96,10 @@ impl Chart<'_> {
     /// # Errors
     /// [`PictureError`] when the numbers cannot be drawn.
     pub fn draw_distribution(&self) -> Result<String, PictureError> {
-        let (x, y) = self.ranges();
-        let low = y.0.max(1e-3);
-        let high = y.1.max(low * 10.0);
+        let points = || self.curves.iter().flat_map(|curve| curve.lines.iter().flatten());
+        let nines = span(points().map(|point| point.0)).map_or(1.0, |range| range.1.max(1.0));
+        let seen = span(points().map(|point| point.1).filter(|value| *value > 0.0));
+        let (low, high) = seen.unwrap_or((1.0, 10.0));
         let share = |nines: &f64| {
             let part = 100.0 * (1.0 - signals::math::pow(10.0, -nines));
             let digits = (nines.round() as usize).saturating_sub(1).saturating_sub(1);
@@ -106,8 +107,8 @@ impl Chart<'_> {
         };
         draw(self.title, self.height, |area| {
             let mut chart =
-                frame(area).build_cartesian_2d(0.0..x.1.max(1.0), (low..high).log_scale())?;
-            self.fill(&mut chart, &share, &short)
+                frame(area).build_cartesian_2d(0.0..nines, (0.6 * low..1.6 * high).log_scale())?;
+            self.fill(area, &mut chart, &share, &short)
         })
     }
 
@@ -129,6 +130,7 @@ impl Chart<'_> {
 
     fn fill<'b, Y>(
         &self,
+        area: &DrawingArea<Canvas<'b>, Shift>,
         chart: &mut ChartContext<
             'b,
             Canvas<'b>,
@@ -145,7 +147,7 @@ impl Chart<'_> {
             .x_desc(self.across)
             .y_desc(self.up)
             .x_labels(11)
-            .y_labels(6)
+            .y_labels(self.height as usize / 32)
             .x_label_formatter(&label_x)
             .y_label_formatter(&label_y)
             .label_style(text_style())
@@ -156,17 +158,14 @@ impl Chart<'_> {
             .draw()?;
         for curve in &self.curves {
             let style = curve.colour.stroke_width(FINE + 1);
-            for (index, line) in curve.lines.iter().enumerate() {
-                let series = chart.draw_series(LineSeries::new(line.iter().copied(), style))?;
-                if index == 0 && !curve.name.is_empty() {
-                    series.label(curve.name.clone()).legend(move |(x, y)| legend_line(x, y, style));
-                }
+            for line in &curve.lines {
+                chart.draw_series(LineSeries::new(line.iter().copied(), style))?;
             }
         }
-        if self.curves.iter().any(|curve| !curve.name.is_empty() && !curve.lines.is_empty()) {
-            legend(chart)?;
-        }
-        Ok(())
+        let entries: Vec<_> = (self.curves.iter())
+            .map(|curve| (curve.name.as_str(), curve.colour.stroke_width(2 * FINE)))
+            .collect();
+        legend(area, &entries)
     }
 }
 
@@ -175,41 +174,39 @@ pub type Canvas<'a> = SVGBackend<'a>;
 /// What can go wrong there.
 pub type Failure<'a> = DrawingAreaErrorKind<<Canvas<'a> as DrawingBackend>::ErrorType>;
 
-/// The sample of a line in a legend.
-pub fn legend_line(x: i32, y: i32, style: ShapeStyle) -> PathElement<(i32, i32)> {
-    PathElement::new([(x, y), (x + 18 * FINE as i32, y)], style)
+/// Width of the margins of a chart, in page units: left, right, above, below.
+pub const MARGINS: [u32; 4] = [72, 118, 10, 52];
+/// Height of a line of the legend, in page units.
+const LEGEND_LINE: u32 = 20;
+
+/// A chart's margins, the same for all; the legend is in the right one.
+pub fn frame<'a, 'b>(area: &'a DrawingArea<Canvas<'b>, Shift>) -> ChartBuilder<'a, 'b, Canvas<'b>> {
+    let [left, right, above, below] = MARGINS.map(|margin| margin * FINE);
+    let mut builder = ChartBuilder::on(area);
+    builder.margin_top(above).margin_right(right);
+    builder.margin_left(8 * FINE).margin_bottom(8 * FINE);
+    builder.x_label_area_size(below - 8 * FINE).y_label_area_size(left - 8 * FINE);
+    builder
 }
 
-/// Draws the legend of the labelled series.
+/// Writes the names of curves with a piece of each beside the chart, from above.
 ///
 /// # Errors
 /// Whatever the drawing library reports.
-pub fn legend<'b, X, Y>(
-    chart: &mut ChartContext<'b, Canvas<'b>, Cartesian2d<X, Y>>,
-) -> Result<(), Failure<'b>>
-where
-    X: Ranged<ValueType = f64>,
-    Y: Ranged<ValueType = f64>,
-{
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .legend_area_size(24 * FINE)
-        .margin(6 * FINE)
-        .background_style(PAPER.mix(0.8))
-        .label_font(text_style())
-        .draw()
-}
-
-/// A chart's margins, the same for all.
-pub fn frame<'a, 'b>(area: &'a DrawingArea<Canvas<'b>, Shift>) -> ChartBuilder<'a, 'b, Canvas<'b>> {
-    let mut builder = ChartBuilder::on(area);
-    builder
-        .margin(8 * FINE)
-        .margin_right(20 * FINE)
-        .x_label_area_size(44 * FINE)
-        .y_label_area_size(64 * FINE);
-    builder
+pub fn legend<'b>(
+    area: &DrawingArea<Canvas<'b>, Shift>,
+    entries: &[(&str, ShapeStyle)],
+) -> Result<(), Failure<'b>> {
+    let left = ((WIDTH - MARGINS[1] + 12) * FINE) as i32;
+    let piece = 16 * FINE as i32;
+    let named = entries.iter().filter(|(name, _)| !name.is_empty());
+    for (y, (name, style)) in (1..).map(|line| (line * LEGEND_LINE * FINE) as i32).zip(named) {
+        area.draw(&PathElement::new([(left, y), (left + piece, y)], *style))?;
+        let beside = text_style().pos(Pos::new(HPos::Left, VPos::Center));
+        let at = (left + piece + 6 * FINE as i32, y);
+        area.draw(&Text::new((*name).to_owned(), at, beside))?;
+    }
+    Ok(())
 }
 
 /// Makes a picture of the usual width and `height` page units.
@@ -242,7 +239,7 @@ pub fn span(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 /// A number on an axis: as few digits as tell the ticks apart.
 pub fn short(value: &f64) -> String {
     let digits = match value.abs() {
-        size if size >= 100.0 || size < 1e-9 => 0,
+        size if !(1e-9..100.0).contains(&size) => 0,
         size if size >= 1.0 => 2,
         _ => 3,
     };

@@ -1,11 +1,12 @@
 //! The picture of the path: what was to be marked, what was marked, and the way in the dark.
 
 use super::chart::{
-    CURVES, FINE, GRID, INK, WIDTH, centred, draw, frame, legend, legend_line, short, span,
-    text_style,
+    CURVES, Canvas, FINE, Failure, GRID, INK, MARGINS, WIDTH, centred, draw, frame, legend, short,
+    span, text_style,
 };
 use super::{PictureError, Report};
 use crate::trace::outline::OutlinePoint;
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 /// Metres to millimetres, the unit of the picture.
@@ -13,6 +14,9 @@ const MILLIMETRES: f64 = 1e3;
 
 /// The most points of the plan drawn; more are thinned evenly.
 const PLAN_POINTS: usize = 40_000;
+
+/// A line that stays within this is a dot [mm].
+const DOT: f64 = 0.02;
 
 /// Share of the drawing's size that the largest magnified deviation takes.
 const MAGNIFIED: f64 = 0.03;
@@ -69,8 +73,9 @@ impl Report<'_> {
         let size = (x[1] - x[0]).max(y[1] - y[0]);
         let air = 0.08 * size;
         let (x, y) = ([x[0] - air, x[1] + air], [y[0] - air, y[1] + air]);
-        // Equal scales: the frame's margins are 8 + 64 + 20 across, 8 + 44 + 8 up.
-        let (inner_width, margin_up) = (f64::from(WIDTH - 92), 60.0);
+        // Equal scales: what the margins leave.
+        let [left, right, above, below] = MARGINS.map(f64::from);
+        let (inner_width, margin_up) = (f64::from(WIDTH) - left - right, above + below);
         let scale = inner_width / (x[1] - x[0]);
         let inner = (scale * (y[1] - y[0])).clamp(120.0, 720.0);
         let (x, y) = widened(x, y, inner_width / inner);
@@ -95,28 +100,31 @@ impl Report<'_> {
                 .bold_line_style(GRID.stroke_width(FINE))
                 .light_line_style(TRANSPARENT)
                 .draw()?;
+            // Magnified, the way in the dark would only be in the way.
+            let dark = CURVES[7].mix(0.7).stroke_width(FINE);
             if gain.is_none() {
-                let dark = self.trace.dark.paths().iter().map(|path| millimetres(path, 0.0));
-                let style = CURVES[7].mix(0.7).stroke_width(FINE);
-                curves(&mut chart, "in the dark", style, dark)?;
+                for path in self.trace.dark.paths() {
+                    curve(&mut chart, dark, millimetres(path, 0.0))?;
+                }
             }
-            let style =
-                CURVES[1].mix(0.9).stroke_width(if gain.is_some() { FINE } else { 3 * FINE });
-            curves(&mut chart, "planned", style, plan.into_iter())?;
-            let marked = self
-                .trace
-                .marked
-                .paths()
-                .iter()
-                .map(|path| millimetres(path, gain.map_or(0.0, |gain| gain - 1.0)));
-            let name =
-                gain.map_or("marked".to_owned(), |gain| format!("marked, deviation × {gain}"));
-            curves(&mut chart, &name, CURVES[0].stroke_width(FINE + 1), marked)?;
+            let planned = match gain {
+                None => CURVES[1].mix(0.5).stroke_width(5 * FINE),
+                Some(_) => CURVES[1].stroke_width(FINE),
+            };
+            for line in plan {
+                curve(&mut chart, planned, line)?;
+            }
+            let marked = CURVES[0].stroke_width(FINE + 1);
+            for path in self.trace.marked.paths() {
+                curve(&mut chart, marked, millimetres(path, gain.map_or(0.0, |gain| gain - 1.0)))?;
+            }
             if self.trace.marked.paths().is_empty() {
                 let middle = ((WIDTH * FINE / 2) as i32, (height * FINE / 2) as i32);
                 area.draw(&Text::new("nothing was marked", middle, centred()))?;
             }
-            legend(&mut chart)
+            let name = gain.map_or("marked".to_owned(), |gain| format!("error × {gain}"));
+            let dark = if gain.is_none() { ("in the dark", dark) } else { ("", dark) };
+            legend(area, &[(&name, marked), ("planned", planned), dark])
         })
     }
 
@@ -135,30 +143,21 @@ impl Report<'_> {
     }
 }
 
-/// Draws several lines as one entry of the legend; a line of one point becomes a dot.
-fn curves<'b>(
-    chart: &mut ChartContext<
-        'b,
-        SVGBackend<'b>,
-        Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
-    >,
-    name: &str,
+/// Draws one line; a line that stands still becomes a dot.
+fn curve<'b>(
+    chart: &mut ChartContext<'b, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
     style: ShapeStyle,
-    lines: impl Iterator<Item = Vec<(f64, f64)>>,
-) -> Result<(), super::chart::Failure<'b>> {
-    let mut first = true;
-    for line in lines.filter(|line| !line.is_empty()) {
-        let still = line.iter().all(|point| Some(point) == line.first());
-        if let (true, Some(&dot)) = (still, line.first()) {
-            let size = style.stroke_width.max(2 * FINE);
-            chart.draw_series([Circle::new(dot, size, style.filled())])?;
-        }
-        let series = chart.draw_series(LineSeries::new(line, style))?;
-        if first {
-            series.label(name).legend(move |(x, y)| legend_line(x, y, style));
-            first = false;
-        }
+    line: Vec<(f64, f64)>,
+) -> Result<(), Failure<'b>> {
+    let far = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).abs().max((a.1 - b.1).abs());
+    if let Some(&first) = line.first()
+        && line.iter().all(|point| far(*point, first) < DOT)
+    {
+        let size = style.stroke_width.max(2 * FINE);
+        chart.draw_series([Circle::new(first, size, style.filled())])?;
+        return Ok(());
     }
+    chart.draw_series(LineSeries::new(line, style))?;
     Ok(())
 }
 

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
+use crate::latency::IntervalLog;
 use crate::marks;
 use crate::recording::CycleRecord;
 use crate::stage::{Clock, Inputs, MonitorStage, Outputs};
@@ -10,6 +11,7 @@ use signals::artwork::Stroke;
 use signals::feedback::status;
 use signals::time::CYCLE_TIME;
 use signals::{Command, Cycle, Feedback, LaserCycle, Nanoseconds, math};
+use std::time::{Duration, SystemTime};
 
 const SPEED: f64 = 0.1;
 const RADIUS: f64 = 0.01;
@@ -119,17 +121,20 @@ fn the_page_shows_the_run_and_needs_no_network() {
         torque_constants: &[0.0136, 0.0136],
         histograms: stage.histograms(),
     };
-    let page = report.page().unwrap();
-    let picture = report.picture().unwrap();
-    // To look at them: GRAVER_KEEP_REPORT=folder cargo test -p monitor
-    if let Some(folder) = std::env::var_os("GRAVER_KEEP_REPORT") {
-        let folder = std::path::Path::new(&folder);
-        std::fs::write(folder.join("report.html"), &page).unwrap();
-        std::fs::write(folder.join("path.svg"), &picture).unwrap();
-        std::fs::write(folder.join("magnified.svg"), report.magnified_picture().unwrap().0)
-            .unwrap();
-    }
+    // To look at the files: GRAVER_KEEP_REPORT=folder cargo test -p monitor
+    let temporary = tempfile::tempdir().unwrap();
+    let kept = std::env::var_os("GRAVER_KEEP_REPORT");
+    let folder =
+        RunFolder::create_at(kept.as_ref().map_or(temporary.path(), |kept| kept.as_ref())).unwrap();
+    report.write(&folder).unwrap();
+    let mut log = IntervalLog::new(Vec::new(), SystemTime::UNIX_EPOCH).unwrap();
+    let second = Duration::from_secs(1);
+    stage.histograms_mut().write_interval(&mut log, Duration::ZERO, second).unwrap();
+    folder.write(run_folder::LATENCY, log.finish().unwrap()).unwrap();
+    let page = std::fs::read_to_string(folder.file(run_folder::REPORT)).unwrap();
+    let picture = std::fs::read_to_string(folder.file(run_folder::PICTURE)).unwrap();
 
+    assert!(picture.starts_with("<svg") && picture.contains("planned"));
     assert_eq!(page.matches("<svg").count(), 10);
     assert!(page.contains("circle &amp; cross on sample &lt;machine&gt;"));
     for text in

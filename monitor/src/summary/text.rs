@@ -20,10 +20,15 @@ pub fn latency(nanoseconds: u64) -> String {
     format!("{:.1} µs", nanoseconds as f64 * 1e-3)
 }
 
-/// The rows of the summary, name and value; the report shows the same.
+/// The rows of the summary, name and value, those without a value left out; the report shows the
+/// same.
 pub fn rows(summary: &Summary) -> Vec<(String, String)> {
     let mut rows = Vec::new();
-    let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
+    let mut row = |name: &str, value: String| {
+        if !value.is_empty() {
+            rows.push((name.to_owned(), value));
+        }
+    };
     let Summary { job, machine, limits, realtime, .. } = summary;
     row("outcome", summary.outcome.name().to_owned());
     if let Some(fault) = &summary.fault {
@@ -91,26 +96,30 @@ pub fn rows(summary: &Summary) -> Vec<(String, String)> {
             .join(", ")
     };
     let following = &summary.following_error;
-    row(
-        "following error",
-        format!(
-            "max {} mrad, rms {} mrad",
-            list(&following.max, 1e3, 2),
-            list(&following.rms, 1e3, 2)
-        ),
-    );
-    row(
-        "limits used",
-        format!(
-            "velocity {} %, acceleration {} %, jerk {} %, current {} %, path {:.0} % and {:.0} %",
-            list(&limits.velocity, 100.0, 0),
-            list(&limits.acceleration, 100.0, 0),
-            list(&limits.jerk, 100.0, 0),
-            list(&limits.effort, 100.0, 0),
-            limits.path_acceleration * 100.0,
-            limits.path_jerk * 100.0,
-        ),
-    );
+    if !following.max.is_empty() {
+        row(
+            "following error",
+            format!(
+                "max {} mrad, rms {} mrad",
+                list(&following.max, 1e3, 2),
+                list(&following.rms, 1e3, 2)
+            ),
+        );
+    }
+    if !limits.velocity.is_empty() {
+        row(
+            "limits used",
+            format!(
+                "velocity {} %, acceleration {} %, jerk {} %, current {} %, path {:.0} % and {:.0} %",
+                list(&limits.velocity, 100.0, 0),
+                list(&limits.acceleration, 100.0, 0),
+                list(&limits.jerk, 100.0, 0),
+                list(&limits.effort, 100.0, 0),
+                limits.path_acceleration * 100.0,
+                limits.path_jerk * 100.0,
+            ),
+        );
+    }
     row("cycles", format!("{}, {} overruns", summary.cycles, summary.overruns));
     for (hop, figures) in &summary.latency {
         row(
