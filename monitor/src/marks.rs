@@ -5,7 +5,7 @@
 //! is followed from sample to sample; a hold that backs up and resumes is followed too, and its
 //! runs of light add up: a gap between them is missing, an overlap is double.
 //!
-//! Work and memory per sample are bounded: the [`Judge`] takes records as they come.
+//! The [`Judge`] takes records as they come; it remembers runs of light, not samples.
 
 pub mod coverage;
 pub mod line;
