@@ -4,6 +4,14 @@ use signals::Nanoseconds;
 
 const SECOND: i64 = 1_000_000_000;
 
+/// How long before a deadline a real-time thread ends its sleep and spins.
+///
+/// Measured on a 2-core VM under FIFO 85, beside compilers, 12 interleaved rounds of 3 s; median
+/// over the rounds of the 99th percentile of |period − 1 ms|: plain sleep 32 µs, 50 µs of spinning
+/// 62 µs (noise of the host), 100 µs 6 µs, LinuxCNC's servo thread 90 µs. In quiet rounds: sleep 15
+/// to 20 µs, 100 µs 0.1 to 0.3 µs. It is a tenth of one core, far from the kernel's throttle.
+pub const SPIN_MARGIN: Nanoseconds = Nanoseconds(100_000);
+
 /// The monotonic clock, which every stamp in a sample is from.
 pub fn now() -> Nanoseconds {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
@@ -19,7 +27,7 @@ pub(crate) fn timespec(time: Nanoseconds) -> libc::timespec {
     libc::timespec { tv_sec: time.0 / SECOND, tv_nsec: time.0 % SECOND }
 }
 
-/// Sleeps until `deadline` [monotonic ns]; at once when it has passed. Goes on sleeping after a
+/// Sleeps until `deadline` on the monotonic clock; at once when it has passed. Goes on sleeping after a
 /// signal.
 pub fn sleep_until(deadline: Nanoseconds) {
     let until = timespec(Nanoseconds(deadline.0.max(0)));
@@ -62,7 +70,7 @@ pub struct PeriodicClock {
 impl PeriodicClock {
     /// A clock whose cycle 0 has its deadline one period from now.
     ///
-    /// `margin` [ns] is how long before a deadline the sleep ends and spinning begins, 0 for none.
+    /// `margin` is how long before a deadline the sleep ends and spinning begins, 0 for none.
     pub fn new(period: Nanoseconds, margin: Nanoseconds) -> Self {
         Self { period, margin, deadline: now() + period, cycle: 0, overruns: 0 }
     }
@@ -106,7 +114,7 @@ impl PeriodicClock {
     }
 
     /// Moves this and all later deadlines so that this one is not before now: for drives that can
-    /// wait. Returns by how much [ns], 0 when nothing had passed; does not count an overrun.
+    /// wait. Returns by how much, 0 when nothing had passed; does not count an overrun.
     pub fn slip(&mut self) -> Nanoseconds {
         let late = Nanoseconds((now() - self.deadline).0.max(0));
         self.deadline = self.deadline + late;

@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 
 use signals::sample::fnv1a;
 
-/// Longest name of an instance [bytes].
+/// Longest name of an instance, in bytes.
 pub const MAX_NAME: usize = 32;
 
-/// Longest path of a Unix socket, its terminating zero included [bytes]; unix(7).
+/// Longest path of a Unix socket, its terminating zero included, in bytes; unix(7).
 const MAX_SOCKET_PATH: usize = 108;
 
 /// Hexadecimal digits of the hash in all names: 48 bits.

@@ -2,7 +2,7 @@
 //! real-time threads, and processes that watch each other.
 //!
 //! The only crate with `unsafe`, libc and iceoryx2. It knows how a sample travels and never what it
-//! means. A pipeline is one [`Domain`](domain::Domain): its holder creates every channel, the
+//! means. A pipeline is one [`Domain`]: its holder creates every channel, the
 //! services join and only open them, and whoever leaves last removes what is left.
 //!
 //! Order in a service: join the domain, make all ports, helper threads and peers, then

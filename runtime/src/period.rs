@@ -30,7 +30,7 @@ impl PeriodRecorder {
         }
     }
 
-    /// The periods [ns], in order.
+    /// The periods, in order.
     pub fn periods(&self) -> &[Nanoseconds] {
         &self.periods
     }

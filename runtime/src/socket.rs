@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use crate::domain::Domain;
 use crate::instance::{Instance, user};
 
-/// Longest line that either side takes [bytes].
+/// Longest line that either side takes, in bytes.
 const MAX_LINE: u64 = 1 << 20;
 
 /// How long a client waits for a plain answer; planning happens elsewhere, so this is long.

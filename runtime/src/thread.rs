@@ -10,8 +10,9 @@ use std::fs::File;
 use std::io::{self, Write};
 
 use core_affinity::CoreId;
-use signals::RealtimeFacts;
+use signals::{Nanoseconds, RealtimeFacts};
 
+use crate::clock::SPIN_MARGIN;
 use crate::core_lock::{CoreError, CoreLock};
 
 /// Priority of the drives' cycle, above the controller on the same core.
@@ -20,10 +21,10 @@ pub const DRIVES_PRIORITY: i32 = 85;
 /// Priority of the controller's cycle.
 pub const CONTROLLER_PRIORITY: i32 = 80;
 
-/// Stack that is touched ahead, so that a cycle meets no page fault there [bytes].
+/// Stack that is touched ahead, so that a cycle meets no page fault there, in bytes.
 const STACK: usize = 256 * 1024;
 
-/// What locked memory may grow by after the set-up [bytes].
+/// What locked memory may grow by after the set-up, in bytes.
 const HEADROOM: u64 = 64 << 20;
 
 /// Bits of the effective capabilities; capabilities(7).
@@ -65,6 +66,13 @@ pub struct Realtime {
 }
 
 impl Realtime {
+    /// How long this thread's clock may spin before a deadline: [`SPIN_MARGIN`] with a
+    /// real-time priority, else 0, because an ordinary thread would only spend its share of the
+    /// CPU.
+    pub fn spin_margin(&self) -> Nanoseconds {
+        if self.facts.fifo == 1 { SPIN_MARGIN } else { Nanoseconds(0) }
+    }
+
     /// Claims the core for this pipeline, if the thread really has a real-time priority on one;
     /// for drives, whose controller shares the core.
     pub fn claim_core(&self) -> Result<Option<CoreLock>, CoreError> {
@@ -247,6 +255,7 @@ mod tests {
         assert_eq!(realtime.facts, RealtimeFacts { core: -1, ..RealtimeFacts::default() });
         assert_eq!(realtime.warnings, Vec::<String>::new());
         assert!(realtime.claim_core().unwrap().is_none());
+        assert_eq!(realtime.spin_margin(), Nanoseconds(0));
     }
 
     #[test]
