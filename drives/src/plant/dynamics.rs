@@ -291,7 +291,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// Where `start` is after one step of the length of `weights`.
     ///
     /// Classical fourth-order Runge–Kutta for the mechanical part; the winding is solved by its
-    /// exponentials at the same stages. Powers of current beyond the stage's limit are cut at the
+    /// exponentials at the same stages. Current beyond the power stage's limit is cut at the
     /// end of the step: see [`super::Plant`].
     pub fn step(
         &mut self,
