@@ -1,12 +1,13 @@
 //! What the words of a line do, in the order that RS-274 gives them, and what stays in force.
 
+mod arc_words;
+
 use std::ops::Range;
 
 use machine::Machine;
 use machine::process::{GcodeSettings, ZMeaning};
 use nalgebra::Vector3;
 
-use super::arc::{Arc, Form, NoArc, axes, rounding};
 use super::block::Block;
 use super::codes::{
     Chosen, FeedMode, Laser, MILLIMETRE, Motion, Once, PathControl, Plane, Reference, Stop, spell,
@@ -19,8 +20,6 @@ use crate::drawing::{Action, Note, Power};
 const MINUTE: f64 = 60.0;
 /// Longest dwell of one G4 [s]: a day.
 const LONGEST_DWELL: f64 = 86_400.0;
-/// Most turns of one arc.
-const MOST_TURNS: f64 = 10_000.0;
 /// The output bit of the air assist.
 const AIR_ASSIST: u32 = 0;
 
@@ -388,106 +387,6 @@ impl<'a> Interpreter<'a> {
             Some(Motion::Clockwise) => self.arc(block, motion, false),
             Some(Motion::Counterclockwise) => self.arc(block, motion, true),
         }
-    }
-
-    /// G2 and G3.
-    fn arc(
-        &mut self,
-        block: &mut Block,
-        motion: Option<&Chosen<Motion>>,
-        counterclockwise: bool,
-    ) -> Result<(), Box<Refusal>> {
-        let feed = self.feed(block, motion)?;
-        let place = place(block, motion);
-        let to = self.target(block, false);
-        let form = self.form(block, place.clone())?;
-        let turns = self.turns(block)?;
-        let start = self.tracer.arc_start();
-        let refuse = |fault: NoArc| {
-            let (message, help) = fault.explain();
-            Refusal::new(place, message, "this arc", help)
-        };
-        let Modal { plane, unit, .. } = self.modal;
-        let arc = Arc::new(plane, counterclockwise, start, to, form, turns, rounding(unit))
-            .map_err(refuse)?;
-        self.note_height(to);
-        if self.modal.plane != Plane::Xy && self.settings.z == ZMeaning::Ignored {
-            self.remark(Remark::Height);
-        }
-        if self.tracer.arc(&arc, to, feed) {
-            self.remark(Remark::Folded);
-        }
-        Ok(())
-    }
-
-    /// Centre or radius of an arc.
-    fn form(&mut self, block: &mut Block, place: Range<usize>) -> Result<Form, Box<Refusal>> {
-        let [u, v, w] = axes(self.modal.plane);
-        let letters = [b'I', b'J', b'K'];
-        let (first, second) = (char::from(letters[u]), char::from(letters[v]));
-        if let Some(radius) = block.number(b'R') {
-            if block.has_offsets() {
-                return Err(Refusal::new(
-                    block.span(b'R'),
-                    "the arc has R and a centre",
-                    "radius",
-                    "write either R, or I, J and K",
-                ));
-            }
-            return Ok(Form::Radius(radius * self.modal.unit));
-        }
-        // Some post-processors write a zero offset along the normal; another is a wrong plane.
-        if block.number(letters[w]).is_some_and(|number| number != 0.0) {
-            return Err(Refusal::new(
-                block.span(letters[w]),
-                format!("{} is not in the plane of the arc", char::from(letters[w])),
-                "offset out of the plane",
-                format!(
-                    "this plane's centre is {first} and {second}; G17 is XY, G18 is ZX, G19 is YZ"
-                ),
-            ));
-        }
-        let absolute = self.modal.arc_distance == Reference::Absolute;
-        let mut centre = self.tracer.position;
-        let mut given = 0;
-        for axis in [u, v] {
-            let Some(number) = block.number(letters[axis]) else { continue };
-            given += 1;
-            let length = number * self.modal.unit;
-            centre[axis] = if absolute {
-                self.modal.origin[axis] + self.modal.shift[axis] + length
-            } else {
-                centre[axis] + length
-            };
-        }
-        if given == 0 || absolute && given < 2 {
-            let wanted = if absolute { "and" } else { "or" };
-            return Err(Refusal::new(
-                place,
-                "the arc has no centre",
-                "no centre or radius",
-                format!("an arc in this plane needs {first} {wanted} {second}, or R"),
-            ));
-        }
-        Ok(Form::Centre(centre))
-    }
-
-    /// How often an arc passes its end: P of G2 and G3.
-    fn turns(&self, block: &mut Block) -> Result<f64, Box<Refusal>> {
-        if !block.has(b'P') {
-            return Ok(1.0);
-        }
-        claim(block, b'P')?;
-        let turns = block.number(b'P').unwrap_or(1.0);
-        if turns.floor() == turns && (1.0..=MOST_TURNS).contains(&turns) {
-            return Ok(turns);
-        }
-        Err(Refusal::new(
-            block.span(b'P'),
-            format!("P{turns} is not a number of turns"),
-            "turns of the arc",
-            format!("P of G2 and G3 is a whole number from 1 to {MOST_TURNS}"),
-        ))
     }
 
     /// The feed of a move on this line.

@@ -18,7 +18,7 @@ fn random_arcs_keep_their_ends_and_radius() {
         let plane = PLANES[(random.next() % 3) as usize];
         let [u, v, w] = axes(plane);
         let radius = random.logarithmic(1e-5, 1.0);
-        let counterclockwise = random.next() % 2 == 0;
+        let counterclockwise = random.next().is_multiple_of(2);
         let first = random.between(-PI, PI);
         let sweep = random.between(1e-3, TAU - 1e-3);
         let last = if counterclockwise { first + sweep } else { first - sweep };
@@ -32,7 +32,7 @@ fn random_arcs_keep_their_ends_and_radius() {
         };
         let start = on(first, random.between(-0.1, 0.1));
         let end = on(last, random.between(-0.1, 0.1));
-        let by_radius = random.next() % 2 == 0;
+        let by_radius = random.next().is_multiple_of(2);
         let form = if by_radius {
             Form::Radius(if sweep < PI { radius } else { -radius })
         } else {

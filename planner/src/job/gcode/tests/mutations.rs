@@ -116,7 +116,8 @@ fn random_text_never_panics() {
     let mut random = Random::new(1);
     for _ in 0..20_000 {
         let count = 1 + random.next() % 24;
-        let mut text = String::from(if random.next() % 2 == 0 { "F60 M3 S9\n" } else { "" });
+        let mut text =
+            String::from(if random.next().is_multiple_of(2) { "F60 M3 S9\n" } else { "" });
         for _ in 0..count {
             text.push_str(PIECES[(random.next() % PIECES.len() as u64) as usize]);
         }
