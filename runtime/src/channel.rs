@@ -119,6 +119,12 @@ pub enum ChannelError {
         /// What iceoryx2 said.
         reason: String,
     },
+    /// The channel went away between joining and opening.
+    #[error("channel {channel:?} is gone: the holder of the domain has ended")]
+    Gone {
+        /// The channel.
+        channel: &'static str,
+    },
     /// An open channel failed; the domain is damaged. Does not allocate.
     #[error("channel {channel:?} failed")]
     Lost {
@@ -222,6 +228,7 @@ fn open<T: Channel>(domain: &Domain) -> Result<Factory<T>, ChannelError> {
             Error::IncompatibleTypes | Error::IncompatibleAttributes => {
                 ChannelError::Layout { channel: T::SERVICE, sample: T::NAME }
             }
+            Error::DoesNotExist => ChannelError::Gone { channel: T::SERVICE },
             other => refused::<T>(other),
         })
 }
