@@ -296,13 +296,11 @@ impl Controller {
         match self.state {
             State::Enabling { waited, held } => self.enable(now, feedback, waited, held),
             State::Idle if self.intake.is_ready() => self.begin(now, feedback.cycle),
-            State::Running if self.is_at_end() => {
-                if self.player.is_at_rest() {
-                    outputs.report = Some(self.finish(true));
-                    self.state = State::Idle;
-                }
+            State::Running if self.is_at_end() && self.player.is_at_rest() => {
+                outputs.report = Some(self.finish(true));
+                self.state = State::Idle;
             }
-            State::Running if self.player.is_resting() && self.alignment.is_done() => {
+            State::Running if !self.is_at_end() && self.alignment.is_done() => {
                 self.player.resume(self.intake.lookahead());
             }
             State::Holding(AfterRest::Resume) if self.player.is_at_rest() => {

@@ -3,7 +3,7 @@
 //! At rate `r` velocity goes with `r`, acceleration and its torque with `r²`, jerk with `r³`, and
 //! laser power with `r`. As planned is always allowed: the planner's checker vouches for rate 1.
 
-use machine::{Axis, Machine, PathLimits};
+use machine::{Axis, Machine};
 use signals::{Setpoint, math};
 
 /// The fastest a stream is ever played.
@@ -16,37 +16,63 @@ const VOLTAGE_SHARE: f64 = 0.9;
 /// Share of the power stage's current that a rate may use up.
 const CURRENT_SHARE: f64 = 0.9;
 
-/// The limits that a rate must keep.
+/// The limits that a rate must keep, as reciprocals: this is asked once a cycle.
 #[derive(Debug, Clone)]
 pub struct RateLimit {
-    path: PathLimits,
-    axes: Vec<Axis>,
+    marking: f64,
+    moving: f64,
+    acceleration: f64,
+    jerk: f64,
+    axes: Vec<AxisRate>,
+}
+
+/// One axis: reciprocal limits of its joint, and the two lines that bound its motor's torque.
+#[derive(Debug, Clone, Copy)]
+struct AxisRate {
+    velocity: f64,
+    acceleration: f64,
+    jerk: f64,
+    /// Friction per joint speed [N·m·s/m or N·m·s/rad].
+    viscous: f64,
+    coulomb: f64,
+    /// Torque that the current gives [N·m].
+    by_current: f64,
+    /// Torque that the voltage gives at standstill [N·m].
+    by_voltage: f64,
+    /// Torque that each unit of joint speed takes from that.
+    back_emf: f64,
 }
 
 impl RateLimit {
     /// Of this machine.
     pub fn new(machine: &Machine) -> Self {
-        Self { path: machine.path, axes: machine.axes.clone() }
+        let path = &machine.path;
+        Self {
+            marking: 1.0 / path.speed,
+            moving: 1.0 / path.speed.max(path.rapid),
+            acceleration: 1.0 / path.acceleration,
+            jerk: 1.0 / path.jerk,
+            axes: machine.axes.iter().map(AxisRate::new).collect(),
+        }
     }
 
     /// The largest rate for `setpoint`, 1..=[`LARGEST_RATE`].
     pub fn of(&self, setpoint: &Setpoint) -> f64 {
         let lit = setpoint.laser.is_lit();
-        let speed = if lit { self.path.speed } else { self.path.speed.max(self.path.rapid) };
-        let mut velocity = setpoint.path_velocity / speed;
-        let mut acceleration = setpoint.path_acceleration / self.path.acceleration;
-        let mut jerk = setpoint.path_jerk / self.path.jerk;
+        let mut velocity = setpoint.path_velocity * if lit { self.marking } else { self.moving };
+        let mut acceleration = setpoint.path_acceleration * self.acceleration;
+        let mut jerk = setpoint.path_jerk * self.jerk;
         let mut rate = LARGEST_RATE;
         let joints = setpoint.velocity.iter().zip(&setpoint.acceleration).zip(&setpoint.jerk);
         let efforts = setpoint.effort.iter().zip(&setpoint.static_effort);
-        for ((axis, ((joint_velocity, joint_acceleration), joint_jerk)), (effort, standing)) in
+        for ((axis, ((speed, joint_acceleration), joint_jerk)), (effort, standing)) in
             self.axes.iter().zip(joints).zip(efforts)
         {
-            velocity = velocity.max(joint_velocity.abs() / axis.limits.velocity);
-            acceleration = acceleration.max(joint_acceleration.abs() / axis.limits.acceleration);
-            jerk = jerk.max(joint_jerk.abs() / axis.limits.jerk);
-            let speed = joint_velocity.abs() / axis.ratio;
-            rate = rate.min(motor_rate(axis, speed, (effort - standing).abs(), standing.abs()));
+            velocity = velocity.max(speed.abs() * axis.velocity);
+            acceleration = acceleration.max(joint_acceleration.abs() * axis.acceleration);
+            jerk = jerk.max(joint_jerk.abs() * axis.jerk);
+            let motor = axis.motor_rate(speed.abs(), (effort - standing).abs(), standing.abs());
+            rate = rate.min(motor);
         }
         if lit {
             velocity = velocity.max(brightest(setpoint));
@@ -65,22 +91,32 @@ impl RateLimit {
     }
 }
 
-/// The largest rate for a motor that turns at `speed` [rad/s] with `moving` torque that goes with
-/// `r²` and `standing` torque that does not [N·m], friction on top.
-fn motor_rate(axis: &Axis, speed: f64, moving: f64, standing: f64) -> f64 {
-    let motor = &axis.motor;
-    let viscous = axis.friction.viscous * speed;
-    let constant = standing + axis.friction.coulomb;
-    let torque = motor.torque_constant * motor.current * CURRENT_SHARE;
-    let by_current = largest_root(moving, viscous, constant - torque);
-    // R·τ/k + k·ω ≤ V, times k/R.
-    let scale = motor.torque_constant / motor.resistance;
-    let by_voltage = largest_root(
-        moving,
-        viscous + scale * motor.torque_constant * speed,
-        constant - scale * motor.voltage * VOLTAGE_SHARE,
-    );
-    by_current.min(by_voltage)
+impl AxisRate {
+    fn new(axis: &Axis) -> Self {
+        let (motor, limits) = (&axis.motor, &axis.limits);
+        // R·τ/k + k·ω ≤ V, times k/R.
+        let scale = motor.torque_constant / motor.resistance;
+        Self {
+            velocity: 1.0 / limits.velocity,
+            acceleration: 1.0 / limits.acceleration,
+            jerk: 1.0 / limits.jerk,
+            viscous: axis.friction.viscous / axis.ratio,
+            coulomb: axis.friction.coulomb,
+            by_current: motor.torque_constant * motor.current * CURRENT_SHARE,
+            by_voltage: scale * motor.voltage * VOLTAGE_SHARE,
+            back_emf: scale * motor.torque_constant / axis.ratio,
+        }
+    }
+
+    /// The largest rate for a joint at `speed` whose motor needs `moving` torque that goes with
+    /// `r²` and `standing` torque that does not [N·m], friction on top.
+    fn motor_rate(&self, speed: f64, moving: f64, standing: f64) -> f64 {
+        let viscous = self.viscous * speed;
+        let constant = standing + self.coulomb;
+        let by_current = largest_root(moving, viscous, constant - self.by_current);
+        let slope = viscous + self.back_emf * speed;
+        by_current.min(largest_root(moving, slope, constant - self.by_voltage))
+    }
 }
 
 /// The largest `r` up to [`LARGEST_RATE`] with `a·r² + b·r + c ≤ 0`, for `a, b ≥ 0`; 0 without.

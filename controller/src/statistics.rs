@@ -4,7 +4,7 @@ use crate::cascade::Drive;
 use crate::digest::Digest;
 use crate::feedforward::Planned;
 use crate::player::Instant;
-use machine::Machine;
+use machine::{Axis, Machine};
 use signals::{
     Command, ControllerReport, Cycle, Fault, Feedback, MAX_AXES, RealtimeFacts, Setpoint,
 };
@@ -12,16 +12,35 @@ use signals::{
 /// The running report of a stream.
 #[derive(Debug, Clone)]
 pub struct Statistics {
-    machine: Machine,
+    path_acceleration: f64,
+    path_jerk: f64,
+    axes: Vec<Shares>,
     report: ControllerReport,
     digest: Digest,
+}
+
+/// Reciprocal limits of one axis.
+#[derive(Debug, Clone, Copy)]
+struct Shares {
+    velocity: f64,
+    acceleration: f64,
+    jerk: f64,
+    current: f64,
 }
 
 impl Statistics {
     /// For this machine, before any stream.
     pub fn new(machine: &Machine) -> Self {
+        let shares = |axis: &Axis| Shares {
+            velocity: 1.0 / axis.limits.velocity,
+            acceleration: 1.0 / axis.limits.acceleration,
+            jerk: 1.0 / axis.limits.jerk,
+            current: 1.0 / axis.motor.current,
+        };
         Self {
-            machine: machine.clone(),
+            path_acceleration: 1.0 / machine.path.acceleration,
+            path_jerk: 1.0 / machine.path.jerk,
+            axes: machine.axes.iter().map(shares).collect(),
             report: ControllerReport::default(),
             digest: Digest::new(),
         }
@@ -46,8 +65,8 @@ impl Statistics {
         report.cycles += 1;
         report.count += 1;
         report.last_cycle = feedback.cycle;
-        self.digest.add(command, self.machine.axes.len());
-        for index in 0..self.machine.axes.len().min(MAX_AXES) {
+        self.digest.add(command, self.axes.len());
+        for index in 0..self.axes.len().min(MAX_AXES) {
             let error = (now.angle[index] - feedback.position[index]).abs();
             report.following_error_max[index] = report.following_error_max[index].max(error);
             report.following_error_squares[index] += error * error;
@@ -57,35 +76,28 @@ impl Statistics {
     /// Counts the current asked of the motor with this index.
     pub fn drive(&mut self, index: usize, drive: &Drive) {
         if let (Some(axis), Some(most)) =
-            (self.machine.axes.get(index), self.report.effort_use.get_mut(index))
+            (self.axes.get(index), self.report.effort_use.get_mut(index))
         {
-            *most = most.max(drive.current.abs() / axis.motor.current);
+            *most = most.max(drive.current.abs() * axis.current);
         }
     }
 
     /// Counts what `setpoint`, played at the rate of `instant`, uses of the limits: as planned and
     /// scaled to the rate.
     pub fn setpoint(&mut self, setpoint: &Setpoint, instant: Instant) {
-        let (report, path) = (&mut self.report, &self.machine.path);
+        let report = &mut self.report;
         let rate = instant.rate.abs();
         let (square, cube) = (rate * rate, rate * rate * rate);
         let raise = |most: &mut f64, share: f64| *most = most.max(share);
-        raise(
-            &mut report.path_acceleration_use,
-            setpoint.path_acceleration * square / path.acceleration,
-        );
-        raise(&mut report.path_jerk_use, setpoint.path_jerk * cube / path.jerk);
-        for (index, axis) in self.machine.axes.iter().enumerate().take(MAX_AXES) {
-            let limits = &axis.limits;
-            raise(
-                &mut report.velocity_use[index],
-                setpoint.velocity[index].abs() * rate / limits.velocity,
-            );
-            raise(
-                &mut report.acceleration_use[index],
-                setpoint.acceleration[index].abs() * square / limits.acceleration,
-            );
-            raise(&mut report.jerk_use[index], setpoint.jerk[index].abs() * cube / limits.jerk);
+        let path_acceleration = setpoint.path_acceleration * square * self.path_acceleration;
+        raise(&mut report.path_acceleration_use, path_acceleration);
+        raise(&mut report.path_jerk_use, setpoint.path_jerk * cube * self.path_jerk);
+        for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
+            let velocity = setpoint.velocity[index].abs() * rate * axis.velocity;
+            let acceleration = setpoint.acceleration[index].abs() * square * axis.acceleration;
+            raise(&mut report.velocity_use[index], velocity);
+            raise(&mut report.acceleration_use[index], acceleration);
+            raise(&mut report.jerk_use[index], setpoint.jerk[index].abs() * cube * axis.jerk);
         }
     }
 

@@ -155,7 +155,8 @@ fn a_dry_stream_ends_at_rest_on_what_is_in_hand() {
 
 #[test]
 fn setpoints_that_break_the_stream_or_a_limit_are_never_played() {
-    let cases: [(FaultCode, fn(&mut Setpoint)); 7] = [
+    type Spoil = fn(&mut Setpoint);
+    let cases: [(FaultCode, Spoil); 7] = [
         (FaultCode::StreamBroken, |setpoint| setpoint.sequence += 1),
         (FaultCode::StreamBroken, |setpoint| setpoint.stream = 2),
         (FaultCode::SetpointLimit, |setpoint| setpoint.velocity[1] = 0.7),
