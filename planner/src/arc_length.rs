@@ -107,9 +107,9 @@ impl<C: Parametric> ByArcLength<C> {
         self.length
     }
 
-    /// The number of steps in the table.
-    pub(crate) fn steps(&self) -> usize {
-        self.nodes.len() - 1
+    /// The curve itself.
+    pub(crate) fn curve(&self) -> &C {
+        &self.curve
     }
 }
 

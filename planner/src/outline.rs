@@ -2,7 +2,7 @@
 
 use machine::PathLimits;
 
-use crate::blend::Join;
+use crate::blend::{Join, Quarter};
 use crate::drawing::{Curve, Power};
 use crate::jet::Jet;
 use crate::stroke::StrokePath;
@@ -102,13 +102,10 @@ impl Outline {
         for join in self.joins.iter().filter(|join| !join.is_smooth()) {
             speed = speed.min(join.sharpest(join.room).speed(acceleration, jerk));
         }
-        if self.joins.is_empty() {
-            return speed;
-        }
-        // The bound above takes the curves' bend at the joins alone; the smoothed path is measured
-        // and has the last word. Each round shortens less than the one before.
+        // That takes the curves' bend at the joins alone; the smoothed joins are measured and have
+        // the last word. Each round shortens less than the one before.
         for _ in 0..8 {
-            let measured = self.trace(speed, limits).bend().speed(acceleration, jerk);
+            let measured = self.measured(speed, limits).speed(acceleration, jerk);
             if measured >= speed {
                 break;
             }
@@ -117,22 +114,57 @@ impl Outline {
         speed
     }
 
+    /// How sharply the path at `speed` bends at most.
+    fn measured(&self, speed: f64, limits: &PathLimits) -> Bend {
+        let mut bend = self.bend;
+        for index in 0..self.joins.len() {
+            if let Some((_, quarters)) = self.smoothed(index, speed, limits) {
+                bend =
+                    quarters.iter().fold(bend, |bend, (part, length)| bend.or(part.bend(*length)));
+            }
+        }
+        bend
+    }
+
+    /// The reach and the quarters of the join after track `index`; `None` where the curves go over
+    /// into each other as they are.
+    fn smoothed(
+        &self,
+        index: usize,
+        speed: f64,
+        limits: &PathLimits,
+    ) -> Option<(f64, [(Quarter, f64); 4])> {
+        /// Each lengthening of a join that turns out too sharp.
+        const LONGER: f64 = 1.05;
+        let join = self.joins.get(index).filter(|join| !join.is_smooth())?;
+        let (acceleration, jerk) = (limits.acceleration, limits.jerk);
+        let shortest = join.shortest(speed, acceleration, jerk);
+        let gentle = join.gentle(limits.tolerance * GENTLE);
+        let mut reach = shortest.max(gentle).min(join.room);
+        loop {
+            let quarters = join.quarters(&self.tracks[index], &self.tracks[index + 1], reach);
+            let fits = |(part, length): &(Quarter, f64)| {
+                part.bend(*length).speed(acceleration, jerk) >= speed
+            };
+            if reach >= join.room || quarters.iter().all(fits) {
+                return Some((reach, quarters));
+            }
+            reach = (reach * LONGER).min(join.room);
+        }
+    }
+
     /// The path of the stroke at `speed` [m/s], its joins smoothed as that speed needs.
     pub(crate) fn trace(&self, speed: f64, limits: &PathLimits) -> StrokePath {
         let mut path = StrokePath::default();
         let mut from = 0.0;
         for (index, track) in self.tracks.iter().enumerate() {
-            let join = self.joins.get(index).filter(|join| !join.is_smooth());
-            let Some(join) = join else {
+            let Some((reach, quarters)) = self.smoothed(index, speed, limits) else {
                 path.push_track(track, from, track.length() - from);
                 from = 0.0;
                 continue;
             };
-            let shortest = join.shortest(speed, limits.acceleration, limits.jerk);
-            let gentle = join.reach_at(limits.tolerance * GENTLE);
-            let reach = shortest.max(gentle).min(join.room);
             path.push_track(track, from, track.length() - reach - from);
-            for (quarter, length) in join.quarters(track, &self.tracks[index + 1], reach) {
+            for (quarter, length) in quarters {
                 path.push_quarter(quarter, length);
             }
             from = reach;

@@ -17,6 +17,9 @@ use crate::sampler::{Sampler, Unreachable};
 use crate::speed;
 use crate::trajectory::Trajectory;
 
+/// Jobs that last longer are refused, most likely for a slip of the pen [s].
+const LONGEST: f64 = 7.0 * 86_400.0;
+
 /// A job, planned and checked for one machine.
 #[derive(Debug, Clone)]
 pub struct Plan {
@@ -87,6 +90,12 @@ pub enum PlanError {
         line: u64,
         /// The speed that its curvature allows [m/s].
         speed: f64,
+    },
+    /// A motion that would not end while anybody waits for it.
+    #[error("this job would take {:.1} days, more than a week", duration / 86_400.0)]
+    TooLong {
+        /// How long it lasts [s].
+        duration: f64,
     },
     /// The laser source cannot switch on and off in the time of a stroke.
     #[error(
@@ -159,7 +168,7 @@ impl PlanError {
     /// Line of the job file that it concerns, from 1; 0 for none.
     pub fn line(&self) -> u64 {
         match self {
-            Self::IdealOnly(_) => 0,
+            Self::IdealOnly(_) | Self::TooLong { .. } => 0,
             Self::TooSharp { line, .. }
             | Self::TooShort { line, .. }
             | Self::TooManyEdges { line, .. }
@@ -202,11 +211,13 @@ fn plan_within(machine: &Machine, job: &Job, ideal: bool) -> Result<Plan, PlanEr
     let trajectory =
         Trajectory::new(drawing.start, &stops, &limits, &machine.laser, &chosen.speeds)
             .map_err(|short| PlanError::TooShort { line: short.line, duration: short.duration })?;
+    if trajectory.end().is_nan() || trajectory.end() > LONGEST {
+        return Err(PlanError::TooLong { duration: trajectory.duration() });
+    }
     check_edges(&trajectory)?;
-    let artwork = artwork(&stops);
     let facts = PlanFacts {
         name: drawing.name.clone(),
-        strokes: artwork.strokes.len(),
+        strokes: 0,
         length: speed::outlines(&stops).map(crate::outline::Outline::length).sum(),
         duration: trajectory.duration(),
         samples: 0,
@@ -215,7 +226,7 @@ fn plan_within(machine: &Machine, job: &Job, ideal: bool) -> Result<Plan, PlanEr
         uses: Uses::default(),
     };
     let mut plan = Plan {
-        artwork,
+        artwork: Artwork::default(),
         facts,
         trajectory: Arc::new(trajectory),
         mechanism: machine.mechanism.clone(),
@@ -225,6 +236,9 @@ fn plan_within(machine: &Machine, job: &Job, ideal: bool) -> Result<Plan, PlanEr
     let (samples, uses) = plan.visit(CheckAll { plan: &plan, checker })?;
     plan.facts.samples = samples;
     plan.facts.uses = uses;
+    // Last, so that a drawing far beyond the area is refused before it is drawn point by point.
+    plan.artwork = artwork(&stops);
+    plan.facts.strokes = plan.artwork.strokes.len();
     Ok(plan)
 }
 

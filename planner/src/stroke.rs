@@ -2,7 +2,7 @@
 
 use crate::blend::Quarter;
 use crate::jet::Jet;
-use crate::track::{Bend, Track};
+use crate::track::Track;
 
 /// The path that the tool follows while the laser is on. It is never empty once it is planned.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -53,26 +53,6 @@ impl StrokePath {
         let after = self.spans.partition_point(|span| span.start <= distance);
         let span = &self.spans[after.max(1) - 1];
         span.at(distance - span.start)
-    }
-
-    /// How sharply it bends at most.
-    pub(crate) fn bend(&self) -> Bend {
-        /// Points on a quarter of a join, which is a cubic away from a smooth curve.
-        const POINTS: usize = 8;
-        let mut bend = Bend::default();
-        for (index, span) in self.spans.iter().enumerate() {
-            match &span.shape {
-                Shape::Track(track, _) => bend = bend.or(track.bend()),
-                Shape::Quarter(quarter) => {
-                    let end = self.spans.get(index + 1).map_or(self.length, |next| next.start);
-                    for point in 0..=POINTS {
-                        let share = point as f64 / POINTS as f64;
-                        bend = bend.or(Bend::of(&quarter.at((end - span.start) * share)));
-                    }
-                }
-            }
-        }
-        bend
     }
 
     /// Distances at which the path goes over from one shape into the next [m].

@@ -64,6 +64,40 @@ impl Parametric for Ellipse {
     }
 }
 
+impl Ellipse {
+    /// The largest value on the arc of a function of a point and its derivatives by arc length.
+    ///
+    /// By angle the sharp ends of a flat ellipse are as wide as the rest; the best of even samples
+    /// is refined between its neighbours.
+    fn largest(&self, of: impl Fn(&Jet) -> f64) -> f64 {
+        const SAMPLES_PER_TURN: f64 = 256.0;
+        const REFINEMENTS: usize = 24;
+        let value = |angle: f64| of(&self.jet(angle).by_arc_length());
+        let count = (self.sweep / math::TURN * SAMPLES_PER_TURN).ceil().max(16.0) as usize;
+        let step = self.sweep / count as f64;
+        let (mut best, mut most) = (0.0, 0.0);
+        for index in 0..=count {
+            let found = value(step * index as f64);
+            if found > most {
+                (best, most) = (step * index as f64, found);
+            }
+        }
+        // Ternary search: the function has one top between the neighbours of the best sample.
+        let (mut low, mut high) = ((best - step).max(0.0), (best + step).min(self.sweep));
+        for _ in 0..REFINEMENTS {
+            let (left, right) = ((2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0);
+            let (at_left, at_right) = (value(left), value(right));
+            most = most.max(at_left).max(at_right);
+            if at_left < at_right {
+                low = left;
+            } else {
+                high = right;
+            }
+        }
+        most
+    }
+}
+
 impl Track {
     /// Takes `curve` by arc length.
     pub(crate) fn new(curve: &Curve) -> Self {
@@ -129,17 +163,10 @@ impl Track {
         match self {
             Self::Line { .. } => Bend::default(),
             Self::Circle { .. } => Bend::of(&self.at(0.0)),
-            Self::Ellipse(table) => {
-                // An ellipse's curvature and its derivative have their extremes where sin 2φ or
-                // cos 2φ is a simple ratio of its axes: well inside steps this fine.
-                let steps = 8 * table.steps();
-                let step = self.length() / steps as f64;
-                let mut bend = Bend::default();
-                for index in 0..=steps {
-                    bend = bend.or(Bend::of(&self.at(step * index as f64)));
-                }
-                bend
-            }
+            Self::Ellipse(table) => Bend {
+                curvature: table.curve().largest(|jet| jet.second.norm()),
+                third: table.curve().largest(|jet| jet.third.norm()),
+            },
         }
     }
 

@@ -11,7 +11,6 @@ use machine::{LaserSource, PathLimits};
 use nalgebra::Vector3;
 use signals::Nanoseconds;
 
-use crate::drawing::Power;
 use crate::itinerary::{Feed, Stop};
 use crate::outline::Outline;
 use crate::run_in::{RunIn, RunOut};
@@ -256,35 +255,26 @@ impl Builder {
             return;
         }
         let mut since = 0.0;
-        for (index, (time, power)) in exposures.enumerate() {
-            let at = if index == 0 {
-                on
-            } else {
-                Nanoseconds::from_seconds(start + since - on_delay).max(on).min(off)
-            };
+        let mut level = 0.0;
+        for (time, power) in exposures {
+            if power != level {
+                let at = Nanoseconds::from_seconds(start + since - on_delay).max(on).min(off);
+                self.trajectory.laser.push(LaserChange { time: at, power, stroke });
+                level = power;
+            }
             since += time;
-            self.trajectory.laser.push(LaserChange { time: at, power, stroke });
         }
         self.trajectory.laser.push(LaserChange { time: off, power: 0.0, stroke: 0 });
     }
 }
 
-/// Times and powers along a stroke at `speed`, tracks of one power put together.
+/// Times and powers along a stroke at `speed`, track by track.
 fn exposures(outline: &Outline, speed: f64) -> impl Iterator<Item = (f64, f64)> {
     let asked = outline.speed;
-    let level = move |power: &Power| {
+    outline.tracks().iter().zip(&outline.powers).map(move |(track, power)| {
         // Power that follows the speed is told for the speed that was asked for.
         let share =
             if power.follows_speed { asked.map_or(1.0, |asked| speed / asked) } else { 1.0 };
-        (power.level * share).min(1.0)
-    };
-    let mut exposures: Vec<(f64, f64)> = Vec::new();
-    for (track, power) in outline.tracks().iter().zip(&outline.powers) {
-        let (time, power) = (track.length() / speed, level(power));
-        match exposures.last_mut() {
-            Some((whole, same)) if *same == power => *whole += time,
-            _ => exposures.push((time, power)),
-        }
-    }
-    exposures.into_iter()
+        (track.length() / speed, (power.level * share).min(1.0))
+    })
 }

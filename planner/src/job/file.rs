@@ -196,7 +196,7 @@ fn of_letters(
         Style::H1 => (Some(H1_RAPID), None),
         Style::H2 => (Some(f64::INFINITY), Some(REPLICA)),
     };
-    findings.finish(Job { drawing, marking: how(marking), rapid, ideal_only })
+    findings.finish(Job { drawing, marking: how(marking), rapid, program: None, ideal_only })
 }
 
 fn of_points(
@@ -235,11 +235,11 @@ fn of_program(
     findings.finish(())?;
     let text = super::read_text(path)?;
     let program = gcode::read(&path.display().to_string(), &text, machine)?;
-    Ok(job_of(program.drawing, marking))
+    Ok(Job { program: Some(program.facts), ..job_of(program.drawing, marking) })
 }
 
 fn job_of(drawing: Drawing, marking: &MarkingTable) -> Job {
-    Job { drawing, marking: how(marking), rapid: None, ideal_only: None }
+    Job { drawing, marking: how(marking), rapid: None, program: None, ideal_only: None }
 }
 
 fn how(table: &MarkingTable) -> Marking {

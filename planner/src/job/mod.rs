@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 use machine::document::{Document, nearest};
 use machine::{DocumentError, Machine, Override};
 
-use crate::drawing::Drawing;
+use crate::drawing::{Action, Drawing, Step};
+use nalgebra::Vector3;
 use gcode::GcodeError;
 
 /// A job, read and understood, but not planned.
@@ -23,6 +24,8 @@ pub struct Job {
     /// Largest speed of free moves that the job's convention has [m/s]; `None` leaves it to the
     /// machine file.
     pub rapid: Option<f64>,
+    /// What a G-code program asks for; `None` for other jobs.
+    pub program: Option<gcode::ProgramFacts>,
     /// Why this job can be planned but not run on a machine, if so.
     pub ideal_only: Option<&'static str>,
 }
@@ -124,6 +127,15 @@ impl Job {
     pub fn builtin(overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
         let document = Document::parse("letters.toml", BUILTIN)?.override_with(overrides, "")?;
         file::job(document, Path::new(""), machine)
+    }
+}
+
+impl Job {
+    /// Begins the job where the tool stands, `tool` in the machine frame [m], with a rapid from
+    /// there to where the drawing wants to begin.
+    pub fn approach_from(&mut self, tool: Vector3<f64>) {
+        let to = std::mem::replace(&mut self.drawing.start, tool);
+        self.drawing.steps.insert(0, Step { action: Action::Rapid { to }, line: 0 });
     }
 }
 

@@ -1,0 +1,488 @@
+//! What every plan must keep, over random drawings and the letters: continuity of position,
+//! velocity and acceleration over all pieces, limits as norms, laser instants, setpoints that are
+//! the derivatives of each other, smoothed joins within tolerance.
+
+#![allow(clippy::unwrap_used)]
+
+use machine::kinematics::ToolMotion;
+use machine::{Machine, Override};
+use nalgebra::Vector3;
+use planner::drawing::{Action, Curve, Drawing, Power, Step};
+use planner::trajectory::{Course, Trajectory};
+use planner::{Job, Marking, MarkingSpeed, Plan, PlanError, plan};
+use signals::setpoint::flags;
+
+/// splitmix64, so that a failing seed can be run again.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut value = self.0;
+        value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        value ^ (value >> 31)
+    }
+
+    fn between(&mut self, lower: f64, upper: f64) -> f64 {
+        lower + (upper - lower) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+fn step(action: Action) -> Step {
+    Step { action, line: 7 }
+}
+
+fn mark(curve: Curve, speed: Option<f64>) -> Step {
+    let power = Power { level: 0.5, follows_speed: speed.is_some() };
+    step(Action::Mark { curve, speed, power })
+}
+
+fn job(steps: Vec<Step>, machine: &Machine) -> Job {
+    let drawing = Drawing {
+        name: "test".to_owned(),
+        start: Vector3::from(machine.home),
+        steps,
+        notes: Vec::new(),
+    };
+    Job { drawing, marking: Marking::default(), rapid: None, program: None, ideal_only: None }
+}
+
+/// An arc that starts at `from` with the direction `heading`, and the point and heading it ends with.
+fn arc(from: Vector3<f64>, heading: f64, radius: f64, sweep: f64) -> (Curve, Vector3<f64>, f64) {
+    use signals::math::{cos, sin};
+    let left = Vector3::new(-sin(heading), cos(heading), 0.0) * sweep.signum();
+    let centre = from + left * radius;
+    let major = -left * radius;
+    let curve = Curve::Arc {
+        centre,
+        major,
+        minor: Vector3::new(-major.y, major.x, 0.0),
+        start: 0.0,
+        sweep,
+        rise: Vector3::zeros(),
+    };
+    (curve, curve.to(), heading + sweep)
+}
+
+/// Strokes of lines, arcs and ellipses, some going on into each other with or without a small kink,
+/// with rapids, feeds in the dark, dwells and dots between them.
+fn random_drawing(random: &mut Random, machine: &Machine) -> Job {
+    let mut steps = Vec::new();
+    let home = Vector3::from(machine.home);
+    let mut place = home;
+    let mut heading = 0.0;
+    for _ in 0..8 {
+        let to = home + Vector3::new(random.between(-0.03, 0.03), random.between(-0.03, 0.03), 0.0);
+        match random.next() % 8 {
+            0 => {
+                steps.push(step(Action::Rapid { to }));
+                place = to;
+            }
+            1 => {
+                steps.push(step(Action::Feed {
+                    curve: Curve::Line { from: place, to },
+                    speed: 0.1,
+                }));
+                place = to;
+            }
+            2 => {
+                let (curve, to, _) = arc(place, heading, random.between(0.001, 0.02), 2.0);
+                steps.push(step(Action::Feed { curve, speed: 0.2 }));
+                place = to;
+            }
+            3 => {
+                let lit = (random.next() % 2 == 0).then_some(0.3);
+                steps.push(step(Action::Dwell { time: random.between(0.001, 0.02), lit }));
+            }
+            4 => {
+                let curve = Curve::Arc {
+                    centre: home,
+                    major: Vector3::new(random.between(0.005, 0.03), 0.0, 0.0),
+                    minor: Vector3::new(0.0, random.between(0.005, 0.03), 0.0),
+                    start: random.between(0.0, 6.0),
+                    sweep: random.between(-6.2, 6.2),
+                    rise: Vector3::zeros(),
+                };
+                steps.push(mark(curve, None));
+                place = curve.to();
+            }
+            _ => {
+                let speed = (random.next() % 2 == 0).then(|| random.between(0.02, 0.25));
+                for _ in 0..1 + random.next() % 4 {
+                    // A kink below the corner of 1°.
+                    heading += random.between(-0.017, 0.017);
+                    let (curve, to, turned) = match random.next() % 2 {
+                        0 => {
+                            let along = Vector3::new(
+                                signals::math::cos(heading),
+                                signals::math::sin(heading),
+                                0.0,
+                            );
+                            let to = place + along * random.between(0.0005, 0.02);
+                            (Curve::Line { from: place, to }, to, heading)
+                        }
+                        _ => {
+                            let radius = random.between(0.001, 0.03);
+                            arc(place, heading, radius, random.between(-3.0, 3.0))
+                        }
+                    };
+                    steps.push(mark(curve, speed));
+                    (place, heading) = (to, turned);
+                }
+            }
+        }
+    }
+    job(steps, machine)
+}
+
+fn machine_of_any_size() -> Machine {
+    let mut machine = Machine::builtin();
+    machine.area.lower = [-10.0; 3];
+    machine.area.upper = [10.0; 3];
+    for axis in &mut machine.axes {
+        axis.limits.position = [-20.0, 20.0];
+    }
+    machine
+}
+
+/// Position, velocity and acceleration are continuous where pieces meet, and where the shapes of a
+/// stroke's path do; within pieces each is the derivative of the one before, and norms keep limits.
+fn check_motion(trajectory: &Trajectory, machine: &Machine, case: &str) {
+    let limits = &machine.path;
+    let mut before: Option<ToolMotion> = None;
+    for (index, piece) in trajectory.pieces.iter().enumerate() {
+        let name = format!("{case}, piece {index} of line {}", piece.line);
+        let first = piece.course.at(0.0);
+        if let Some(before) = before {
+            let jump = first.position - before.position;
+            assert!(jump.norm() < 1e-8, "{name}: jumps by {jump}");
+            let jump = first.velocity - before.velocity;
+            assert!(jump.norm() < 1e-8, "{name}: velocity jumps by {jump}");
+            let jump = first.acceleration - before.acceleration;
+            assert!(jump.norm() < 1e-5, "{name}: acceleration jumps by {jump}");
+        }
+        before = Some(piece.course.at(piece.duration));
+        let mut instants = vec![0.0, piece.duration];
+        if let Course::Stroke { path, speed } = &piece.course {
+            for seam in path.seams() {
+                let (left, right) = (path.at(seam * (1.0 - 1e-14)), path.at(seam));
+                assert!((left.point - right.point).norm() < 1e-8, "{name}");
+                let jump = (left.first - right.first) * *speed;
+                assert!(jump.norm() < 1e-8, "{name}: velocity jumps by {jump} at {seam}");
+                let jump = (left.second - right.second) * (speed * speed);
+                assert!(jump.norm() < 1e-5, "{name}: acceleration jumps by {jump} at {seam}");
+                instants.push(seam / speed);
+            }
+        }
+        let count = 200;
+        for sample in 0..=count {
+            let time = piece.duration * f64::from(sample) / f64::from(count);
+            let now = piece.course.at(time);
+            let over = now.acceleration.norm() / limits.acceleration;
+            assert!(over <= 1.0005, "{name}: acceleration {over} of the limit at {time}");
+            let over = now.jerk.norm() / limits.jerk;
+            assert!(over <= 1.0005, "{name}: jerk {over} of the limit at {time}");
+            assert!(now.velocity.norm() <= limits.rapid * 1.005, "{name}: {}", now.velocity);
+            if let Course::Stroke { speed, .. } = &piece.course {
+                let off = now.velocity.norm() / speed - 1.0;
+                // On smoothed joins with the tightest arcs of these drawings; blend.rs.
+                assert!(off.abs() <= 7e-3, "{name}: speed off by {off:e}");
+            }
+            // Simpson over a short step; its error is a third derivative of bounded functions.
+            let step = 1e-6_f64.min(piece.duration / 4.0);
+            if time + 2.0 * step <= piece.duration && step > 0.0 {
+                let middle = piece.course.at(time + step);
+                let end = piece.course.at(time + 2.0 * step);
+                let mean = (now.velocity + middle.velocity * 4.0 + end.velocity) / 6.0;
+                let off = (end.position - now.position) / (2.0 * step) - mean;
+                assert!(off.norm() < 1e-8, "{name}: velocity is off by {off} at {time}");
+                let mean = (now.acceleration + middle.acceleration * 4.0 + end.acceleration) / 6.0;
+                let off = (end.velocity - now.velocity) / (2.0 * step) - mean;
+                // A change of jerk inside the step: 2·J·step.
+                let most = 2.0 * limits.jerk * step + 1e-6;
+                assert!(off.norm() < most, "{name}: acceleration is off by {off} at {time}");
+            }
+        }
+    }
+    let last = before.unwrap();
+    assert!(last.velocity.norm() < 1e-9 && last.acceleration.norm() < 1e-6, "{case}");
+}
+
+/// The laser changes exactly where strokes and dots begin and end, to the nanosecond.
+fn check_laser(plan: &Plan, case: &str) {
+    let trajectory = &plan.trajectory;
+    let mut open = 0;
+    for change in &trajectory.laser {
+        let piece = trajectory
+            .pieces
+            .iter()
+            .find(|piece| {
+                let lit = matches!(&piece.course, Course::Stroke { .. } | Course::Rest(_));
+                let at =
+                    if change.stroke != 0 { piece.start } else { piece.start + piece.duration };
+                lit && piece.stroke == change.stroke.max(open)
+                    && (at - change.time.seconds()).abs() <= 0.51e-9
+            })
+            .is_some();
+        assert!(piece, "{case}: {change:?} is no end of a stroke");
+        open = change.stroke;
+    }
+    assert_eq!(open, 0, "{case}: the laser stays on");
+}
+
+/// The stream is whole, starts and ends at rest in the dark, and its gate is what the trajectory
+/// says.
+fn check_stream(plan: &Plan, case: &str) {
+    let stream: Vec<_> = plan.setpoints(3).collect();
+    assert_eq!(stream.len() as u64, plan.facts.samples, "{case}");
+    let mut lit = 0_i64;
+    let mut gate = 0;
+    let mut strokes = 0;
+    for (index, setpoint) in stream.iter().enumerate() {
+        assert_eq!((setpoint.stream, setpoint.sequence), (3, index as u64), "{case}");
+        assert_eq!(setpoint.laser.gate, gate, "{case}: the gate jumps between cycles");
+        let mut since = 0;
+        for edge in setpoint.laser.edges() {
+            assert!(edge.offset < 1_000_000 && i64::from(edge.offset) >= since, "{case}");
+            lit += i64::from(gate) * (i64::from(edge.offset) - since);
+            since = i64::from(edge.offset);
+            gate = edge.gate;
+        }
+        lit += i64::from(gate) * (1_000_000 - since);
+        assert_eq!(setpoint.stroke != 0, setpoint.laser.is_lit(), "{case}");
+        assert!(setpoint.stroke == 0 || setpoint.stroke >= strokes, "{case}");
+        strokes = strokes.max(setpoint.stroke);
+        assert_eq!(setpoint.has(flags::LAST), index + 1 == stream.len(), "{case}");
+    }
+    let expected: f64 = plan
+        .trajectory
+        .laser
+        .windows(2)
+        .filter(|pair| pair[0].stroke != 0)
+        .map(|pair| (pair[1].time - pair[0].time).seconds())
+        .sum();
+    assert!((lit as f64 * 1e-9 - expected).abs() < 1e-12, "{case}: lit {lit} ns of {expected} s");
+    assert_eq!(strokes as usize, plan.artwork.strokes.len(), "{case}");
+    for setpoint in stream.iter().take(2).chain(stream.iter().rev().take(2)) {
+        assert_eq!(setpoint.path_velocity, 0.0, "{case}");
+        assert!(setpoint.lead.iter().all(|lead| lead.abs() < 2e-9), "{case}: {:?}", setpoint.lead);
+        assert!(setpoint.effort.iter().all(|effort| effort.abs() < 1e-5), "{case}");
+    }
+}
+
+#[test]
+fn random_drawings_are_smooth_and_keep_their_limits() {
+    let machine = machine_of_any_size();
+    for seed in 0..120 {
+        let mut random = Random(seed);
+        let job = random_drawing(&mut random, &machine);
+        let case = format!("seed {seed}");
+        let planned = match plan(&machine, &job) {
+            Ok(planned) => planned,
+            Err(error) => panic!("{case}: {error}"),
+        };
+        check_motion(&planned.trajectory, &machine, &case);
+        check_laser(&planned, &case);
+        check_stream(&planned, &case);
+    }
+}
+
+#[test]
+fn letters_are_smooth_and_keep_their_limits() {
+    let machine = Machine::builtin();
+    for style in ["curves", "h1"] {
+        let setting = Override { key: "letters.style".to_owned(), value: style.to_owned() };
+        let job = Job::builtin(&[setting], &machine).unwrap();
+        let planned = plan(&machine, &job).unwrap();
+        check_motion(&planned.trajectory, &machine, style);
+        check_laser(&planned, style);
+        check_stream(&planned, style);
+        let strokes = if style == "h1" { 3 + 3 + 19 + 20 } else { 3 + 3 + 1 + 1 };
+        assert_eq!(planned.facts.strokes, strokes);
+    }
+}
+
+/// The smoothed S stays within the tolerance of its two arcs, and leaves them at all.
+#[test]
+fn a_jump_of_curvature_is_smoothed_within_the_tolerance() {
+    for (height, most) in [(0.01, 2e-6), (0.02, 2e-6), (0.05, 2e-6)] {
+        let machine = Machine::builtin();
+        let settings = [
+            Override { key: "letters.text".to_owned(), value: "S".to_owned() },
+            Override { key: "letters.height".to_owned(), value: format!("\"{height} m\"") },
+        ];
+        let planned = plan(&machine, &Job::builtin(&settings, &machine).unwrap()).unwrap();
+        let stroke = planned
+            .trajectory
+            .pieces
+            .iter()
+            .find_map(|piece| match &piece.course {
+                Course::Stroke { path, .. } => Some(path.clone()),
+                _ => None,
+            })
+            .unwrap();
+        let drawn = &planned.artwork.strokes[0];
+        // Chords are shorter than the curve by κ·(chord error)/3, at most 11 ppm here.
+        assert!((drawn.length() / stroke.length() - 1.0).abs() < 2e-5);
+        assert!((planned.facts.length / stroke.length() - 1.0).abs() < 1e-12);
+        let middle = stroke.length() / 2.0;
+        let mut worst: f64 = 0.0;
+        for index in -400..=400 {
+            let point = stroke.at(middle + f64::from(index) * 1e-5).point;
+            let nearest = drawn
+                .points
+                .windows(2)
+                .map(|pair| {
+                    let (a, b) = (Vector3::from(pair[0]), Vector3::from(pair[1]));
+                    let along =
+                        ((point - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
+                    (point - a - (b - a) * along).norm()
+                })
+                .fold(f64::INFINITY, f64::min);
+            worst = worst.max(nearest);
+        }
+        println!("S at {height} m leaves its line by {worst:e} m");
+        assert!(worst <= most && worst > 1e-8, "{height}: {worst:e}");
+    }
+}
+
+/// The motor's torque over any stretch of cycles adds up to the change of its momentum: rotor and
+/// load get what the samples say.
+#[test]
+fn efforts_add_up_to_momentum() {
+    let machine = Machine::builtin();
+    let planned = plan(&machine, &Job::builtin(&[], &machine).unwrap()).unwrap();
+    let stream: Vec<_> = planned.setpoints(1).collect();
+    for axis in 0..2 {
+        let (mut impulse, mut worst, mut peak) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for pair in stream.windows(2) {
+            impulse += (pair[0].effort[axis] + pair[1].effort[axis]) / 2.0 * 1e-3;
+            // Momentum of the rotor's lead is left out: B·λ̇ + K·λ = τ makes it 2 % of the peak.
+            worst = worst.max((impulse - pair[1].momentum[axis]).abs());
+            peak = peak.max(pair[1].momentum[axis].abs());
+        }
+        assert!(worst < 0.06 * peak, "axis {axis}: {worst:e} of {peak:e} N m s");
+        assert!(impulse.abs() < 1e-4 * peak, "axis {axis}: {impulse:e} of {peak:e} N m s left");
+    }
+}
+
+/// Off the ends of the area, beyond a motor, beyond an axis: each is refused with its place.
+#[test]
+fn broken_limits_are_named() {
+    let line = |length: f64, machine: &Machine| {
+        let from = Vector3::from(machine.home);
+        job(vec![mark(Curve::Line { from, to: from + Vector3::x() * length }, Some(0.2))], machine)
+    };
+    let breach =
+        |machine: &Machine, length: f64| match plan(machine, &line(length, machine)).unwrap_err() {
+            PlanError::Limit { line, place, breach } => {
+                assert_eq!(line, 7);
+                assert_eq!(place.time, breach.time);
+                breach
+            }
+            other => panic!("{other}"),
+        };
+    let machine = Machine::builtin();
+    let found = breach(&machine, 0.12);
+    assert_eq!((found.quantity, found.limit), ("x of the tool", 0.2));
+    assert!(found.value > 0.2 && found.value < 0.2003, "{}", found.value);
+
+    let mut weak = machine.clone();
+    weak.axes[1].motor.voltage = 3.0;
+    let found = breach(&weak, 0.05);
+    assert_eq!((found.axis.as_deref(), found.quantity), (Some("b"), "motor voltage"));
+
+    let mut weak = machine.clone();
+    weak.axes[0].motor.current = 0.5;
+    let found = breach(&weak, 0.05);
+    assert_eq!((found.axis.as_deref(), found.quantity), (Some("a"), "motor current"));
+
+    let mut slow = machine.clone();
+    slow.axes[0].limits.velocity = 0.1;
+    let found = breach(&slow, 0.05);
+    assert_eq!((found.quantity, found.limit), ("joint velocity", 0.1));
+    assert!(found.value > 0.1 && found.value < 0.11, "{}", found.value);
+
+    let message = plan(&slow, &line(0.05, &slow)).unwrap_err().to_string();
+    let expected = "at 0.024 s, axis a: joint velocity of 0.1";
+    assert!(message.starts_with(expected), "{message}");
+}
+
+#[test]
+fn a_speed_beyond_the_path_is_reduced_with_one_note() {
+    let machine = Machine::builtin();
+    let from = Vector3::from(machine.home);
+    let (curve, ..) = arc(from, 0.0, 1e-3, 3.0);
+    let steps = vec![mark(curve, Some(0.2)), step(Action::Pause), mark(curve, Some(0.2))];
+    let planned = plan(&machine, &job(steps, &machine)).unwrap();
+    // V³κ² ≤ J binds at this radius: (500·10⁻⁶)^⅓ = 79.4 mm/s, below √(A·R) = 100 mm/s.
+    assert!((planned.facts.speed - 0.079_370).abs() < 1e-6, "{}", planned.facts.speed);
+    assert_eq!(planned.facts.notes.len(), 1);
+    let note = &planned.facts.notes[0];
+    assert_eq!(note.line, 7);
+    assert!(note.text.contains("0.0794 m/s instead of 0.2000 m/s"), "{}", note.text);
+    // M4: the power follows the speed, here 39.7 % of half power.
+    let power = planned.trajectory.laser[0].power;
+    assert!((power - 0.5 * 0.079_370 / 0.2).abs() < 1e-6, "{power}");
+    let pauses: Vec<_> =
+        planned.setpoints(1).filter(|setpoint| setpoint.has(flags::PAUSE)).collect();
+    assert_eq!(pauses.len(), 1);
+    assert_eq!(pauses[0].path_velocity, 0.0);
+    assert!(pauses[0].lead.iter().all(|lead| lead.abs() < 1e-8), "{:?}", pauses[0].lead);
+}
+
+#[test]
+fn laser_delays_are_compensated() {
+    let mut machine = Machine::builtin();
+    machine.laser.on_delay = 150e-6;
+    machine.laser.off_delay = 50e-6;
+    let from = Vector3::from(machine.home);
+    let curve = Curve::Line { from, to: from + Vector3::x() * 0.01 };
+    let planned = plan(&machine, &job(vec![mark(curve, Some(0.1))], &machine)).unwrap();
+    let stroke = planned
+        .trajectory
+        .pieces
+        .iter()
+        .find(|piece| matches!(piece.course, Course::Stroke { .. }));
+    let stroke = stroke.unwrap();
+    let on = planned.trajectory.laser[0].time.seconds();
+    let off = planned.trajectory.laser[1].time.seconds();
+    assert!((stroke.start - on - 150e-6).abs() < 1e-9);
+    assert!((stroke.start + stroke.duration - off - 50e-6).abs() < 1e-9);
+}
+
+#[test]
+fn dots_are_lit_where_and_as_long_as_asked() {
+    let machine = Machine::builtin();
+    let place = Vector3::from(machine.home) + Vector3::new(0.01, -0.02, 0.0);
+    let steps = vec![
+        step(Action::Rapid { to: place }),
+        step(Action::Dwell { time: 0.0123, lit: Some(0.4) }),
+        step(Action::Dwell { time: 0.002, lit: Some(0.8) }),
+        step(Action::Output { bit: 2, on: true }),
+    ];
+    let planned = plan(&machine, &job(steps, &machine)).unwrap();
+    assert_eq!(planned.artwork.strokes.len(), 1);
+    assert_eq!(planned.artwork.strokes[0].points, vec![[place.x, place.y, place.z]]);
+    let changes: Vec<_> = planned.trajectory.laser.iter().map(|change| change.power).collect();
+    assert_eq!(changes, [0.4, 0.8, 0.0]);
+    let lit = planned.trajectory.laser[2].time - planned.trajectory.laser[0].time;
+    assert_eq!(lit.0, 14_300_000);
+    let last = planned.setpoints(1).last().unwrap();
+    assert_eq!(last.outputs, 4);
+    assert!((Vector3::from(last.tool) - place).norm() < 1e-15);
+}
+
+#[test]
+fn a_fixed_speed_rules_over_the_program() {
+    let machine = Machine::builtin();
+    let from = Vector3::from(machine.home);
+    let curve = Curve::Line { from, to: from + Vector3::x() * 0.02 };
+    let mut job = job(vec![mark(curve, Some(0.2))], &machine);
+    job.marking.speed = Some(MarkingSpeed::Constant(0.05));
+    assert_eq!(plan(&machine, &job).unwrap().facts.speed, 0.05);
+    job.marking.speed = Some(MarkingSpeed::Optimum);
+    job.marking.max_speed = Some(0.01);
+    assert_eq!(plan(&machine, &job).unwrap().facts.speed, 0.01);
+}
