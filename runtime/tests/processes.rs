@@ -9,11 +9,13 @@ mod scratch;
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use runtime::child::ChildProcess;
 use runtime::peer::{PeerState, Peers};
+use runtime::wake::Wake;
 use runtime::{Domain, DomainError, Instance, Reading, Role};
 use scratch::Scratch;
 use signals::{Cycle, Feedback, Progress};
@@ -290,6 +292,25 @@ fn a_child_keeps_the_domain_from_its_first_instruction() {
     let status = child.wait_within(PATIENCE).unwrap().unwrap();
     assert_eq!(status.signal(), Some(libc::SIGTERM));
     drop(Domain::create(scratch.instance()).unwrap());
+}
+
+#[test]
+fn a_child_inherits_the_lock_and_nothing_else() {
+    let scratch = Scratch::new();
+    let holder = Domain::create(scratch.instance()).unwrap();
+    let _ports = (holder.publisher::<Feedback>().unwrap(), holder.listener(Wake::Command).unwrap());
+    let mut sleep = Command::new("sleep");
+    sleep.arg("600").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let child = ChildProcess::spawn(&holder, sleep).unwrap();
+    let directory = format!("/proc/{}/fd", child.pid());
+    // While it starts, `sleep` also has its libraries open for a moment.
+    eventually("only the lock is open", || {
+        let entries = std::fs::read_dir(&directory).unwrap().flatten();
+        let mut open: Vec<_> =
+            entries.filter_map(|entry| std::fs::read_link(entry.path()).ok()).collect();
+        open.retain(|path| path != Path::new("/dev/null"));
+        open == [scratch.instance().lock_path()]
+    });
 }
 
 #[test]
