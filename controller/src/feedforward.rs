@@ -78,7 +78,7 @@ impl Feedforward {
         &self.after
     }
 
-    /// Rests at `angle` [rad] from now on, as if it always had; the tool at `tool` [m].
+    /// Rests at `angle` [rad] from now on, as if it always had; the tool at `tool`, in metres.
     pub fn rest_at(&mut self, angle: &AxisArray, tool: [f64; 3]) {
         let resting = Planned { angle: *angle, tool, ..Planned::default() };
         (self.before, self.now, self.next, self.after) = (resting, resting, resting, resting);

@@ -10,7 +10,7 @@ use crate::supervision::{Finding, Supervision, Tracking};
 use machine::Machine;
 use signals::{FaultCode, Nanoseconds, Setpoint};
 
-/// Setpoints that must be in hand before a stream begins, unless it is shorter [setpoints].
+/// Setpoints that must be in hand before a stream begins, unless it is shorter.
 pub const BEGINNING: u64 = 250;
 
 /// The way into the look-ahead.
