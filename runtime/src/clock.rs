@@ -6,10 +6,11 @@ const SECOND: i64 = 1_000_000_000;
 
 /// How long before a deadline a real-time thread ends its sleep and spins.
 ///
-/// Measured on a 2-core VM under FIFO 85, beside compilers, 12 interleaved rounds of 3 s; median
-/// over the rounds of the 99th percentile of |period − 1 ms|: plain sleep 32 µs, 50 µs of spinning
-/// 62 µs (noise of the host), 100 µs 6 µs, LinuxCNC's servo thread 90 µs. In quiet rounds: sleep 15
-/// to 20 µs, 100 µs 0.1 to 0.3 µs. It is a tenth of one core, far from the kernel's throttle.
+/// Chosen from quiet rounds on a 2-core VM under FIFO 85: the 99th percentile of |period − 1 ms| is
+/// 14 to 20 µs with a plain sleep and 0.1 to 0.3 µs with 100 µs of spinning. Beside compilers the
+/// margins cannot be told apart: medians over 12 interleaved rounds of 3 s, overruns slipped, were
+/// 32 µs asleep and 62, 6 and 272 µs with 50, 100 and 200 µs, where LinuxCNC's servo thread, which
+/// does not slip, had 90 µs. It is a tenth of one core, far from the kernel's throttle.
 pub const SPIN_MARGIN: Nanoseconds = Nanoseconds(100_000);
 
 /// The monotonic clock, which every stamp in a sample is from.
