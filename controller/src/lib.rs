@@ -16,6 +16,7 @@ pub mod lookahead;
 pub mod player;
 pub mod ramp;
 pub mod rate_limit;
+pub mod service;
 pub mod statistics;
 pub mod stream_time;
 pub mod supervision;

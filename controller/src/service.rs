@@ -86,16 +86,13 @@ impl ServiceCycle {
     fn answer(&mut self, feedback: &Feedback, received: Nanoseconds) -> Result<(), ServiceError> {
         self.setpoints_taken.clear();
         while self.setpoints_taken.len() < DRAIN.min(self.controller.room()) {
-            let Some(setpoint) = self.setpoints.next()? else { break };
+            let Some(setpoint) = self.setpoints.receive()? else { break };
             self.setpoints_taken.push(setpoint);
         }
-        let inputs = Inputs {
-            feedback,
-            received,
-            setpoints: &self.setpoints_taken,
-            request: self.request(),
-            peers: self.present(),
-        };
+        let request = self.request();
+        let peers = self.present();
+        let setpoints = &self.setpoints_taken;
+        let inputs = Inputs { feedback, received, setpoints, request, peers };
         self.controller.step(received, &inputs, &mut self.outputs);
 
         // The command first: everything else can wait until drives has it.

@@ -51,12 +51,14 @@ pub struct PlantOptions {
     pub substep: f64,
     /// Step of the measured current [A]; 0 reads it exactly.
     pub current_resolution: f64,
+    /// Chooses where between two counts each encoder stands at home; 0 puts all in the middle.
+    pub seed: u64,
 }
 
 impl Default for PlantOptions {
     fn default() -> Self {
         // 20 kHz; 14 bits over ±8 A.
-        Self { substep: 50e-6, current_resolution: 1e-3 }
+        Self { substep: 50e-6, current_resolution: 1e-3, seed: 0 }
     }
 }
 
@@ -140,6 +142,8 @@ pub struct Plant<const N: usize, M: Mechanism<N>> {
     current_resolution: f64,
     resolution: SVector<f64, N>,
     origin: SVector<f64, N>,
+    /// Where between two counts each encoder stands at the origin, −0.5..0.5 [counts].
+    phase: SVector<f64, N>,
     state: State<N>,
     in_force: Option<Actuation>,
     light: LaserCycle,
@@ -158,7 +162,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         home: [f64; 3],
         options: PlantOptions,
     ) -> Result<Self, PlantError> {
-        let PlantOptions { substep, current_resolution } = options;
+        let PlantOptions { substep, current_resolution, seed } = options;
         if !(1e-6..=5e-5).contains(&substep) {
             return Err(PlantError::Substep(substep));
         }
@@ -194,6 +198,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             current_resolution,
             resolution: SVector::from_fn(|row, _| axes[row].encoder.resolution()),
             origin: angle,
+            phase: SVector::from_fn(|row, _| encoder_phase(seed, row as u64)),
             state: State {
                 current: SVector::zeros(),
                 angle,
@@ -280,8 +285,8 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
     fn measure(&mut self, measurement: &mut Measurement) {
         *measurement = Measurement::default();
         for row in 0..N {
-            let counts =
-                ((self.state.angle[row] - self.origin[row]) / self.resolution[row]).round();
+            let turned = (self.state.angle[row] - self.origin[row]) / self.resolution[row];
+            let counts = (turned + self.phase[row]).round();
             measurement.counts[row] = counts as i64;
             measurement.position[row] = self.origin[row] + counts * self.resolution[row];
             measurement.current[row] = self.state.current[row];
@@ -370,4 +375,16 @@ fn refusal<const N: usize>(actuation: &Actuation) -> Fault {
 /// `value` within ±`limit`.
 fn saturate(value: f64, limit: f64) -> f64 {
     value.max(-limit).min(limit)
+}
+/// A phase −0.5..0.5 [counts] for an encoder, 0 for seed 0 (SplitMix64, Steele et al. 2014).
+fn encoder_phase(seed: u64, axis: u64) -> f64 {
+    if seed == 0 {
+        return 0.0;
+    }
+    let mut state = seed.wrapping_add(axis.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    state = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    state = (state ^ (state >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    state ^= state >> 31;
+    // The upper 53 bits as a fraction of one.
+    (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
 }

@@ -8,13 +8,11 @@
 
 use crate::bridge::{Bridge, BridgeOptions, Deadlines, GatePermission};
 use crate::port::{Freshness, Port};
-use runtime::channel::ChannelError;
 use runtime::clock::{self, PeriodicClock};
-use runtime::domain::DomainError;
 use runtime::peer::{PeerState, Peers};
 use runtime::thread::{self, RealtimeOptions};
-use runtime::wake::Wake;
-use runtime::{Domain, Publisher, Reading, Role, Subscriber, signal};
+use runtime::wake::{Listener, Notifier, Wake};
+use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, signal};
 use signals::time::CYCLE_PERIOD;
 use signals::{Command, DrivesReport, FaultCode, Feedback, Nanoseconds};
 
@@ -39,20 +37,6 @@ pub struct ServiceOptions {
     pub realtime: RealtimeOptions,
     /// How long before a deadline the thread stops sleeping and spins, 0 to only sleep.
     pub margin: Nanoseconds,
-}
-
-/// Why the service ended early.
-#[derive(Debug, thiserror::Error)]
-pub enum ServiceError {
-    /// A port of the domain could not be opened.
-    #[error(transparent)]
-    Domain(#[from] DomainError),
-    /// A channel failed.
-    #[error(transparent)]
-    Channel(#[from] ChannelError),
-    /// The operating system refused.
-    #[error("{0}")]
-    Io(#[from] std::io::Error),
 }
 
 /// Runs until it is told to end (SIGTERM) or nobody is left to obey; the axes are at rest then.
@@ -107,8 +91,8 @@ struct ServiceCycle {
     feedbacks: Publisher<Feedback>,
     reports: Publisher<DrivesReport>,
     commands: Subscriber<Command>,
-    feedback_wake: runtime::wake::Notifier,
-    command_wake: runtime::wake::Listener,
+    feedback_wake: Notifier,
+    command_wake: Listener,
     reported: DrivesReport,
 }
 

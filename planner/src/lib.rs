@@ -17,8 +17,10 @@ pub mod plan;
 pub mod profile;
 #[cfg(test)]
 mod random;
+pub mod request;
 pub mod run_in;
 mod sampler;
+pub mod service;
 mod speed;
 pub mod stroke;
 pub mod timing;

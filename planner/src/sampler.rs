@@ -194,6 +194,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
                 drive.inertia * acceleration[axis] / drive.ratio + drive.ratio * mean[axis]
             }),
             static_effort: per_axis(&|axis, drive| drive.ratio * gravity[axis]),
+            lead_momentum: axis_array(self.lead.settled(&impulse).as_slice()),
             momentum: per_axis(&|axis, drive| {
                 drive.inertia * motion.velocity[axis] / drive.ratio + drive.ratio * impulse[axis]
             }),
@@ -206,7 +207,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     fn laser(&mut self) -> (LaserCycle, u64) {
         let start = self.sequence as i64 * CYCLE;
         let mut cycle = LaserCycle {
-            gate: u32::from(self.laser.power > 0.0),
+            gate: gate(self.laser.power, self.laser.stroke),
             power: self.laser.power,
             ..LaserCycle::OFF
         };
@@ -218,7 +219,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             }
             let edge = GateEdge {
                 offset: u32::try_from(offset).unwrap_or(0),
-                gate: u32::from(change.power > 0.0),
+                gate: gate(change.power, change.stroke),
                 power: change.power,
             };
             if !cycle.push(edge) {
@@ -281,4 +282,9 @@ impl<const N: usize, M: Mechanism<N>> Iterator for Sampler<N, M> {
         self.sequence += 1;
         Some(setpoint)
     }
+}
+
+/// The gate of a sample: open for `stroke` where there is power.
+fn gate(power: f64, stroke: u64) -> u32 {
+    if power > 0.0 { u32::try_from(stroke).unwrap_or(u32::MAX) } else { 0 }
 }

@@ -51,7 +51,10 @@ pub fn read<K: Kind>(text: &str) -> Result<f64, QuantityError> {
 }
 
 /// Reads `text` as a share, `"80 %"` or `"0.8"`.
-pub(crate) fn read_share(text: &str) -> Result<f64, QuantityError> {
+///
+/// # Errors
+/// What is not a share, and what would be right.
+pub fn read_share(text: &str) -> Result<f64, QuantityError> {
     match parse::parse(text)? {
         (value, Dimension::NONE) => Ok(value),
         (_, dimension) => Err(QuantityError::no_share(text, dimension)),

@@ -11,8 +11,8 @@ use machine::document::{Document, nearest};
 use machine::{DocumentError, Machine, Override};
 
 use crate::drawing::{Action, Drawing, Step};
-use nalgebra::Vector3;
 use gcode::GcodeError;
+use nalgebra::Vector3;
 
 /// A job, read and understood, but not planned.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +56,9 @@ pub enum MarkingSpeed {
 pub enum JobError {
     /// The file cannot be read.
     #[error("{}: cannot be read: {cause}", path.display())]
-    #[diagnostic(help("give the path of a job file (.toml) or a G-code program (.ngc, .nc, .gcode, .tap)"))]
+    #[diagnostic(help(
+        "give the path of a job file (.toml) or a G-code program (.ngc, .nc, .gcode, .tap)"
+    ))]
     Unreadable {
         /// The file.
         path: PathBuf,

@@ -43,7 +43,7 @@ pub struct Program {
 }
 
 /// Extent of a program in all three axes, before an ignored Z is left out.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, schemars::JsonSchema)]
 pub struct ProgramFacts {
     /// Lines with at least one word that were read up to the end of the program.
     pub blocks: u64,

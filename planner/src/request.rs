@@ -1,0 +1,140 @@
+//! What the domain asks of the planner and what the planner answers besides samples: small JSON
+//! files in the run folder.
+
+use crate::job::{Job, JobError};
+use crate::{Plan, PlanError};
+use machine::Machine;
+use machine::document::{DocumentError, Override};
+use miette::Diagnostic;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// A job by name, as `request.json` in the run folder.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct JobRequest {
+    /// The job file; `None` for the built-in job.
+    pub job: Option<PathBuf>,
+    /// Changes of the job, `KEY=VALUE`.
+    pub set: Vec<String>,
+}
+
+/// Why a job was refused, as `refused.json` in the run folder.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Refusal {
+    /// The file at fault; `None` when it is none.
+    pub file: Option<String>,
+    /// Line from 1.
+    pub line: Option<u64>,
+    /// Column from 1.
+    pub column: Option<u64>,
+    /// What is wrong, and what would be right.
+    pub message: String,
+    /// The same for a person, with the lines at fault.
+    pub text: String,
+}
+
+/// Name of the request in a run folder.
+pub const REQUEST_FILE: &str = "request.json";
+
+/// Name of the refusal in a run folder.
+pub const REFUSAL_FILE: &str = "refused.json";
+
+/// Name of the artwork in a run folder.
+pub const ARTWORK_FILE: &str = "artwork.json";
+
+/// Name of the plan's facts in a run folder.
+pub const PLAN_FILE: &str = "plan.json";
+
+impl JobRequest {
+    /// The same job by a path that holds from any folder.
+    #[must_use]
+    pub fn absolute(mut self) -> Self {
+        self.job = self.job.map(|path| std::path::absolute(&path).unwrap_or(path));
+        self
+    }
+
+    /// Reads the job that is asked for.
+    ///
+    /// # Errors
+    /// What is wrong with it, and where.
+    pub fn read(&self, machine: &Machine) -> Result<Job, Refusal> {
+        let overrides: Vec<Override> = self
+            .set
+            .iter()
+            .map(|text| text.parse())
+            .collect::<Result<_, _>>()
+            .map_err(|error| Refusal::of_diagnostic(&error))?;
+        match &self.job {
+            Some(path) => Job::read(path, &overrides, machine),
+            None => Job::builtin(&overrides, machine),
+        }
+        .map_err(|error| Refusal::of_job(&error))
+    }
+
+    /// Reads and plans it.
+    ///
+    /// # Errors
+    /// What is wrong with it, and where.
+    pub fn plan(&self, machine: &Machine) -> Result<Plan, Refusal> {
+        let job = self.read(machine)?;
+        crate::plan(machine, &job).map_err(|error| self.refuse(&error))
+    }
+
+    /// The refusal that a plan's error means for this job.
+    pub fn refuse(&self, error: &PlanError) -> Refusal {
+        let file = self.job.as_ref().map(|path| path.display().to_string());
+        let line = Some(error.line()).filter(|line| *line > 0);
+        let message = error.to_string();
+        let place = match (&file, line) {
+            (Some(file), Some(line)) => format!("{file}:{line}: "),
+            (Some(file), None) => format!("{file}: "),
+            (None, _) => String::new(),
+        };
+        Refusal { file, line, column: None, text: format!("{place}{message}"), message }
+    }
+}
+
+impl Refusal {
+    /// The refusal that a job which cannot be read means.
+    pub fn of_job(error: &JobError) -> Self {
+        let position = error.position();
+        Self {
+            file: Some(error.file()),
+            line: position.map(|(line, _)| line),
+            column: position.map(|(_, column)| column),
+            ..Self::of_diagnostic(error)
+        }
+    }
+
+    /// The refusal that a machine file or an override which is not sound means.
+    pub fn of_document(error: &DocumentError) -> Self {
+        Self {
+            file: Some(error.file().to_owned()),
+            line: error.line().map(|line| line as u64),
+            column: error.column().map(|column| column as u64),
+            message: error.message(),
+            ..Self::of_diagnostic(error)
+        }
+    }
+
+    /// A refusal with the text of a diagnostic, without a place.
+    pub fn of_diagnostic(diagnostic: &dyn Diagnostic) -> Self {
+        let mut text = String::new();
+        let theme = miette::GraphicalTheme::unicode_nocolor();
+        let handler = miette::GraphicalReportHandler::new_themed(theme);
+        if handler.render_report(&mut text, diagnostic).is_err() {
+            text = diagnostic.to_string();
+        }
+        let message = match diagnostic.help() {
+            Some(help) => format!("{diagnostic}; {help}"),
+            None => diagnostic.to_string(),
+        };
+        Self { file: None, line: None, column: None, message, text }
+    }
+
+    /// A refusal that no line of a file is to blame for.
+    pub fn internal(error: impl std::fmt::Display) -> Self {
+        let message = error.to_string();
+        Self { file: None, line: None, column: None, text: message.clone(), message }
+    }
+}

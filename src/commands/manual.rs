@@ -1,0 +1,24 @@
+//! Shell completions and man pages, generated from the command line itself.
+
+use crate::arguments::Arguments;
+use crate::exit::{Exit, Failure};
+use clap::CommandFactory;
+use std::path::Path;
+
+/// Prints the completion script of a shell.
+pub fn completions(shell: clap_complete::Shell) -> Exit {
+    let mut command = Arguments::command();
+    clap_complete::generate(shell, &mut command, "graver", &mut std::io::stdout());
+    Exit::Done
+}
+
+/// Writes a man page for graver and one for each command into `folder`.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn pages(folder: &Path) -> Result<Exit, Failure> {
+    std::fs::create_dir_all(folder)
+        .and_then(|()| clap_mangen::generate_to(Arguments::command(), folder))
+        .map_err(|error| Failure::bad_input(format!("{}: {error}", folder.display())))?;
+    Ok(Exit::Done)
+}

@@ -1,0 +1,12 @@
+//! One file for each command, or family of commands.
+
+pub mod bench;
+pub mod check;
+pub mod kinematics;
+pub mod manual;
+pub mod operator;
+pub mod plan;
+pub mod run;
+pub mod service;
+pub mod simulate;
+pub mod verify;

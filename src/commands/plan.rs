@@ -1,0 +1,120 @@
+//! `graver plan`: plans a job without running it.
+
+use crate::arguments::PlanArguments;
+use crate::exit::{Exit, Failure};
+use crate::{inputs, output};
+use machine::Machine;
+use planner::{Plan, PlanFacts};
+use serde::Serialize;
+use signals::Setpoint;
+use signals::time::CYCLE_TIME;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+use std::time::Instant;
+
+/// What `plan --json` prints.
+#[derive(Debug, Serialize, schemars::JsonSchema)]
+pub struct PlanReport {
+    /// What the plan comes to.
+    #[serde(flatten)]
+    pub facts: PlanFacts,
+    /// The machine's name.
+    pub machine: String,
+    /// From the first motion to the last [s].
+    pub time: f64,
+    /// Time that reading, planning and checking took [s].
+    pub plan_time: f64,
+    /// What a G-code program asks for; null for other jobs.
+    pub program: Option<planner::job::gcode::ProgramFacts>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A machine or job that does not hold, or a file that cannot be written.
+pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
+    let input = inputs::machine(&arguments.machine)?;
+    let request = inputs::job_request(
+        arguments.job.as_deref(),
+        &input.machine,
+        input.folder.as_deref(),
+        &input.job_overrides,
+    );
+    let started = Instant::now();
+    let job = request.read(&input.machine)?;
+    let plan = if arguments.ideal { planner::plan_ideal } else { planner::plan };
+    let plan = plan(&input.machine, &job).map_err(|error| request.refuse(&error))?;
+    let plan_time = started.elapsed().as_secs_f64();
+    if let Some(path) = &arguments.samples {
+        write_samples(path, &input.machine, &plan)
+            .map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))?;
+    }
+    let report = PlanReport {
+        machine: input.machine.name.clone(),
+        time: plan.facts.duration,
+        plan_time,
+        program: job.program.clone(),
+        facts: plan.facts,
+    };
+    if arguments.json {
+        output::json(&report)?;
+    } else {
+        print_text(&report);
+    }
+    Ok(Exit::Done)
+}
+
+fn print_text(report: &PlanReport) {
+    let facts = &report.facts;
+    eprintln!("job       {}", facts.name);
+    eprintln!("machine   {}", report.machine);
+    eprintln!("strokes   {}, {:.3} mm", facts.strokes, facts.length * 1e3);
+    eprintln!("time      {:.4} s", report.time);
+    eprintln!("speed     {:.4} m/s while the laser is on", facts.speed);
+    eprintln!(
+        "limits    path acceleration {:.1} %, path jerk {:.1} %",
+        facts.uses.path_acceleration * 100.0,
+        facts.uses.path_jerk * 100.0
+    );
+    eprintln!("planning  {:.1} ms", report.plan_time * 1e3);
+    for note in &facts.notes {
+        match note.line {
+            0 => eprintln!("note      {}", note.text),
+            line => eprintln!("note      line {line}: {}", note.text),
+        }
+    }
+}
+
+/// One row a setpoint: `t`, the tool, then per axis position, velocity, acceleration and effort,
+/// then laser on and power.
+fn write_samples(path: &Path, machine: &Machine, plan: &Plan) -> io::Result<()> {
+    let mut file = BufWriter::new(File::create(path)?);
+    write!(file, "t,x,y,z")?;
+    for axis in &machine.axes {
+        let name = &axis.name;
+        write!(file, ",{name}_position,{name}_velocity,{name}_acceleration,{name}_effort")?;
+    }
+    writeln!(file, ",laser,power")?;
+    for setpoint in plan.setpoints(1) {
+        write_row(&mut file, machine.axes.len(), &setpoint)?;
+    }
+    file.flush()
+}
+
+fn write_row(file: &mut impl Write, axes: usize, setpoint: &Setpoint) -> io::Result<()> {
+    let [x, y, z] = setpoint.tool;
+    write!(file, "{},{x},{y},{z}", setpoint.sequence as f64 * CYCLE_TIME)?;
+    for axis in 0..axes {
+        write!(
+            file,
+            ",{},{},{},{}",
+            setpoint.position[axis],
+            setpoint.velocity[axis],
+            setpoint.acceleration[axis],
+            setpoint.effort[axis]
+        )?;
+    }
+    let lit = u32::from(setpoint.laser.gate != 0);
+    writeln!(file, ",{lit},{}", if lit == 1 { setpoint.laser.power } else { 0.0 })
+}

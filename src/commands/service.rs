@@ -1,0 +1,48 @@
+//! The four services as commands: each joins the domain of its instance, builds itself from the
+//! domain's configuration, and runs until it is told to end.
+
+use crate::arguments::ServiceArguments;
+use crate::exit::{Exit, Failure};
+use crate::pipeline::configuration::{Configuration, Driven};
+use drives::{PlantOptions, SimulatedPlant};
+use runtime::domain::Role;
+use runtime::thread::{CONTROLLER_PRIORITY, DRIVES_PRIORITY};
+use runtime::{Domain, Instance, signal};
+use signals::Nanoseconds;
+
+/// How long before a deadline drives stops sleeping and spins: longer than the timer is usually
+/// late, and too short to starve anybody on its core.
+const SPIN: Nanoseconds = Nanoseconds(0);
+
+/// Runs the service with this role.
+///
+/// # Errors
+/// A domain that is not there, or a channel that fails.
+pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
+    signal::install().map_err(Failure::service)?;
+    let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
+    let domain = Domain::join(&instance, role).map_err(Failure::service)?;
+    let configuration = Configuration::read(&instance).map_err(Failure::service)?;
+    match role {
+        Role::Planner => planner::service::run(&domain, &configuration.machine()?),
+        Role::Monitor => monitor::service::run(&domain, &configuration.machine()?),
+        Role::Controller => {
+            let realtime = configuration.realtime_options(CONTROLLER_PRIORITY);
+            controller::service::run(&domain, &configuration.machine()?, &realtime)
+        }
+        Role::Drives => {
+            let Driven::Simulated = configuration.drives;
+            let port = SimulatedPlant::new(&configuration.plant()?, PlantOptions::default())
+                .map_err(Failure::bad_input)?;
+            let options = drives::service::ServiceOptions {
+                deadlines: configuration.deadlines(),
+                realtime: configuration.realtime_options(DRIVES_PRIORITY),
+                margin: SPIN,
+            };
+            drives::service::run(&domain, port, &options)
+        }
+        Role::Domain | Role::Observer => Ok(()),
+    }
+    .map_err(Failure::service)?;
+    Ok(Exit::Done)
+}

@@ -1,0 +1,76 @@
+//! Graver: a real-time motion controller for laser marking and engraving machines.
+//!
+//! This is the command line and the supervisor; what a machine is, how a job is planned, played,
+//! driven and watched stands in the other crates. `ARCHITECTURE.md` follows one sample through all
+//! of them.
+
+pub mod arguments;
+pub mod commands;
+pub mod exit;
+pub mod inputs;
+pub mod output;
+pub mod pipeline;
+pub mod simulation;
+
+use arguments::{Arguments, BenchCommand, Command};
+use clap::Parser;
+use commands::{bench, check, kinematics, manual, operator, plan, run, service, simulate, verify};
+use exit::{Exit, Failure};
+use pipeline::operators::Verb;
+use runtime::domain::Role;
+use std::process::ExitCode;
+
+/// Does what the command line says.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let json = wants_json(&arguments.command);
+    match carry_out(&arguments.command) {
+        Ok(exit) => exit.into(),
+        Err(failure) => {
+            output::failure(&failure, json);
+            failure.exit.into()
+        }
+    }
+}
+
+fn carry_out(command: &Command) -> Result<Exit, Failure> {
+    match command {
+        Command::Run(arguments) => run::run(arguments),
+        Command::Simulate(arguments) => simulate::run(arguments),
+        Command::Plan(arguments) => plan::run(arguments),
+        Command::Check(arguments) => check::run(arguments),
+        Command::Kinematics(arguments) => kinematics::run(arguments),
+        Command::Bench(BenchCommand::Latency(arguments)) => bench::latency(arguments),
+        Command::Bench(BenchCommand::Plan(arguments)) => bench::plan(arguments),
+        Command::Bench(BenchCommand::Simulate(arguments)) => bench::simulate(arguments),
+        Command::Submit(arguments) => operator::submit(arguments),
+        Command::Hold(arguments) => operator::verb(Verb::Hold, arguments),
+        Command::Resume(arguments) => operator::verb(Verb::Resume, arguments),
+        Command::Stop(arguments) => operator::verb(Verb::Stop, arguments),
+        Command::Reset(arguments) => operator::verb(Verb::Reset, arguments),
+        Command::Enable(arguments) => operator::verb(Verb::Enable, arguments),
+        Command::Disable(arguments) => operator::verb(Verb::Disable, arguments),
+        Command::Override(arguments) => operator::override_rate(arguments),
+        Command::Status(arguments) => operator::status(arguments),
+        Command::Domain(arguments) => run::domain(arguments),
+        Command::Planner(arguments) => service::run(Role::Planner, arguments),
+        Command::Controller(arguments) => service::run(Role::Controller, arguments),
+        Command::Drives(arguments) => service::run(Role::Drives, arguments),
+        Command::Monitor(arguments) => service::run(Role::Monitor, arguments),
+        Command::Completions { shell } => Ok(manual::completions(*shell)),
+        Command::Manual { folder } => manual::pages(folder),
+        Command::VerifySummary { file } => verify::run(file),
+    }
+}
+
+/// Whether a failure is also printed as JSON.
+fn wants_json(command: &Command) -> bool {
+    match command {
+        Command::Run(arguments) => arguments.instance.json,
+        Command::Simulate(arguments) => arguments.json,
+        Command::Plan(arguments) => arguments.json,
+        Command::Check(arguments) => arguments.json,
+        Command::Submit(arguments) => arguments.instance.json,
+        _ => false,
+    }
+}

@@ -1,0 +1,87 @@
+//! What operators see of a running pipeline.
+
+use super::Heard;
+use serde::Serialize;
+use signals::{ControllerState, PlannerPhase};
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+/// A notice board: the supervisor writes, operators' threads read.
+#[derive(Debug, Default)]
+pub struct Board {
+    status: Mutex<Status>,
+}
+
+/// What a pipeline is doing, as `graver status --json` prints it.
+#[derive(Debug, Clone, Default, Serialize, schemars::JsonSchema)]
+pub struct Status {
+    /// The controller's state.
+    pub state: String,
+    /// What the planner is doing.
+    pub planner: String,
+    /// The stream being played, 0 for none.
+    pub stream: u64,
+    /// Its job, when it has one.
+    pub job: Option<String>,
+    /// Setpoints played so far.
+    pub played: u64,
+    /// Setpoints in the stream.
+    pub samples: u64,
+    /// Stroke being marked, from 1; 0 for none.
+    pub stroke: u64,
+    /// Rate at which the stream is played.
+    pub rate: f64,
+    /// Where the plan has the tool [m].
+    pub tool: [f64; 3],
+    /// The latched fault.
+    pub fault: Option<String>,
+    /// Cycles since drives started.
+    pub cycles: u64,
+    /// Overruns since drives started.
+    pub overruns: u64,
+    /// Process id of each service; null for one that does not run.
+    pub services: BTreeMap<String, Option<i32>>,
+}
+
+impl Board {
+    /// Writes what was heard.
+    pub fn post(&self, heard: &Heard, pids: &[(&'static str, Option<i32>)]) {
+        let mut status = self.lock();
+        let Heard { progress, drives, planner, .. } = heard;
+        status.state = ControllerState::from_wire(progress.state).name().to_owned();
+        status.planner = match PlannerPhase::from_wire(planner.phase) {
+            PlannerPhase::Idle => "idle",
+            PlannerPhase::Planning => "planning",
+            PlannerPhase::Streaming => "streaming",
+            PlannerPhase::Sent => "sent",
+            PlannerPhase::Refused => "refused",
+        }
+        .to_owned();
+        status.stream = progress.stream;
+        status.played = progress.played;
+        status.samples = if planner.stream == progress.stream { planner.samples } else { 0 };
+        status.stroke = progress.stroke;
+        status.rate = progress.rate;
+        status.tool = progress.tool;
+        let fault = progress.fault;
+        status.fault = fault.is_some().then(|| fault.code().name().to_owned());
+        status.cycles = drives.cycle.0;
+        status.overruns = drives.overruns;
+        status.services = pids.iter().map(|(name, pid)| ((*name).to_owned(), *pid)).collect();
+    }
+
+    /// Names the job that runs, or none.
+    pub fn name_job(&self, job: Option<&str>) {
+        self.lock().job = job.map(str::to_owned);
+    }
+
+    /// What stands there now.
+    pub fn read(&self) -> Status {
+        self.lock().clone()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Status> {
+        // A reader that panicked cannot have left it half written.
+        self.status.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}

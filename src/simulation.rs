@@ -1,0 +1,169 @@
+//! The stages in one process, in virtual time.
+//!
+//! Sampler, controller and bridge are the ones that run as processes; only what moves the samples
+//! between them is different. Nothing here reads a clock but to say how fast it went.
+
+use controller::{Controller, Inputs, Outputs, Peers};
+use drives::bridge::BridgeOptions;
+use drives::{Bridge, Deadlines, PlantOptions, SimulatedPlant};
+use machine::Machine;
+use monitor::recording::CycleRecord;
+use planner::Plan;
+use signals::time::CYCLE_PERIOD;
+use signals::{
+    ControllerReport, ControllerState, DrivesReport, Nanoseconds, OperatorRequest, OperatorVerb,
+    RealtimeFacts, Setpoint,
+};
+use std::time::{Duration, Instant};
+
+/// The stream number of the one job.
+const STREAM: u64 = 1;
+
+/// Setpoints handed over in one cycle at most, as the controller service does.
+const DRAIN: usize = 16;
+
+/// Cycles stepped between two visits of whoever examines the records.
+const CHUNK: usize = 4096;
+
+/// Cycles after the stream's end in which its last light is still told.
+const LIGHT_LAG: usize = monitor::conclusion::LIGHT_LAG as usize + 1;
+
+/// Cycles that enabling may take.
+const ENABLE_PATIENCE: u64 = 2000;
+
+/// What a simulation gives besides its records.
+#[derive(Debug, Clone)]
+pub struct Simulated {
+    /// The controller's final report.
+    pub controller: ControllerReport,
+    /// The drives' report at the end.
+    pub drives: DrivesReport,
+    /// Wall time of the stepping.
+    pub stepping: Duration,
+}
+
+/// Why a simulation could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulationError {
+    /// The machine cannot be simulated.
+    #[error(transparent)]
+    Plant(#[from] drives::plant::PlantError),
+    /// The controller did not get ready.
+    #[error("the controller did not become ready: it is {state}, fault {fault}")]
+    NotReady {
+        /// Its state.
+        state: &'static str,
+        /// Its fault.
+        fault: &'static str,
+    },
+}
+
+struct Pipeline {
+    controller: Controller,
+    bridge: Bridge,
+    now: Nanoseconds,
+    outputs: Outputs,
+}
+
+impl Pipeline {
+    fn new(
+        machine: &Machine,
+        plant: &Machine,
+        plant_options: PlantOptions,
+    ) -> Result<Self, SimulationError> {
+        let port = SimulatedPlant::new(plant, plant_options)?;
+        let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict };
+        Ok(Self {
+            controller: Controller::new(machine),
+            bridge: Bridge::new(port, options),
+            now: Nanoseconds(0),
+            outputs: Outputs::default(),
+        })
+    }
+
+    /// One cycle, in the order of the real one; no time passes in it.
+    fn cycle(&mut self, setpoints: &[Setpoint], request: Option<OperatorRequest>) {
+        self.now = self.now + CYCLE_PERIOD;
+        self.bridge.begin(self.now, self.now);
+        let feedback = self.bridge.feedback();
+        let peers = Peers::default();
+        let inputs = Inputs { feedback, received: self.now, setpoints, request, peers };
+        self.controller.step(self.now, &inputs, &mut self.outputs);
+        self.bridge.latch(&self.outputs.command, self.now);
+        self.bridge.finish(self.now);
+    }
+
+    fn record(&self) -> CycleRecord {
+        CycleRecord { feedback: *self.bridge.feedback(), command: self.outputs.command }
+    }
+
+    fn enable(&mut self) -> Result<(), SimulationError> {
+        // Drives powers nothing before it has been greeted by an unpowered command.
+        self.cycle(&[], None);
+        self.cycle(&[], Some(request(OperatorVerb::Enable, 0.0)));
+        for _ in 0..ENABLE_PATIENCE {
+            if self.outputs.command.state() == ControllerState::Idle {
+                return Ok(());
+            }
+            self.cycle(&[], None);
+        }
+        Err(SimulationError::NotReady {
+            state: self.outputs.command.state().name(),
+            fault: self.outputs.command.fault.code().name(),
+        })
+    }
+}
+
+fn request(verb: OperatorVerb, value: f64) -> OperatorRequest {
+    OperatorRequest { verb: verb as u32, ticket: 1, value }
+}
+
+/// Plays `plan` on a controller for `machine` and a simulated `plant`; `examine` gets every record
+/// in order.
+///
+/// # Errors
+/// A machine that cannot be simulated, or a controller that does not get ready.
+pub fn simulate(
+    machine: &Machine,
+    plant: &Machine,
+    plan: &Plan,
+    plant_options: PlantOptions,
+    mut examine: impl FnMut(&[CycleRecord]),
+) -> Result<Simulated, SimulationError> {
+    let mut pipeline = Pipeline::new(machine, plant, plant_options)?;
+    pipeline.enable()?;
+    let mut setpoints = plan.setpoints(STREAM);
+    let mut waiting: Vec<Setpoint> = Vec::with_capacity(DRAIN);
+    let mut records = Vec::with_capacity(CHUNK);
+    let mut stepping = Duration::ZERO;
+    let mut start = Some(request(OperatorVerb::Start, STREAM as f64));
+    let mut report = ControllerReport::default();
+    let mut remaining = usize::MAX;
+    while remaining > 0 {
+        records.clear();
+        let began = Instant::now();
+        while records.len() < CHUNK && remaining > 0 {
+            waiting.clear();
+            if start.is_none() {
+                let room = pipeline.controller.room().min(DRAIN);
+                waiting.extend(setpoints.by_ref().take(room));
+            }
+            let paused = pipeline.outputs.command.state() == ControllerState::Holding;
+            // Nobody is there to answer a program's pause.
+            let resume = paused.then(|| request(OperatorVerb::Resume, 0.0));
+            pipeline.cycle(&waiting, start.take().or(resume));
+            records.push(pipeline.record());
+            remaining = remaining.saturating_sub(1);
+            if let Some(new) = pipeline.outputs.report {
+                report = new;
+                if report.is_final == 1 {
+                    remaining = remaining.min(LIGHT_LAG);
+                }
+            }
+        }
+        stepping += began.elapsed();
+        examine(&records);
+    }
+    let drives = pipeline.bridge.report(RealtimeFacts::default());
+    Ok(Simulated { controller: report, drives, stepping })
+}
