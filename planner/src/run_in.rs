@@ -2,7 +2,7 @@
 //!
 //! At the stroke's start the tool must have the stroke's speed V along its tangent and, where the
 //! stroke starts curved, its lateral acceleration V²κ at once. The start point of the run-in is
-//! free. Along the tangent the tool takes the [`Ramp`] of the thesis; across it a [`Swing`], which
+//! free. Along the tangent the tool takes the [`Ramp`] of the thesis; across it a swing, which
 //! ends without lateral velocity:
 //!
 //! ```text

@@ -245,11 +245,11 @@ fn check_stream(plan: &Plan, case: &str) {
         let mut since = 0;
         for edge in setpoint.laser.edges() {
             assert!(edge.offset < 1_000_000 && i64::from(edge.offset) >= since, "{case}");
-            lit += i64::from(gate) * (i64::from(edge.offset) - since);
+            lit += i64::from(gate != 0) * (i64::from(edge.offset) - since);
             since = i64::from(edge.offset);
             gate = edge.gate;
         }
-        lit += i64::from(gate) * (1_000_000 - since);
+        lit += i64::from(gate != 0) * (1_000_000 - since);
         assert_eq!(setpoint.stroke != 0, setpoint.laser.is_lit(), "{case}");
         assert!(setpoint.stroke == 0 || setpoint.stroke >= strokes, "{case}");
         strokes = strokes.max(setpoint.stroke);
