@@ -1,9 +1,10 @@
 //! The judgement of the marks: what the laser truly marked against what the job asked for.
 //!
 //! Matched stroke by stroke along the arc length, so that strokes which touch or cross in space do
-//! not hide each other. While the controller is in a stroke, lit or dark, the tool's place along it
-//! is followed from sample to sample; a hold that backs up and resumes is followed too, and its
-//! runs of light add up: a gap between them is missing, an overlap is double.
+//! not hide each other. All light names its stroke, and the tool's place along that stroke is
+//! followed from sample to sample; in dark cycles, along the stroke that the command in force
+//! names, so that light which comes late is found where it falls. A hold that backs up and resumes
+//! adds a run of light to its stroke: a gap between the runs is missing, an overlap is double.
 //!
 //! The [`Judge`] takes records as they come; it remembers runs of light, not samples.
 
@@ -19,7 +20,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use signals::artwork::Artwork;
 use signals::time::CYCLE_TIME;
-use tool_path::{Interval, Moment, ToolPath};
+use tool_path::{Interval, LitSpan, Moment, ToolPath};
 
 /// How the tool's true position was known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -121,7 +122,7 @@ struct Followed {
     tool: Vector3<f64>,
 }
 
-/// One run of light on one stroke (0 for none), from edge to edge.
+/// One run of light on one stroke, from edge to edge.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     stroke: u64,
@@ -273,31 +274,26 @@ impl<'a> Judge<'a> {
 
     fn interval(&mut self, interval: &Interval) {
         let lit = interval.lit();
-        let own = interval.stroke();
+        let commanded = interval.commanded_stroke();
         let whole = lit.is_whole();
-        self.follow(own, interval.start.tool);
+        self.follow(commanded, interval.start.tool);
         if !lit.as_slice().is_empty() && !interval.tool_known() {
             self.unknown = self.unknown.or(Some(interval.end.cycle));
         }
         let mut reached = 0.0;
-        for &(from, to) in lit.as_slice() {
+        for &LitSpan { from, to, stroke } in lit.as_slice() {
             // Light that goes on across the deadline is the same run, unless the stroke changes.
-            let goes_on = from == 0.0
-                && self.run.is_some_and(|run| own == 0 || run.stroke == 0 || own == run.stroke);
+            let goes_on = from == 0.0 && self.run.is_some_and(|run| run.stroke == stroke);
             if !goes_on {
                 self.end_run();
             }
-            let stroke = match self.run {
-                Some(run) if run.stroke != 0 => run.stroke,
-                _ => interval.stroke_nearby(),
-            };
             self.light(interval, stroke, from, to);
             reached = to;
         }
         if reached < 1.0 {
             self.end_run();
         }
-        self.follow(own, interval.end.tool);
+        self.follow(commanded, interval.end.tool);
         self.measure_speed(interval, whole);
     }
 
@@ -328,25 +324,22 @@ impl<'a> Judge<'a> {
     /// One marked point, `time` [s] after the one before in the same run.
     fn point(&mut self, stroke: u64, tool: Vector3<f64>, deviation: Option<f64>, time: f64) {
         let begins = self.run.is_none();
-        let error = match self.locate(stroke, tool, true, begins) {
-            Some(foot) => {
-                if let Some(state) = self.state(stroke) {
-                    state.coverage.mark(foot.at);
-                }
-                foot.distance
-            }
-            None => 0.0,
-        };
+        let foot = self.locate(stroke, tool, true, begins);
+        if let (Some(foot), Some(state)) = (&foot, self.state(stroke)) {
+            state.coverage.mark(foot.at);
+        }
+        // Light for a stroke that the job does not have has no line to be measured against.
+        let stray = foot.is_none();
+        let error = foot.map_or(0.0, |foot| foot.distance);
         let run =
             self.run.get_or_insert(Run { stroke, tool, error, deviation, length: 0.0, time: 0.0 });
         let step = (tool - run.tool).norm();
         run.length += step;
         run.time += time;
         self.sums.length += step;
-        if run.stroke == 0 && stroke == 0 {
+        if stray {
             self.sums.stray += step;
         } else {
-            run.stroke = stroke;
             self.sums.error.add(run.error, error, time);
             if let Some(to) = deviation {
                 self.sums.tracking.add(run.deviation.unwrap_or(to), to, time);

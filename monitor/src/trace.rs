@@ -4,7 +4,7 @@
 pub mod envelope;
 pub mod outline;
 
-use crate::marks::tool_path::{Interval, LitSpans, Moment, ToolPath};
+use crate::marks::tool_path::{Interval, LitSpan, LitSpans, Moment, ToolPath};
 use crate::recording::CycleRecord;
 use envelope::Envelope;
 use outline::{Outline, OutlinePoint};
@@ -137,7 +137,7 @@ impl Trace {
 
     fn draw(&mut self, interval: &Interval, lit: &LitSpans) {
         let mut done = 0.0;
-        for &(from, to) in lit.as_slice() {
+        for &LitSpan { from, to, .. } in lit.as_slice() {
             if from > done {
                 self.marked.end();
                 draw_part(&mut self.dark, interval, done, from);

@@ -25,8 +25,10 @@ fn play(
     delay: impl Fn(usize, f64) -> f64,
 ) -> Vec<CycleRecord> {
     let cycles = (plan.duration / CYCLE_TIME).round() as u64;
-    let true_light: Vec<(f64, f64)> = (plan.light.iter().enumerate())
-        .map(|(index, &(_, from, to))| (from + delay(index, from), to + delay(index, to)))
+    let true_light: Vec<(u64, f64, f64)> = (plan.light.iter().enumerate())
+        .map(|(index, &(stroke, from, to))| {
+            (stroke, from + delay(index, from), to + delay(index, to))
+        })
         .collect();
     let stroke_in = |from: f64| {
         let overlaps =
@@ -63,24 +65,33 @@ fn play(
 const FIRST: u64 = 1234;
 const START: f64 = 0.02;
 
-/// The laser in the cycle from `start` [s], for light in these spans [s].
-fn laser(light: &[(f64, f64)], start: f64) -> LaserCycle {
+/// The laser in the cycle from `start` [s], for light in these spans: `(stroke, from, to)` [s].
+fn laser(light: &[(u64, f64, f64)], start: f64) -> LaserCycle {
+    let power = |gate: u32| if gate == 0 { 0.0 } else { 1.0 };
     let mut edges: Vec<(i64, u32)> = Vec::new();
     let mut cycle = LaserCycle::OFF;
-    for &(from, to) in light {
-        for (at, gate) in [(from, 1), (to, 0)] {
+    for &(stroke, from, to) in light {
+        for (at, gate) in [(from, stroke as u32), (to, 0)] {
             let offset = ((at - start) * 1e9).round() as i64;
             if offset <= 0 {
                 cycle.gate = gate;
-                cycle.power = f64::from(gate);
+                cycle.power = power(gate);
             } else if offset < 1_000_000 {
                 edges.push((offset, gate));
             }
         }
     }
     edges.sort_unstable();
+    // Where one stroke ends and the next begins, the gate changes its number and stays open.
+    edges.dedup_by(|later, earlier| {
+        let together = later.0 == earlier.0;
+        if together {
+            earlier.1 = later.1;
+        }
+        together
+    });
     for (offset, gate) in edges {
-        assert!(cycle.push(GateEdge { offset: offset as u32, gate, power: f64::from(gate) }));
+        assert!(cycle.push(GateEdge { offset: offset as u32, gate, power: power(gate) }));
     }
     cycle
 }
@@ -283,14 +294,97 @@ fn a_dot_is_judged_by_distance() {
     assert_eq!((marks.strokes_lost, marks.speed_max), (1, 0.0));
 }
 
+/// One line in two strokes that meet without a dark gap: inside a cycle, or at a deadline.
 #[test]
-fn light_without_a_stroke_is_stray() {
-    let mut records = play(&one_plan(), |_, tool| tool, |_, _| 0.0);
-    records.iter_mut().for_each(|record| record.command.stroke = 0);
-    let marks = judge(&one_line(), &records).unwrap();
-    near(marks.stray, SPEED * STROKE_TIME, ROUNDING, "stray");
-    near(marks.double, SPEED * STROKE_TIME, ROUNDING, "double");
-    near(marks.missing, SPEED * STROKE_TIME, ROUNDING, "missing");
+fn a_change_of_stroke_without_a_dark_gap_splits_the_light() {
+    let whole = SPEED * STROKE_TIME;
+    for change in [0.0401234, 0.04] {
+        let middle = SPEED * change;
+        let art = artwork(vec![
+            straight([0.0; 3], [middle, 0.0, 0.0]),
+            straight([middle, 0.0, 0.0], [whole, 0.0, 0.0]),
+        ]);
+        let light = [(1, 0.0, change), (2, change, STROKE_TIME)];
+        let plan = Plan { tool: &along_x, light: &light, duration: 0.15 };
+        let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+        near(marks.length, whole, ROUNDING, "length");
+        near(marks.missing, 0.0, ROUNDING, "missing");
+        near(marks.double, 0.0, ROUNDING, "double");
+        near(marks.error_max, 0.0, ROUNDING, "error_max");
+        near(marks.speed_min, SPEED, 1e-12, "speed_min");
+        near(marks.speed_max, SPEED, 1e-12, "speed_max");
+        assert_eq!((marks.strokes_lost, marks.stray), (0, 0.0), "{change}");
+
+        // The change 0.2 ms late: the light is unbroken, yet 50 µm of it are on the wrong stroke.
+        let late = |_, at: f64| if at == change { 2e-4 } else { 0.0 };
+        let marks = judge(&art, &play(&plan, |_, tool| tool, late)).unwrap();
+        near(marks.length, whole, ROUNDING, "length");
+        near(marks.missing_end_max, 5e-5, ROUNDING, "missing_end_max");
+        near(marks.double_end_max, 5e-5, ROUNDING, "double_end_max");
+        near(marks.missing, 5e-5, ROUNDING, "missing");
+        near(marks.double, 5e-5, ROUNDING, "double");
+    }
+}
+
+#[test]
+fn the_light_tells_its_stroke_whatever_the_command_says() {
+    for commanded in [0, 2] {
+        let mut records = play(&one_plan(), |_, tool| tool, |_, _| 0.0);
+        records.iter_mut().for_each(|record| record.command.stroke = commanded);
+        let marks = judge(&one_line(), &records).unwrap();
+        near(marks.length, SPEED * STROKE_TIME, ROUNDING, "length");
+        near(marks.missing, 0.0, ROUNDING, "missing");
+        near(marks.double, 0.0, ROUNDING, "double");
+        assert_eq!(marks.stray, 0.0, "{commanded}");
+    }
+}
+
+#[test]
+fn light_for_a_stroke_beyond_the_artwork_is_stray() {
+    let whole = SPEED * STROKE_TIME;
+    let light = [(2, 0.0, STROKE_TIME)];
+    let plan = Plan { light: &light, ..one_plan() };
+    let marks = judge(&one_line(), &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+    near(marks.length, whole, ROUNDING, "length");
+    near(marks.stray, whole, ROUNDING, "stray");
+    near(marks.double, whole, ROUNDING, "double");
+    near(marks.missing, whole, ROUNDING, "missing");
+    assert_eq!((marks.strokes_lost, marks.error_max, marks.speed_max), (1, 0.0, 0.0));
+
+    // The number changes halfway along the stroke: only what follows is stray.
+    let change = 0.0401234;
+    let light = [(1, 0.0, change), (u64::from(u32::MAX), change, STROKE_TIME)];
+    let plan = Plan { light: &light, ..one_plan() };
+    let marks = judge(&one_line(), &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+    let rest = whole - SPEED * change;
+    near(marks.length, whole, ROUNDING, "length");
+    near(marks.stray, rest, ROUNDING, "stray");
+    near(marks.double, rest, ROUNDING, "double");
+    near(marks.missing_end_max, rest, ROUNDING, "missing_end_max");
+    near(marks.double_end_max, 0.0, ROUNDING, "double_end_max");
+    near(marks.speed_min, SPEED, 1e-12, "speed_min");
+    assert_eq!(marks.strokes_lost, 0);
+}
+
+/// Light that first comes far along a stroke which crosses itself: the place is known from the
+/// dark cycles before it.
+#[test]
+fn light_that_comes_late_is_found_where_it_falls() {
+    let eight = Eight::new();
+    let art = artwork(vec![Stroke { points: eight.points.clone(), line: 0 }]);
+    let end = eight.length() / SPEED;
+    let tool = |time: f64| eight.point(SPEED * time);
+    let plan = Plan { tool: &tool, light: &[(1, 0.0, end)], duration: end + 0.04 };
+    // The crossing is a quarter of the way along; the second branch through it is three quarters.
+    for part in [0.1, 0.25, 0.5, 0.75] {
+        let dark = part * end;
+        let late = |_, at: f64| if at == 0.0 { dark } else { 0.0 };
+        let marks = judge(&art, &play(&plan, |_, tool| tool, late)).unwrap();
+        // As in the test of holds: the cubic's error in the tightest bend.
+        near(marks.missing_end_max, SPEED * dark, 1.1e-7, "missing_end_max");
+        near(marks.missing, SPEED * dark, 1.1e-7, "missing");
+        near(marks.double, 0.0, 1.1e-7, "double");
+    }
 }
 
 #[test]

@@ -23,7 +23,7 @@ pub struct Moment {
     pub planned: Option<Vector3<f64>>,
     /// What the laser did in `[t[k−1], t[k])`.
     pub laser: LaserCycle,
-    /// Stroke of the command that answered this feedback: it is marked in `[t[k+1], t[k+2])`.
+    /// Stroke that the command which answered this feedback names, from 1; 0 for none.
     pub stroke: u64,
     /// Cycle of the command in force from `t[k]` on; `None` before the first.
     pub in_force: Option<u64>,
@@ -136,29 +136,12 @@ impl Interval {
         self.start.tool_known && self.end.tool_known
     }
 
-    /// Stroke that the command in force names for this cycle, from 1; 0 for none.
-    ///
-    /// The command in force from `t[k−1]` on answers cycle `k − 2`, unless drives says otherwise.
-    pub fn stroke(&self) -> u64 {
-        self.commanded(0)
-    }
-
-    /// The stroke of this cycle or else of the one before or after: the source's switching delay
-    /// can carry light into a cycle that has no stroke of its own.
-    pub fn stroke_nearby(&self) -> u64 {
-        [0, -1, 1].into_iter().map(|shift| self.commanded(shift)).find(|&n| n != 0).unwrap_or(0)
-    }
-
-    fn commanded(&self, shift: i64) -> u64 {
-        let known = [self.earliest, self.before, Some(self.start), Some(self.end)];
-        let stroke = |cycle: u64| {
-            known.iter().flatten().find(|moment| moment.cycle == cycle).map(|moment| moment.stroke)
-        };
-        let usual = self.start.cycle.saturating_sub(1);
-        let in_force = self.start.in_force.unwrap_or(usual);
-        stroke(in_force.saturating_add_signed(shift))
-            .or_else(|| stroke(usual.saturating_add_signed(shift)))
-            .unwrap_or(0)
+    /// Stroke that the command in force in this cycle names, from 1; 0 for none. What is marked
+    /// is what [`Interval::lit`] says.
+    pub fn commanded_stroke(&self) -> u64 {
+        let in_force = |moment: &Moment| Some(moment.cycle) == self.start.in_force;
+        let mut answered = [self.before, self.earliest].into_iter().flatten();
+        answered.find(in_force).map_or(0, |moment| moment.stroke)
     }
 
     /// The parts of the cycle with light.
@@ -167,10 +150,21 @@ impl Interval {
     }
 }
 
-/// The lit parts of one cycle, in order, none of them empty, no two touching.
+/// A lit part of one cycle.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LitSpan {
+    /// Where it begins, as a part of the cycle, 0..=1.
+    pub from: f64,
+    /// Where it ends, above `from`.
+    pub to: f64,
+    /// The stroke that the light belongs to, from 1.
+    pub stroke: u64,
+}
+
+/// The lit parts of one cycle, in order; two that touch belong to different strokes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LitSpans {
-    spans: [(f64, f64); MAX_EDGES + 1],
+    spans: [LitSpan; MAX_EDGES + 1],
     count: usize,
 }
 
@@ -178,46 +172,47 @@ impl LitSpans {
     /// The lit parts of a cycle of the laser; light takes an open gate and power.
     pub fn of(laser: &LaserCycle) -> Self {
         let period = CYCLE_PERIOD.0 as f64;
+        let light = |gate: u32, power: f64| if power > 0.0 { u64::from(gate) } else { 0 };
         let mut spans = Self::default();
-        let (mut since, mut lit) = (0.0, laser.gate != 0 && laser.power > 0.0);
+        let (mut from, mut stroke) = (0.0, light(laser.gate, laser.power));
         for edge in laser.edges() {
-            let at = (f64::from(edge.offset) / period).min(1.0);
-            spans.add(since, at, lit);
-            (since, lit) = (at, edge.gate != 0 && edge.power > 0.0);
+            let to = (f64::from(edge.offset) / period).min(1.0);
+            spans.add(LitSpan { from, to, stroke });
+            (from, stroke) = (to, light(edge.gate, edge.power));
         }
-        spans.add(since, 1.0, lit);
+        spans.add(LitSpan { from, to: 1.0, stroke });
         spans
     }
 
-    fn add(&mut self, from: f64, to: f64, lit: bool) {
-        if !lit || to <= from {
+    fn add(&mut self, span: LitSpan) {
+        if span.stroke == 0 || span.to <= span.from {
             return;
         }
         let joined = self.count.checked_sub(1).and_then(|last| self.spans.get_mut(last));
         match joined {
-            Some(last) if last.1 >= from => last.1 = to,
+            Some(last) if last.to >= span.from && last.stroke == span.stroke => last.to = span.to,
             _ => {
-                if let Some(span) = self.spans.get_mut(self.count) {
-                    *span = (from, to);
+                if let Some(free) = self.spans.get_mut(self.count) {
+                    *free = span;
                     self.count += 1;
                 }
             }
         }
     }
 
-    /// `(from, to)` of each, as parts of the cycle, 0..=1.
-    pub fn as_slice(&self) -> &[(f64, f64)] {
+    /// The spans.
+    pub fn as_slice(&self) -> &[LitSpan] {
         self.spans.get(..self.count).unwrap_or(&[])
     }
 
-    /// Whether the whole cycle is lit.
+    /// Whether the whole cycle is lit for one stroke.
     pub fn is_whole(&self) -> bool {
-        self.as_slice() == [(0.0, 1.0)]
+        matches!(self.as_slice(), [span] if (span.from, span.to) == (0.0, 1.0))
     }
 
     /// Share of the cycle that is lit, 0..=1.
     pub fn share(&self) -> f64 {
-        self.as_slice().iter().map(|(from, to)| to - from).sum()
+        self.as_slice().iter().map(|span| span.to - span.from).sum()
     }
 }
 
@@ -288,15 +283,18 @@ mod tests {
     }
 
     #[test]
-    fn the_stroke_is_that_of_the_command_two_cycles_earlier() {
-        let mut window = ToolPath::default();
-        for cycle in 0..10 {
-            if let Some(interval) = window.push(moment(cycle, Vector3::zeros()))
-                && interval.before.is_some()
-            {
-                // Every command names its own cycle as stroke here.
-                assert_eq!(interval.stroke(), interval.end.cycle - 2);
+    fn the_commanded_stroke_is_that_of_the_command_in_force() {
+        // Every command names its own cycle as stroke; drives says which one it follows.
+        for (in_force, expect) in [(None, 0), (Some(3), 0), (Some(4), 4), (Some(5), 5)] {
+            let mut window = ToolPath::default();
+            for cycle in 3..7 {
+                let in_force = if cycle == 6 { in_force } else { None };
+                window.push(Moment { in_force, ..moment(cycle, Vector3::zeros()) });
             }
+            window.push(moment(7, Vector3::zeros()));
+            // The cycle from 6 to 7, with two moments before it.
+            let interval = window.finish().unwrap();
+            assert_eq!(interval.commanded_stroke(), expect, "{in_force:?}");
         }
     }
 
@@ -314,19 +312,48 @@ mod tests {
 
     #[test]
     fn spans_follow_gate_and_power() {
-        let check = |gate: u32, edges: &[(u32, u32, f64)], expect: &[(f64, f64)]| {
+        let check = |gate: u32, edges: &[(u32, u32, f64)], expect: &[(f64, f64, u64)]| {
             let mut laser = LaserCycle { gate, power: 0.8, ..LaserCycle::OFF };
             for &(offset, gate, power) in edges {
                 assert!(laser.push(GateEdge { offset, gate, power }));
             }
-            assert_eq!(LitSpans::of(&laser).as_slice(), expect, "{gate} {edges:?}");
+            let spans = LitSpans::of(&laser);
+            let found: Vec<_> =
+                spans.as_slice().iter().map(|span| (span.from, span.to, span.stroke)).collect();
+            assert_eq!(found, expect, "{gate} {edges:?}");
+            assert_eq!(spans.is_whole(), matches!(expect, [(0.0, 1.0, _)]), "{gate} {edges:?}");
         };
         check(0, &[], &[]);
-        check(1, &[], &[(0.0, 1.0)]);
-        check(1, &[(300_000, 0, 0.0)], &[(0.0, 0.3)]);
-        check(0, &[(300_000, 1, 0.5)], &[(0.3, 1.0)]);
-        check(1, &[(200_000, 1, 0.4), (500_000, 1, 0.0)], &[(0.0, 0.5)]);
-        check(1, &[(100_000, 0, 0.0), (100_000, 1, 0.5)], &[(0.0, 1.0)]);
-        check(0, &[(0, 1, 1.0), (250_000, 0, 0.0), (750_000, 1, 1.0)], &[(0.0, 0.25), (0.75, 1.0)]);
+        check(7, &[], &[(0.0, 1.0, 7)]);
+        check(7, &[(300_000, 0, 0.0)], &[(0.0, 0.3, 7)]);
+        check(0, &[(300_000, 7, 0.5)], &[(0.3, 1.0, 7)]);
+        check(7, &[(200_000, 7, 0.4), (500_000, 7, 0.0)], &[(0.0, 0.5, 7)]);
+        check(7, &[(100_000, 0, 0.0), (100_000, 7, 0.5)], &[(0.0, 1.0, 7)]);
+        check(
+            0,
+            &[(0, 7, 1.0), (250_000, 0, 0.0), (750_000, 7, 1.0)],
+            &[(0.0, 0.25, 7), (0.75, 1.0, 7)],
+        );
+    }
+
+    #[test]
+    fn spans_of_two_strokes_touch_and_are_not_joined() {
+        let spans = |gate: u32, edges: &[(u32, u32)]| {
+            let mut laser = LaserCycle { gate, power: 0.8, ..LaserCycle::OFF };
+            for &(offset, gate) in edges {
+                assert!(laser.push(GateEdge { offset, gate, power: 0.8 }));
+            }
+            LitSpans::of(&laser)
+        };
+        let first = LitSpan { from: 0.0, to: 0.4, stroke: 7 };
+        let second = LitSpan { from: 0.4, to: 1.0, stroke: 8 };
+        for edges in [&[(400_000, 8)][..], &[(400_000, 0), (400_000, 8)]] {
+            let spans = spans(7, edges);
+            assert_eq!(spans.as_slice(), [first, second], "{edges:?}");
+            assert!(!spans.is_whole() && spans.share() == 1.0, "{edges:?}");
+        }
+        // An edge at the very start of the cycle leaves nothing of the gate before it.
+        let whole = LitSpan { from: 0.0, to: 1.0, stroke: 8 };
+        assert_eq!(spans(7, &[(0, 8)]).as_slice(), [whole]);
     }
 }

@@ -50,8 +50,8 @@ fn samples(cycles: u64) -> (Vec<Feedback>, Vec<Command>) {
             let at = |offset: i64| Nanoseconds(1_000_000_000 + cycle as i64 * 1_000_000 + offset);
             let noise = |seed: f64| math::sin(time * seed) * math::sin(time * 1.7 * seed + 1.0);
             let (planned, _) = plan(time);
-            let lit = cycle > 0 && plan(time - 0.5 * CYCLE_TIME).1 != 0;
-            let laser = LaserCycle { gate: u32::from(lit), power: 0.8, ..LaserCycle::OFF };
+            let stroke = if cycle > 0 { plan(time - 0.5 * CYCLE_TIME).1 } else { 0 };
+            let laser = LaserCycle { gate: stroke as u32, power: 0.8, ..LaserCycle::OFF };
             let late = (30_000.0 * noise(777.0).abs()) as i64;
             let mut feedback = Feedback {
                 cycle: Cycle(cycle),
