@@ -3,16 +3,20 @@
 use crate::exit::{Exit, Failure};
 use monitor::summary::{JobSummary, MachineSummary, Summary};
 use serde::Serialize;
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 
 /// Prints one JSON object.
 ///
 /// # Errors
 /// When standard output is closed.
 pub fn json(value: &impl Serialize) -> Result<(), Failure> {
-    let mut output = std::io::stdout().lock();
-    serde_json::to_writer_pretty(&mut output, value).map_err(Failure::service)?;
-    writeln!(output).map_err(Failure::service)
+    let mut text = serde_json::to_string_pretty(value).map_err(Failure::service)?;
+    text.push('\n');
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        // Whoever read has read enough, as `head` does.
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.map_err(Failure::service),
+    }
 }
 
 /// Prints a summary, as JSON or as text, and gives the exit code of its outcome.
@@ -21,6 +25,9 @@ pub fn json(value: &impl Serialize) -> Result<(), Failure> {
 /// When standard output is closed.
 pub fn summary(summary: &Summary, as_json: bool) -> Result<Exit, Failure> {
     if as_json {
+        for warning in summary.warnings.iter().chain(&summary.realtime.warnings) {
+            eprintln!("graver: warning: {warning}");
+        }
         json(summary)?;
     } else {
         eprint!("{}", summary.text());
