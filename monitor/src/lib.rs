@@ -4,11 +4,14 @@
 //! What happens per sample ([`stage::MonitorStage::step`]) does no input or output; files are
 //! written by functions that are told where to.
 
+pub mod conclusion;
+pub mod examination;
 pub mod latency;
 pub mod marks;
 pub mod recording;
 pub mod report;
 pub mod run_folder;
+pub mod service;
 pub mod stage;
 pub mod summary;
 pub mod trace;

@@ -16,6 +16,8 @@ pub const LATENCY: &str = "latency.hlog";
 pub const SAMPLES: &str = "samples.bin";
 /// What was to be marked; written by the planner.
 pub const ARTWORK: &str = "artwork.json";
+/// The facts of the plan; written by the planner.
+pub const PLAN: &str = "plan.json";
 
 /// The longest part of a job's name that goes into the folder's name [characters].
 const LONGEST_NAME: usize = 40;

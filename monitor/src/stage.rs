@@ -53,8 +53,10 @@ impl MonitorStage {
 
     /// Takes samples; `outputs` is overwritten.
     pub fn step(&mut self, inputs: &Inputs<'_>, outputs: &mut Outputs) {
-        inputs.feedbacks.iter().for_each(|feedback| self.recorder.feedback(feedback));
+        // Commands first: however many samples waited, each feedback then finds its answer, where
+        // there is one.
         inputs.commands.iter().for_each(|command| self.recorder.command(command));
+        inputs.feedbacks.iter().for_each(|feedback| self.recorder.feedback(feedback));
         self.pass_on(outputs);
     }
 

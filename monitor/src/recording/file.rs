@@ -97,12 +97,14 @@ pub struct RecordingWriter<W: Write> {
 }
 
 impl<W: Write> RecordingWriter<W> {
-    /// Writes the header to `writer`, which should be buffered.
+    /// Writes the header to `writer`, which should be buffered, and flushes it: a recording that
+    /// is still empty can be told from no recording.
     ///
     /// # Errors
     /// Whatever the writer reports.
     pub fn new(mut writer: W) -> io::Result<Self> {
         writer.write_all(Header::current().as_bytes())?;
+        writer.flush()?;
         Ok(Self { writer })
     }
 
