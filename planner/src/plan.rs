@@ -20,6 +20,9 @@ use crate::trajectory::Trajectory;
 /// Jobs that last longer are refused, most likely for a slip of the pen [s].
 const LONGEST: f64 = 7.0 * 86_400.0;
 
+/// Samples checked between two looks at whether anybody still waits for the plan.
+const LOOK: u64 = 4096;
+
 /// A job, planned and checked for one machine.
 #[derive(Debug, Clone)]
 pub struct Plan {
@@ -81,6 +84,9 @@ pub enum PlanError {
     /// The job is a comparison on paper.
     #[error("this job can be planned, not run: {0}")]
     IdealOnly(&'static str),
+    /// Whoever asked for the plan does not want it any more.
+    #[error("planning was given up: the job was withdrawn")]
+    Abandoned,
     /// A stroke bends so sharply that no speed is low enough.
     #[error(
         "this line turns too sharply to be marked without a stop: its curvature allows {speed:e} m/s"
@@ -168,7 +174,7 @@ impl PlanError {
     /// Line of the job file that it concerns, from 1; 0 for none.
     pub fn line(&self) -> u64 {
         match self {
-            Self::IdealOnly(_) | Self::TooLong { .. } => 0,
+            Self::IdealOnly(_) | Self::Abandoned | Self::TooLong { .. } => 0,
             Self::TooSharp { line, .. }
             | Self::TooShort { line, .. }
             | Self::TooManyEdges { line, .. }
@@ -183,9 +189,18 @@ impl PlanError {
 /// # Errors
 /// The first limit that it breaks, with line, stroke, time, axis, value and limit.
 pub fn plan(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
+    plan_unless(machine, job, &|| false)
+}
+
+/// Plans as [`plan`], but gives up soon after `abandoned` says so.
+pub(crate) fn plan_unless(
+    machine: &Machine,
+    job: &Job,
+    abandoned: &dyn Fn() -> bool,
+) -> Result<Plan, PlanError> {
     match job.ideal_only {
         Some(reason) => Err(PlanError::IdealOnly(reason)),
-        None => plan_within(machine, job, false),
+        None => plan_within(machine, job, false, abandoned),
     }
 }
 
@@ -195,10 +210,15 @@ pub fn plan(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
 /// # Errors
 /// As [`plan`], without axes and area.
 pub fn plan_ideal(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
-    plan_within(machine, job, true)
+    plan_within(machine, job, true, &|| false)
 }
 
-fn plan_within(machine: &Machine, job: &Job, ideal: bool) -> Result<Plan, PlanError> {
+fn plan_within(
+    machine: &Machine,
+    job: &Job,
+    ideal: bool,
+    abandoned: &dyn Fn() -> bool,
+) -> Result<Plan, PlanError> {
     let drawing = &job.drawing;
     let limits = PathLimits {
         rapid: job.rapid.unwrap_or(machine.path.rapid),
@@ -233,7 +253,7 @@ fn plan_within(machine: &Machine, job: &Job, ideal: bool) -> Result<Plan, PlanEr
         axes: machine.axes.clone(),
     };
     let checker = Checker::new(machine, limits, ideal);
-    let (samples, uses) = plan.visit(CheckAll { plan: &plan, checker })?;
+    let (samples, uses) = plan.visit(CheckAll { plan: &plan, checker, abandoned })?;
     plan.facts.samples = samples;
     plan.facts.uses = uses;
     // Last, so that a drawing far beyond the area is refused before it is drawn point by point.
@@ -259,13 +279,14 @@ fn check_edges(trajectory: &Trajectory) -> Result<(), PlanError> {
 struct CheckAll<'a> {
     plan: &'a Plan,
     checker: Checker<'a>,
+    abandoned: &'a dyn Fn() -> bool,
 }
 
 impl MechanismVisitor for CheckAll<'_> {
     type Output = Result<(u64, Uses), PlanError>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let Self { plan, mut checker } = self;
+        let Self { plan, mut checker, abandoned } = self;
         let unreachable = |found: Unreachable| {
             let (line, place) = plan.place(found.time);
             PlanError::Unreachable { line, place, cause: found.cause }
@@ -273,9 +294,12 @@ impl MechanismVisitor for CheckAll<'_> {
         let trajectory = Arc::clone(&plan.trajectory);
         let mut sampler =
             Sampler::new(mechanism, &plan.axes, trajectory, 1).map_err(unreachable)?;
-        let mut samples = 0;
+        let mut samples: u64 = 0;
         for setpoint in sampler.by_ref() {
             samples += 1;
+            if samples.is_multiple_of(LOOK) && abandoned() {
+                return Err(PlanError::Abandoned);
+            }
             checker.look(&setpoint).map_err(|breach| {
                 let (line, place) = plan.place(breach.time);
                 PlanError::Limit { line, place, breach }

@@ -2,20 +2,24 @@
 //! ahead as the controller has room for.
 //!
 //! Three threads joined by bounded channels: one plans, one samples the checked plan, and the main
-//! one talks to the domain. Nothing is sent before the whole job has been checked, and nothing
-//! before the controller names the stream: until then its channel may be emptied unread.
+//! one talks to the domain and never waits for either. Nothing is sent before the whole job has
+//! been checked, and nothing before the controller names the stream: until then its channel may be
+//! emptied unread. A stream that the controller has gone on with without this process, or is done
+//! with, is let go: no part of it is ever sent twice.
 
-use crate::job::Job;
-use crate::request::{ARTWORK_FILE, JobRequest, PLAN_FILE, REFUSAL_FILE, REQUEST_FILE, Refusal};
-use crate::{Plan, plan};
+mod desk;
+#[cfg(test)]
+mod tests;
+
+use crate::request::Refusal;
+use crate::{Plan, PlanFacts};
 use crossbeam::channel::{Receiver, TryRecvError, bounded};
-use machine::{Machine, Mechanism, MechanismVisitor};
-use nalgebra::Vector3;
+use desk::Abandoned;
+use machine::Machine;
 use runtime::peer::{PeerState, Peers};
 use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, clock, signal};
-use signals::{AxisArray, JobOffer, PlannerPhase, PlannerReport, Progress, Setpoint};
-use std::path::{Path, PathBuf};
-use std::thread::JoinHandle;
+use signals::{ControllerState, JobOffer, PlannerPhase, PlannerReport, Progress, Setpoint};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// How often the service looks at its channels.
@@ -27,10 +31,6 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 /// Setpoints that wait between sampling and sending.
 const SAMPLED_AHEAD: usize = 1024;
 
-/// A start farther than this from where the drawing begins is reached by a move of its own [m]:
-/// the axes stand within a few encoder counts of where they were told to.
-const START_TOLERANCE: f64 = 20e-6;
-
 /// Runs until it is told to end (SIGTERM) or the supervisor dies.
 ///
 /// # Errors
@@ -38,10 +38,7 @@ const START_TOLERANCE: f64 = 20e-6;
 pub fn run(domain: &Domain, machine: &Machine) -> Result<(), ServiceError> {
     let mut service = Service::open(domain, machine)?;
     while signal::termination().is_none() && service.peers.state(Role::Domain) != PeerState::Dead {
-        service.take_offer()?;
-        service.take_plan()?;
-        service.send()?;
-        service.report_now_and_then()?;
+        service.turn()?;
         std::thread::sleep(LOOK);
     }
     Ok(())
@@ -50,8 +47,25 @@ pub fn run(domain: &Domain, machine: &Machine) -> Result<(), ServiceError> {
 /// What the service is doing, with what that needs.
 enum Work {
     Idle,
-    Planning { folder: PathBuf, started: Instant, result: Receiver<Result<Plan, Refusal>> },
-    Sending { samples: Receiver<Setpoint>, waiting: Option<Setpoint>, _sampler: JoinHandle<()> },
+    /// The offer waits for the axes to rest: where they rest, the job begins.
+    Waiting(PathBuf),
+    Planning(Planning),
+    Sending(Sending),
+}
+
+/// A plan in the making, on a thread of its own; dropping this makes that thread give up.
+struct Planning {
+    folder: PathBuf,
+    started: Instant,
+    result: Receiver<Result<Plan, Refusal>>,
+    _abandoned: Abandoned,
+}
+
+/// A plan on its way to the controller; dropping this ends the thread that samples it.
+struct Sending {
+    samples: Receiver<Setpoint>,
+    /// Sampled, but the channel was full.
+    waiting: Option<Box<Setpoint>>,
 }
 
 struct Service {
@@ -85,105 +99,157 @@ impl Service {
         Ok(service)
     }
 
-    fn take_offer(&mut self) -> Result<(), ServiceError> {
+    /// Looks at everything once; never waits.
+    fn turn(&mut self) -> Result<(), ServiceError> {
         if let Some(progress) = self.progress.newest()? {
             self.newest_progress = progress;
         }
-        let Some(offer) = self.offers.newest()? else { return Ok(()) };
-        let folder = offer.folder().filter(|folder| !folder.is_empty());
-        let finished = offer.stream <= self.newest_progress.finished_stream;
-        let Some(folder) = folder.filter(|_| !finished) else {
-            if offer.stream == self.report.stream {
-                self.work = Work::Idle;
-                self.enter(PlannerPhase::Idle)?;
+        if let Some(offer) = self.offers.newest()? {
+            self.take_offer(&offer)?;
+        }
+        self.let_go()?;
+        self.begin_plan()?;
+        self.take_plan()?;
+        self.send()?;
+        self.report_now_and_then()
+    }
+
+    fn take_offer(&mut self, offer: &JobOffer) -> Result<(), ServiceError> {
+        match offer.folder().filter(|folder| !folder.is_empty()) {
+            // Over already: this process is a new one, and the offer of an old job still stands.
+            Some(_) if offer.stream <= self.newest_progress.finished_stream => Ok(()),
+            Some(folder) => {
+                self.work = Work::Waiting(PathBuf::from(folder));
+                self.report = PlannerReport { stream: offer.stream, ..PlannerReport::default() };
+                self.enter(PlannerPhase::Planning)
             }
+            None if offer.stream == self.report.stream => self.rest(),
+            None => Ok(()),
+        }
+    }
+
+    /// Gives up a stream that the controller is done with, or has begun without this process.
+    fn let_go(&mut self) -> Result<(), ServiceError> {
+        if matches!(self.work, Work::Idle) {
             return Ok(());
-        };
-        let folder = PathBuf::from(folder);
-        let machine = self.machine.clone();
-        let start = self.newest_progress.position;
-        let standing = self.newest_progress.published.0 != 0;
+        }
+        let (report, progress) = (&self.report, &self.newest_progress);
+        let over = report.stream <= progress.finished_stream;
+        let foreign = report.stream == progress.stream && report.sent < progress.accepted;
+        if over || foreign { self.rest() } else { Ok(()) }
+    }
+
+    fn rest(&mut self) -> Result<(), ServiceError> {
+        self.work = Work::Idle;
+        self.enter(PlannerPhase::Idle)
+    }
+
+    /// Begins to plan once the axes rest.
+    fn begin_plan(&mut self) -> Result<(), ServiceError> {
+        let Work::Waiting(folder) = &self.work else { return Ok(()) };
+        let progress = &self.newest_progress;
+        if matches!(
+            ControllerState::from_wire(progress.state),
+            ControllerState::Running | ControllerState::Holding | ControllerState::Stopping
+        ) {
+            return Ok(());
+        }
+        let folder = folder.clone();
+        // Without a controller so far the job begins where its drawing does.
+        let standing = (progress.published.0 != 0).then_some(progress.position);
+        let abandoned = Abandoned::default();
         let (sender, result) = bounded(1);
-        let place = folder.clone();
+        let (place, machine, watched) = (folder.clone(), self.machine.clone(), abandoned.watch());
         spawn("plan", move || {
-            let planned = plan_request(&place, &machine, standing.then_some(&start));
             // Nobody listens any more when the offer was withdrawn.
-            let _ = sender.send(planned);
+            let _ = sender.send(desk::plan_request(&place, &machine, standing.as_ref(), &watched));
         })?;
-        self.work = Work::Planning { folder, started: Instant::now(), result };
-        self.report = PlannerReport { stream: offer.stream, ..PlannerReport::default() };
-        self.enter(PlannerPhase::Planning)
+        let started = Instant::now();
+        self.work = Work::Planning(Planning { folder, started, result, _abandoned: abandoned });
+        Ok(())
     }
 
     fn take_plan(&mut self) -> Result<(), ServiceError> {
-        let Work::Planning { folder, started, result } = &self.work else { return Ok(()) };
+        let Work::Planning(Planning { folder, started, result, .. }) = &self.work else {
+            return Ok(());
+        };
         let planned = match result.try_recv() {
             Ok(planned) => planned,
             Err(TryRecvError::Empty) => return Ok(()),
-            Err(TryRecvError::Disconnected) => Err(Refusal::internal("the planning thread ended")),
+            Err(TryRecvError::Disconnected) => {
+                Err(Refusal::internal("planning ended without a result: a fault of the planner"))
+            }
         };
-        let plan_time = started.elapsed().as_secs_f64();
-        let folder = folder.clone();
-        match planned.and_then(|plan| write_plan(&folder, &plan).map(|()| plan)) {
+        match planned {
             Ok(plan) => {
-                let stream = self.report.stream;
-                self.report = PlannerReport {
-                    samples: plan.facts.samples,
-                    strokes: plan.artwork.strokes.len() as u64,
-                    plan_time,
-                    duration: plan.facts.duration,
-                    length: plan.facts.length,
-                    ..self.report
-                };
-                let (sender, samples) = bounded(SAMPLED_AHEAD);
-                let sampler = spawn("sample", move || {
-                    for setpoint in plan.setpoints(stream) {
-                        if sender.send(setpoint).is_err() {
-                            return;
-                        }
-                    }
-                })?;
-                self.work = Work::Sending { samples, waiting: None, _sampler: sampler };
-                self.enter(PlannerPhase::Streaming)
+                let plan_time = started.elapsed().as_secs_f64();
+                self.begin_stream(plan, plan_time)
             }
             Err(refusal) => {
-                let text = serde_json::to_vec_pretty(&refusal).map_err(std::io::Error::other)?;
-                std::fs::write(folder.join(REFUSAL_FILE), text)?;
+                desk::write_refusal(folder, &refusal);
                 self.work = Work::Idle;
                 self.enter(PlannerPhase::Refused)
             }
         }
     }
 
+    fn begin_stream(&mut self, plan: Plan, plan_time: f64) -> Result<(), ServiceError> {
+        let stream = self.report.stream;
+        let PlanFacts { samples, strokes, duration, length, .. } = plan.facts;
+        self.report = PlannerReport {
+            samples,
+            strokes: strokes as u64,
+            plan_time,
+            duration,
+            length,
+            ..self.report
+        };
+        let setpoints = plan.setpoints(stream);
+        // The stream holds what it needs; the rest of the plan can be large.
+        drop(plan);
+        let (sender, samples) = bounded(SAMPLED_AHEAD);
+        spawn("sample", move || {
+            for setpoint in setpoints {
+                if sender.send(setpoint).is_err() {
+                    return;
+                }
+            }
+        })?;
+        self.work = Work::Sending(Sending { samples, waiting: None });
+        self.enter(PlannerPhase::Streaming)
+    }
+
     /// Sends as many setpoints as the controller has room for, less those still under way.
     fn send(&mut self) -> Result<(), ServiceError> {
-        let Work::Sending { samples, waiting, .. } = &mut self.work else { return Ok(()) };
+        let Work::Sending(Sending { samples, waiting }) = &mut self.work else { return Ok(()) };
         let progress = &self.newest_progress;
         if progress.stream != self.report.stream {
             return Ok(());
         }
         let under_way = self.report.sent.saturating_sub(progress.accepted);
         let mut licence = progress.room.saturating_sub(under_way);
-        while licence > 0 {
-            let next = match waiting.take() {
-                Some(setpoint) => Ok(setpoint),
-                None => samples.try_recv(),
-            };
-            let mut setpoint = match next {
-                Ok(setpoint) => setpoint,
-                Err(TryRecvError::Empty) => return Ok(()),
-                Err(TryRecvError::Disconnected) => {
-                    self.work = Work::Idle;
-                    return self.enter(PlannerPhase::Sent);
-                }
-            };
+        while licence > 0 && self.report.sent < self.report.samples {
+            let mut setpoint =
+                match waiting.take().map_or_else(|| samples.try_recv(), |setpoint| Ok(*setpoint)) {
+                    Ok(setpoint) => setpoint,
+                    Err(TryRecvError::Empty) => return Ok(()),
+                    Err(TryRecvError::Disconnected) => {
+                        let (sent, all) = (self.report.sent, self.report.samples);
+                        let message = format!("sampling ended after {sent} of {all} setpoints");
+                        return Err(std::io::Error::other(message).into());
+                    }
+                };
             setpoint.published = clock::now();
             if !self.setpoints.publish(&setpoint)? {
-                *waiting = Some(setpoint);
+                *waiting = Some(Box::new(setpoint));
                 return Ok(());
             }
             self.report.sent += 1;
             licence -= 1;
+        }
+        if self.report.sent == self.report.samples {
+            self.work = Work::Idle;
+            return self.enter(PlannerPhase::Sent);
         }
         Ok(())
     }
@@ -205,52 +271,7 @@ impl Service {
     }
 }
 
-fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<JoinHandle<()>> {
-    std::thread::Builder::new().name(name.to_owned()).spawn(work)
-}
-
-/// Reads and plans the job of a run folder, from where the joints stand.
-fn plan_request(
-    folder: &Path,
-    machine: &Machine,
-    standing: Option<&AxisArray>,
-) -> Result<Plan, Refusal> {
-    let text = std::fs::read(folder.join(REQUEST_FILE)).map_err(Refusal::internal)?;
-    let request: JobRequest = serde_json::from_slice(&text).map_err(Refusal::internal)?;
-    let mut job = request.read(machine)?;
-    if let Some(position) = standing {
-        approach(&mut job, machine, position)?;
-    }
-    plan(machine, &job).map_err(|error| request.refuse(&error))
-}
-
-/// Lets the job begin where the axes stand, with a rapid to where it wants to begin.
-fn approach(job: &mut Job, machine: &Machine, position: &AxisArray) -> Result<(), Refusal> {
-    let tool = machine.mechanism.visit(ToolAt { position }).map_err(Refusal::internal)?;
-    if (tool - job.drawing.start).norm() > START_TOLERANCE {
-        job.approach_from(tool);
-    }
-    Ok(())
-}
-
-struct ToolAt<'a> {
-    position: &'a AxisArray,
-}
-
-impl MechanismVisitor for ToolAt<'_> {
-    type Output = Result<Vector3<f64>, machine::kinematics::KinematicsError>;
-
-    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let joints = nalgebra::SVector::from_fn(|axis, _| self.position[axis]);
-        Ok(mechanism.forward(&joints, M::Branch::default())?.position)
-    }
-}
-
-fn write_plan(folder: &Path, plan: &Plan) -> Result<(), Refusal> {
-    let write = |name: &str, content: serde_json::Result<Vec<u8>>| {
-        std::fs::write(folder.join(name), content.map_err(std::io::Error::other)?)
-    };
-    write(ARTWORK_FILE, serde_json::to_vec(&plan.artwork))
-        .and_then(|()| write(PLAN_FILE, serde_json::to_vec_pretty(&plan.facts)))
-        .map_err(Refusal::internal)
+/// Starts a thread that ends by itself when nobody listens to it.
+fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    std::thread::Builder::new().name(name.to_owned()).spawn(work).map(drop)
 }

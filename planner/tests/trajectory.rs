@@ -92,7 +92,7 @@ fn random_drawing(random: &mut Random, machine: &Machine) -> Job {
                 place = to;
             }
             3 => {
-                let lit = (random.next() % 2 == 0).then_some(0.3);
+                let lit = random.next().is_multiple_of(2).then_some(0.3);
                 steps.push(step(Action::Dwell { time: random.between(0.001, 0.02), lit }));
             }
             4 => {
@@ -108,7 +108,7 @@ fn random_drawing(random: &mut Random, machine: &Machine) -> Job {
                 place = curve.to();
             }
             _ => {
-                let speed = (random.next() % 2 == 0).then(|| random.between(0.02, 0.25));
+                let speed = random.next().is_multiple_of(2).then(|| random.between(0.02, 0.25));
                 for _ in 0..1 + random.next() % 4 {
                     // A kink below the corner of 1°.
                     heading += random.between(-0.017, 0.017);

@@ -1,0 +1,116 @@
+//! The slow part of the service, away from its loop: files, reading, planning.
+
+use crate::Plan;
+use crate::job::Job;
+use crate::plan::plan_unless;
+use crate::request::{ARTWORK_FILE, JobRequest, PLAN_FILE, REFUSAL_FILE, REQUEST_FILE, Refusal};
+use machine::kinematics::{Joints, KinematicsError};
+use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea};
+use nalgebra::Vector3;
+use signals::AxisArray;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Encoder counts that an axis may stand away from where the drawing begins without a move of its
+/// own there: rounding when the motors were powered, well below what the controller fades out.
+const COUNTS: f64 = 4.0;
+
+/// Says, once dropped, that nobody waits for a plan any more.
+#[derive(Debug, Default)]
+pub(super) struct Abandoned(Arc<AtomicBool>);
+
+impl Abandoned {
+    /// What becomes true when this is dropped.
+    pub(super) fn watch(&self) -> Arc<AtomicBool> {
+        self.0.clone()
+    }
+}
+
+impl Drop for Abandoned {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Reads and plans the job of a run folder from where the joints stand, load side [m or rad], and
+/// writes what others read of the plan. Gives up once `abandoned`.
+pub(super) fn plan_request(
+    folder: &Path,
+    machine: &Machine,
+    standing: Option<&AxisArray>,
+    abandoned: &AtomicBool,
+) -> Result<Plan, Refusal> {
+    let text = std::fs::read(folder.join(REQUEST_FILE)).map_err(Refusal::internal)?;
+    let request: JobRequest = serde_json::from_slice(&text).map_err(Refusal::internal)?;
+    let mut job = request.read(machine)?;
+    if let Some(standing) = standing {
+        approach(&mut job, machine, standing).map_err(Refusal::internal)?;
+    }
+    let plan = plan_unless(machine, &job, &|| abandoned.load(Ordering::Relaxed))
+        .map_err(|error| request.refuse(&error))?;
+    write_plan(folder, &plan).map_err(Refusal::internal)?;
+    Ok(plan)
+}
+
+/// Says in the run folder why the job was refused. Where that cannot be written, such as on a full
+/// disk, standard error is all there is.
+pub(super) fn write_refusal(folder: &Path, refusal: &Refusal) {
+    let path = folder.join(REFUSAL_FILE);
+    let text = serde_json::to_vec_pretty(refusal).map_err(std::io::Error::other);
+    if let Err(error) = text.and_then(|text| std::fs::write(&path, text)) {
+        eprintln!("graver: {}: {error}: {}", path.display(), refusal.message);
+    }
+}
+
+fn write_plan(folder: &Path, plan: &Plan) -> std::io::Result<()> {
+    let write = |name: &str, content: serde_json::Result<Vec<u8>>| {
+        std::fs::write(folder.join(name), content.map_err(std::io::Error::other)?)
+    };
+    write(ARTWORK_FILE, serde_json::to_vec(&plan.artwork))?;
+    write(PLAN_FILE, serde_json::to_vec_pretty(&plan.facts))
+}
+
+/// Lets the job begin where the axes stand, with a rapid to where it wants to begin.
+fn approach(job: &mut Job, machine: &Machine, standing: &AxisArray) -> Result<(), KinematicsError> {
+    let wanted = job.drawing.start;
+    let Machine { mechanism, axes, area, .. } = machine;
+    if let Some(from) = mechanism.visit(Departure { standing, axes, area, wanted })? {
+        job.approach_from(from);
+    }
+    Ok(())
+}
+
+/// Where a job departs from; `None` where the drawing's own start is as good.
+struct Departure<'a> {
+    standing: &'a AxisArray,
+    axes: &'a [Axis],
+    area: &'a WorkArea,
+    wanted: Vector3<f64>,
+}
+
+impl MechanismVisitor for Departure<'_> {
+    type Output = Result<Option<Vector3<f64>>, KinematicsError>;
+
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
+        let Self { standing, axes, area, wanted } = self;
+        let branch = M::Branch::default();
+        let joints = Joints::<N>::from_fn(|axis, _| standing[axis]);
+        let is_here = |point: &Vector3<f64>| {
+            let there = mechanism.inverse(&Pose::at(*point), branch, &joints);
+            there.is_ok_and(|there| {
+                axes.iter().enumerate().take(N).all(|(index, axis)| {
+                    let count = axis.encoder.resolution() * axis.ratio.abs();
+                    (there[index] - joints[index]).abs() <= COUNTS * count
+                })
+            })
+        };
+        if is_here(&wanted) {
+            return Ok(None);
+        }
+        // An encoder's rounding at the edge of the area does not put the tool outside.
+        let tool = mechanism.forward(&joints, branch)?.position;
+        let inside = Vector3::from_fn(|row, _| tool[row].clamp(area.lower[row], area.upper[row]));
+        Ok(Some(if is_here(&inside) { inside } else { tool }))
+    }
+}

@@ -1,0 +1,285 @@
+//! The service in a domain of its own, with the test as the supervisor and the controller.
+
+#![allow(clippy::unwrap_used)]
+
+use super::{Service, Work};
+use crate::request::{ARTWORK_FILE, JobRequest, PLAN_FILE, REFUSAL_FILE, REQUEST_FILE, Refusal};
+use machine::Machine;
+use runtime::{Domain, Instance, Publisher, Reading, Role, Subscriber};
+use signals::setpoint::flags;
+use signals::{
+    AxisArray, ControllerState, JobOffer, Nanoseconds, PlannerPhase, Progress, Setpoint,
+    axis::axis_array,
+};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// How long a plan may take before a test gives up.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+struct Bench {
+    service: Service,
+    offers: Publisher<JobOffer>,
+    progress: Publisher<Progress>,
+    setpoints: Subscriber<Setpoint>,
+    folder: tempfile::TempDir,
+    said: Progress,
+    // Last, so that all else has let go of the domain.
+    _planner: Domain,
+    _holder: Domain,
+}
+
+impl Bench {
+    /// A planner that has heard a controller at rest at home.
+    fn new() -> Self {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let name = format!("planner-test-{}-{number}", std::process::id());
+        let instance = Instance::new(&name).unwrap();
+        let holder = Domain::create(&instance).unwrap();
+        let planner = Domain::join(&instance, Role::Planner).unwrap();
+        let service = Service::open(&planner, &Machine::builtin()).unwrap();
+        let mut bench = Self {
+            service,
+            offers: holder.publisher().unwrap(),
+            progress: holder.publisher().unwrap(),
+            setpoints: holder.subscriber(Reading::Every).unwrap(),
+            folder: tempfile::tempdir().unwrap(),
+            said: Progress {
+                published: Nanoseconds(1),
+                state: ControllerState::Idle as u32,
+                position: at(0.1, 0.1),
+                ..Progress::default()
+            },
+            _planner: planner,
+            _holder: holder,
+        };
+        bench.say(|_| ());
+        bench
+    }
+
+    fn say(&mut self, change: impl FnOnce(&mut Progress)) {
+        change(&mut self.said);
+        assert!(self.progress.publish(&self.said).unwrap());
+    }
+
+    /// Offers the built-in job with settings, small enough to be planned at once.
+    fn offer(&mut self, stream: u64, set: &[&str]) {
+        let set = set.iter().map(ToString::to_string).collect();
+        let request = JobRequest { job: None, set };
+        let path = self.folder.path().join(REQUEST_FILE);
+        std::fs::write(path, serde_json::to_vec(&request).unwrap()).unwrap();
+        let folder = self.folder.path().to_str().unwrap();
+        self.offers.publish(&JobOffer::new(stream, folder).unwrap()).unwrap();
+    }
+
+    fn withdraw(&mut self, stream: u64) {
+        self.offers.publish(&JobOffer { stream, ..JobOffer::default() }).unwrap();
+    }
+
+    fn phase(&self) -> PlannerPhase {
+        PlannerPhase::from_wire(self.service.report.phase)
+    }
+
+    fn turn_until(&mut self, phase: PlannerPhase) {
+        let started = Instant::now();
+        while self.phase() != phase {
+            assert!(started.elapsed() < PATIENCE, "{:?} instead of {phase:?}", self.phase());
+            self.service.turn().unwrap();
+        }
+    }
+
+    fn arrived(&mut self) -> Vec<Setpoint> {
+        std::iter::from_fn(|| self.setpoints.receive().unwrap()).collect()
+    }
+
+    /// Turns until `count` setpoints came, or far more turns than that needs have passed.
+    fn collect(&mut self, count: usize) -> Vec<Setpoint> {
+        let mut all = Vec::new();
+        for _ in 0..2000 {
+            self.service.turn().unwrap();
+            all.extend(self.arrived());
+            if all.len() >= count {
+                break;
+            }
+            std::thread::sleep(Duration::from_micros(100));
+        }
+        all
+    }
+}
+
+/// Belt travels of the built-in machine with its tool at x and y [m].
+fn at(x: f64, y: f64) -> AxisArray {
+    axis_array(&[x + y, x - y])
+}
+
+const SMALL: [&str; 2] = ["letters.text=S", "letters.height=2 mm"];
+
+#[test]
+fn a_stream_waits_for_its_name_and_never_exceeds_its_licence() {
+    let mut bench = Bench::new();
+    bench.offer(1, &SMALL);
+    bench.turn_until(PlannerPhase::Streaming);
+    assert!(bench.folder.path().join(ARTWORK_FILE).exists());
+    assert!(bench.folder.path().join(PLAN_FILE).exists());
+    assert_eq!(bench.collect(1), [], "nothing goes out before the controller names the stream");
+
+    bench.say(|progress| (progress.stream, progress.room) = (1, 10));
+    let mut all = bench.collect(10);
+    assert_eq!(all.len(), 10, "room for ten");
+    // Six of them taken, room for five more: four are still under way, so one may follow.
+    bench.say(|progress| (progress.accepted, progress.room) = (6, 5));
+    all.extend(bench.collect(2));
+    assert_eq!(all.len(), 11);
+    // All taken, and room again.
+    let samples = bench.service.report.samples;
+    while (all.len() as u64) < samples {
+        let accepted = all.len() as u64;
+        bench.say(|progress| (progress.accepted, progress.room) = (accepted, 300));
+        let new = bench.collect(300.min((samples - accepted) as usize));
+        assert!((1..=300).contains(&new.len()), "{}", new.len());
+        all.extend(new);
+    }
+    assert_eq!(bench.phase(), PlannerPhase::Sent);
+    assert!(all.iter().enumerate().all(|(index, setpoint)| {
+        setpoint.stream == 1 && setpoint.sequence == index as u64 && setpoint.published.0 > 0
+    }));
+    assert!(all.last().unwrap().has(flags::LAST));
+}
+
+#[test]
+fn a_job_begins_where_the_axes_rest() {
+    let mut bench = Bench::new();
+    bench.say(|progress| {
+        progress.state = ControllerState::Stopping as u32;
+        progress.position = at(0.07, 0.12);
+    });
+    bench.offer(4, &SMALL);
+    bench.collect(1);
+    assert!(matches!(bench.service.work, Work::Waiting(_)), "the axes still move");
+    // A stopped job has left the axes here, and its stream is over.
+    bench.say(|progress| {
+        progress.state = ControllerState::Idle as u32;
+        progress.position = at(0.06, 0.13);
+        progress.finished_stream = 3;
+    });
+    bench.turn_until(PlannerPhase::Streaming);
+    bench.say(|progress| (progress.stream, progress.room) = (4, 100));
+    let first = bench.collect(100)[0];
+    assert!((first.tool[0] - 0.06).abs() < 1e-12 && (first.tool[1] - 0.13).abs() < 1e-12);
+    assert_eq!((first.sequence, first.path_velocity), (0, 0.0));
+}
+
+#[test]
+fn encoder_rounding_at_the_edge_of_the_area_refuses_no_job() {
+    let mut bench = Bench::new();
+    let count = 1e-6;
+    bench.say(|progress| progress.position = at(-count, 0.05));
+    bench.offer(1, &SMALL);
+    bench.turn_until(PlannerPhase::Streaming);
+    bench.say(|progress| (progress.stream, progress.room) = (1, 10));
+    assert_eq!(bench.collect(10)[0].tool[0], 0.0);
+}
+
+#[test]
+fn rounding_where_the_drawing_begins_needs_no_move_of_its_own() {
+    let mut bench = Bench::new();
+    bench.say(|progress| progress.position = at(0.1 + 1e-6, 0.1));
+    bench.offer(1, &SMALL);
+    bench.turn_until(PlannerPhase::Streaming);
+    bench.say(|progress| (progress.stream, progress.room) = (1, 10));
+    assert_eq!(bench.collect(10)[0].tool, [0.1, 0.1, 0.0]);
+}
+
+#[test]
+fn a_withdrawn_job_ends_in_every_phase() {
+    let mut bench = Bench::new();
+    bench.offer(1, &SMALL);
+    bench.service.turn().unwrap();
+    bench.withdraw(1);
+    bench.turn_until(PlannerPhase::Idle);
+    bench.say(|progress| (progress.stream, progress.room) = (1, 100));
+    assert_eq!(bench.collect(1), []);
+
+    bench.say(|progress| *progress = Progress { stream: 0, finished_stream: 1, ..*progress });
+    bench.offer(2, &SMALL);
+    bench.turn_until(PlannerPhase::Streaming);
+    bench.say(|progress| (progress.stream, progress.room) = (2, 20));
+    assert_eq!(bench.collect(20).len(), 20);
+    // The withdrawal of another stream is none of this one.
+    bench.withdraw(1);
+    bench.say(|progress| (progress.accepted, progress.room) = (20, 20));
+    assert_eq!(bench.collect(20).len(), 20);
+    bench.withdraw(2);
+    bench.turn_until(PlannerPhase::Idle);
+    bench.say(|progress| (progress.accepted, progress.room) = (40, 20));
+    assert_eq!(bench.collect(1), []);
+}
+
+#[test]
+fn a_new_offer_replaces_the_job_that_is_planned_or_sent() {
+    let mut bench = Bench::new();
+    bench.offer(1, &SMALL);
+    bench.service.turn().unwrap();
+    bench.offer(2, &SMALL);
+    bench.service.turn().unwrap();
+    bench.turn_until(PlannerPhase::Streaming);
+    assert_eq!(bench.service.report.stream, 2);
+    bench.say(|progress| (progress.stream, progress.room) = (2, 50));
+    assert_eq!(bench.collect(50).len(), 50);
+    bench.offer(3, &SMALL);
+    bench.service.turn().unwrap();
+    bench.turn_until(PlannerPhase::Streaming);
+    assert_eq!(bench.collect(1), [], "stream 2 has ended with its offer");
+    bench.say(|progress| (progress.stream, progress.accepted, progress.room) = (3, 0, 50));
+    let new = bench.collect(50);
+    assert!(
+        new.iter()
+            .enumerate()
+            .all(|(index, setpoint)| { (setpoint.stream, setpoint.sequence) == (3, index as u64) })
+    );
+    assert_eq!(new.len(), 50);
+}
+
+#[test]
+fn a_stream_that_the_controller_is_done_with_is_let_go() {
+    let mut bench = Bench::new();
+    bench.offer(1, &SMALL);
+    bench.turn_until(PlannerPhase::Streaming);
+    bench.say(|progress| (progress.stream, progress.room) = (1, 20));
+    bench.collect(20);
+    bench.say(|progress| (progress.stream, progress.finished_stream) = (0, 1));
+    bench.turn_until(PlannerPhase::Idle);
+    assert!(matches!(bench.service.work, Work::Idle));
+    // Its offer heard again, as by a planner that was restarted, plans nothing.
+    bench.offer(1, &SMALL);
+    bench.service.turn().unwrap();
+    assert_eq!(bench.phase(), PlannerPhase::Idle);
+}
+
+#[test]
+fn a_planner_restarted_in_the_middle_of_a_stream_sends_none_of_it() {
+    let mut bench = Bench::new();
+    bench.say(|progress| {
+        progress.state = ControllerState::Running as u32;
+        (progress.stream, progress.accepted, progress.room) = (1, 500, 100);
+    });
+    bench.offer(1, &SMALL);
+    assert_eq!(bench.collect(1), []);
+    assert_eq!(bench.phase(), PlannerPhase::Idle);
+}
+
+#[test]
+fn a_refusal_is_written_or_at_least_reported() {
+    let mut bench = Bench::new();
+    bench.offer(1, &["letters.text=S", "letters.height=400 mm"]);
+    bench.turn_until(PlannerPhase::Refused);
+    let text = std::fs::read(bench.folder.path().join(REFUSAL_FILE)).unwrap();
+    let refusal: Refusal = serde_json::from_slice(&text).unwrap();
+    assert!(refusal.message.contains("of the tool"), "{}", refusal.message);
+
+    bench.offers.publish(&JobOffer::new(2, "/nowhere/at/all").unwrap()).unwrap();
+    bench.service.turn().unwrap();
+    bench.turn_until(PlannerPhase::Refused);
+    assert_eq!(bench.service.report.stream, 2);
+}
