@@ -62,23 +62,38 @@ pub(crate) struct Dot {
 
 impl Feed {
     fn new(track: Track, speed: f64, limits: &PathLimits) -> Self {
+        /// Looks at each phase of the profile.
+        const LOOKS: u32 = 64;
+        /// How near to the ends of a phase to look, as a share of it.
+        const INSIDE: f64 = 1e-9;
         let speed = speed.min(limits.rapid);
         let profile = Move::new(track.length(), speed, limits.acceleration, limits.jerk);
         let mut feed = Self { track, profile, pace: 1.0 };
         if matches!(feed.track, Track::Line { .. }) {
             return feed;
         }
-        // Played c times slower, speed falls by c, acceleration by c² and jerk by c³.
-        let samples = 512;
+        // Played c times slower, speed falls by c, acceleration by c² and jerk by c³. The jerk steps
+        // between the phases of the profile, so each is looked at by itself, up to its very ends.
+        let bend = feed.track.bend();
         let mut pace: f64 = 1.0;
-        for index in 0..=samples {
-            let time = feed.profile.duration() * f64::from(index) / f64::from(samples);
-            let motion = feed.at(time);
-            pace = pace
-                .max((motion.acceleration.norm() / limits.acceleration).sqrt())
-                .max(math::cbrt(motion.jerk.norm() / limits.jerk));
+        let mut start = 0.0;
+        for (duration, _) in feed.profile.phases() {
+            for index in 0..=LOOKS {
+                let share = (f64::from(index) / f64::from(LOOKS)).clamp(INSIDE, 1.0 - INSIDE);
+                let time = start + duration * share;
+                let (acceleration, jerk) = if let Track::Ellipse(_) = feed.track {
+                    bend.demands(&feed.profile.at(time))
+                } else {
+                    let motion = feed.at(time);
+                    (motion.acceleration.norm(), motion.jerk.norm())
+                };
+                pace = pace
+                    .max((acceleration / limits.acceleration).sqrt())
+                    .max(math::cbrt(jerk / limits.jerk));
+            }
+            start += duration;
         }
-        // Between samples the norms rise by less than a thousandth.
+        // A top between two samples is higher than both by less than a thousandth.
         feed.pace = if pace > 1.0 { pace * 1.001 } else { 1.0 };
         feed
     }

@@ -8,6 +8,7 @@ use signals::math;
 use crate::arc_length::{ByArcLength, Parametric};
 use crate::drawing::Curve;
 use crate::jet::Jet;
+use crate::profile::Motion;
 
 /// Steps of the table for a whole turn of an ellipse, before it is refined.
 const STEPS_PER_TURN: f64 = 64.0;
@@ -189,6 +190,16 @@ impl Bend {
     /// That of one point.
     pub(crate) fn of(jet: &Jet) -> Self {
         Self { curvature: jet.second.norm(), third: jet.third.norm() }
+    }
+
+    /// Acceleration [m/s²] and jerk [m/s³] of a motion along the curve, from above, wherever on it
+    /// that is: the tips of a flat ellipse are too narrow to be found by looking.
+    pub(crate) fn demands(&self, along: &Motion) -> (f64, f64) {
+        let Motion { velocity, acceleration, jerk, .. } = *along;
+        let across = self.curvature * velocity * velocity;
+        let turning = 3.0 * self.curvature * (velocity * acceleration).abs();
+        let most = self.third * velocity * velocity * velocity + turning + jerk.abs();
+        (math::hypot(across, acceleration), most)
     }
 
     /// The larger of both.
