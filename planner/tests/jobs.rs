@@ -19,7 +19,7 @@ impl Folder {
         Self(path)
     }
 
-    fn write(&self, name: &str, text: &str) -> PathBuf {
+    fn write(&self, name: &str, text: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.join(name);
         std::fs::write(&path, text).unwrap();
         path
@@ -231,4 +231,42 @@ fn every_mutation_is_an_error_at_its_line_or_still_a_job() {
         }
     }
     assert!(refused > 150, "only {refused} mutations were refused");
+}
+
+#[test]
+fn a_program_with_latin_1_comments_is_read_with_the_right_columns() {
+    let machine = Machine::builtin();
+    let folder = Folder::new("latin-1");
+    let sound = folder.write(
+        "sound.ngc",
+        b"G21 (Gr\xf6\xdfe \xe9\xe9\x80) G90\nM3 S5 F600\nG1 X1 ; \xfcber\nM2\n",
+    );
+    let job = Job::read(&sound, &[], &machine).unwrap();
+    assert!(matches!(job.drawing.steps.as_slice(), [step] if step.line == 3));
+
+    let broken = folder.write("broken.ngc", b"G21\n(Gr\xf6\xdfe) G1 Y1 X\xb5\nM2\n");
+    let error = Job::read(&broken, &[], &machine).unwrap_err();
+    // X is the 15th character; in bytes of UTF-8 it would be the 17th.
+    assert_eq!(error.position(), Some((2, 15)), "{error}");
+}
+
+#[test]
+fn long_curves_in_the_dark_keep_the_limits_at_every_instant() {
+    let machine = Machine::builtin();
+    let folder = Folder::new("dark");
+    // Many turns, so that the ramps are a small part of the whole; and a wave of many tips.
+    for (index, program) in [
+        "G0 X3 Y0\nG2 I-3 P30 F15000\nM2\n",
+        "G0 X10 Y0\nG2 I-10 P20 F15000\nM2\n",
+        "G0 X0.05 Y0\nG3 I-0.05 P400 F15000\nM2\n",
+        "G18 G0 X0 Y0 Z0\nG2 X0 Z0 Y20 I5 K0 P3 F1000\nM2\n",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let path = folder.write(&format!("dark{index}.ngc"), program);
+        let facts = plan(&machine, &Job::read(&path, &[], &machine).unwrap()).unwrap().facts;
+        let used = facts.uses.path_jerk.max(facts.uses.path_acceleration);
+        assert!((0.7..=1.0 + 1e-9).contains(&used), "{program}: {used}");
+    }
 }

@@ -233,7 +233,7 @@ fn of_program(
         );
     }
     findings.finish(())?;
-    let text = super::read_text(path)?;
+    let text = super::read_program(path)?;
     let program = gcode::read(&path.display().to_string(), &text, machine)?;
     Ok(Job { program: Some(program.facts), ..job_of(program.drawing, marking) })
 }

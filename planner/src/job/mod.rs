@@ -170,3 +170,13 @@ fn read_text(path: &Path) -> Result<String, JobError> {
     std::fs::read_to_string(path)
         .map_err(|cause| JobError::Unreadable { path: path.to_owned(), cause })
 }
+
+/// The text of the program at `path`. Many editors of G-code write comments in Latin-1: what is not
+/// UTF-8 is taken for that, in which every byte is the character with its number, so that columns
+/// stay right.
+fn read_program(path: &Path) -> Result<String, JobError> {
+    let bytes = std::fs::read(path)
+        .map_err(|cause| JobError::Unreadable { path: path.to_owned(), cause })?;
+    Ok(String::from_utf8(bytes)
+        .unwrap_or_else(|error| error.as_bytes().iter().copied().map(char::from).collect()))
+}
