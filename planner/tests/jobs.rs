@@ -200,7 +200,7 @@ fn every_mutation_is_an_error_at_its_line_or_still_a_job() {
             for mutation in mutations {
                 let mut mutated = lines.clone();
                 mutated[index] = &mutation;
-                let path = folder.write(&format!("{name}.toml"), &mutated.join("\n"));
+                let path = folder.write(&format!("{name}.toml"), mutated.join("\n"));
                 let case = format!("{name}.toml, line {}: `{mutation}`", index + 1);
                 match Job::read(&path, &[], &machine) {
                     Ok(job) => {
