@@ -65,18 +65,18 @@ pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     let text = |key: &str| status[key].as_str().unwrap_or("none").to_owned();
-    eprintln!("state     {}", text("state"));
-    eprintln!("job       {}", text("job"));
-    eprintln!("planner   {}", text("planner"));
-    eprintln!("played    {} of {} setpoints", status["played"], status["samples"]);
-    eprintln!("stroke    {}", status["stroke"]);
-    eprintln!("rate      {:.0} %", status["rate"].as_f64().unwrap_or(0.0) * 100.0);
-    eprintln!("fault     {}", text("fault"));
-    eprintln!("cycles    {}, {} overruns", status["cycles"], status["overruns"]);
+    eprintln!("state      {}", text("state"));
+    eprintln!("job        {}", text("job"));
+    eprintln!("planner    {}", text("planner"));
+    eprintln!("played     {} of {} setpoints", status["played"], status["samples"]);
+    eprintln!("stroke     {}", status["stroke"]);
+    eprintln!("rate       {:.0} %", status["rate"].as_f64().unwrap_or(0.0) * 100.0);
+    eprintln!("fault      {}", text("fault"));
+    eprintln!("cycles     {}, {} overruns", status["cycles"], status["overruns"]);
     for (name, pid) in status["services"].as_object().into_iter().flatten() {
         match pid.as_i64() {
-            Some(pid) => eprintln!("{name:<10}pid {pid}"),
-            None => eprintln!("{name:<10}not running"),
+            Some(pid) => eprintln!("{name:<10} pid {pid}"),
+            None => eprintln!("{name:<10} not running"),
         }
     }
     Ok(Exit::Done)
@@ -87,6 +87,8 @@ pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
 /// # Errors
 /// No pipeline, or a job that is refused.
 pub fn submit(arguments: &SubmitArguments) -> Result<Exit, Failure> {
+    let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
+    let mut client = OperatorClient::connect(&instance).map_err(Failure::service)?;
     let whole = |path: &std::path::Path| absolute(path).unwrap_or_else(|_| path.to_owned());
     let out = match &arguments.out {
         Some(path) => whole(path),
@@ -99,9 +101,7 @@ pub fn submit(arguments: &SubmitArguments) -> Result<Exit, Failure> {
     };
     let job = JobRequest { job: Some(whole(&arguments.job)), set: arguments.set.clone() };
     let request = Request::Submit { job, out: Some(out) };
-    let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
-    let mut client = OperatorClient::connect(&instance).map_err(Failure::service)?;
-    let line = ProgressLine::new();
+    let line = ProgressLine::on_terminal();
     let request = serde_json::to_value(&request).map_err(Failure::service)?;
     let reply = client
         .follow(&request, |part| {
@@ -121,6 +121,9 @@ fn send(request: &Request, arguments: &InstanceArguments) -> Result<Value, Failu
 }
 
 fn checked(reply: Value) -> Result<Value, Failure> {
+    if reply.is_null() {
+        return Err(Failure::service("the pipeline ended before it answered"));
+    }
     match reply["error"].as_str() {
         Some(error) if reply.get("outcome").is_none() => Err(Failure::service(error)),
         _ => Ok(reply),

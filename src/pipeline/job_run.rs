@@ -2,7 +2,7 @@
 
 use super::operators::{News, Submission};
 use super::services::{Ended, Remedy};
-use super::{LOOK, Pipeline};
+use super::{LOOK, Pipeline, Starter};
 use crate::exit::{Failure, error_summary};
 use crate::output::ProgressLine;
 use monitor::conclusion::{self, Ending, WATCH_FILE};
@@ -84,11 +84,14 @@ impl<'a> JobRun<'a> {
     /// # Errors
     /// A channel that fails, or a run folder that cannot be written.
     pub fn follow(mut self) -> Result<Summary, Failure> {
-        let line = ProgressLine::new();
+        let line = ProgressLine::on_terminal();
         loop {
             for ended in self.pipeline.look()? {
                 line.clear();
                 self.note_ended(&ended);
+            }
+            if let Some(message) = self.missing() {
+                self.end_with(message.into());
             }
             self.heed_termination()?;
             if self.advance()? {
@@ -200,6 +203,23 @@ impl<'a> JobRun<'a> {
         }
     }
 
+    /// What ails a job whose services somebody else starts, when one that it cannot end without is
+    /// gone. Of the others' deaths the controller tells.
+    fn missing(&self) -> Option<&'static str> {
+        if self.pipeline.starter() == Starter::Own {
+            return None;
+        }
+        match self.stage {
+            Stage::Planning if !self.pipeline.has(Role::Planner) => {
+                Some("the planner is not running: start it and submit again")
+            }
+            Stage::Ready(_) | Stage::Playing if !self.pipeline.has(Role::Controller) => {
+                Some("the controller has ended: laser off, drives stops the axes")
+            }
+            _ => None,
+        }
+    }
+
     fn end_with(&mut self, message: String) {
         if self.ending.error.is_none() {
             self.ending.error =
@@ -214,7 +234,7 @@ impl<'a> JobRun<'a> {
     fn refuse(&mut self) -> Result<(), Failure> {
         let text = std::fs::read(self.folder.file(REFUSAL_FILE)).map_err(Failure::service)?;
         let refusal: Refusal = serde_json::from_slice(&text).map_err(Failure::service)?;
-        eprintln!("graver: {}", refusal.text.trim_end());
+        eprintln!("graver: {}", refusal.text.trim());
         self.ending.outcome = Some(Outcome::Refused);
         self.ending.error = Some(error_summary(&refusal));
         Ok(())

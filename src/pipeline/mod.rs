@@ -76,6 +76,7 @@ pub struct Pipeline {
     offers: Publisher<JobOffer>,
     ears: Ears,
     services: Services,
+    starter: Starter,
     streams: u64,
     domain: Domain,
 }
@@ -101,7 +102,7 @@ impl Pipeline {
         let offers = domain.publisher().map_err(Failure::service)?;
         let link = Arc::new(OperatorLink::start(&domain).map_err(Failure::service)?);
         let board = Arc::new(Board::default());
-        let operators = Operators::bind(&domain, link.clone(), board.clone())?;
+        let operators = Operators::bind(&domain, link.clone(), board.clone(), starter)?;
         let services = match starter {
             Starter::Own => Services::start(&domain)?,
             Starter::Others => Services::of_others(),
@@ -115,6 +116,7 @@ impl Pipeline {
             offers,
             ears,
             services,
+            starter,
             streams: 0,
             domain,
         };
@@ -182,6 +184,11 @@ impl Pipeline {
     /// A job that an operator submitted and nobody has taken yet.
     pub fn submission(&self) -> Option<Submission> {
         self.operators.submission()
+    }
+
+    /// Who starts the services.
+    pub fn starter(&self) -> Starter {
+        self.starter
     }
 
     /// Whether a process with this role lives in the domain.

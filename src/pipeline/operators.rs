@@ -3,6 +3,7 @@
 //! Verbs go straight to the controller; a submitted job waits in a queue for the supervisor's
 //! loop, and its progress goes back to whoever submitted it.
 
+use super::Starter;
 use super::status::Board;
 use crate::exit::Failure;
 use crossbeam::channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
@@ -106,12 +107,17 @@ impl Operators {
         domain: &Domain,
         link: Arc<OperatorLink>,
         board: Arc<Board>,
+        starter: Starter,
     ) -> Result<Self, Failure> {
         let (queue, submissions) = bounded(8);
         let server =
             OperatorServer::bind(
                 domain,
                 move |request, conversation| match serde_json::from_value(request) {
+                    Ok(Request::Submit { .. }) if starter == Starter::Own => json!({
+                        "error": "this pipeline belongs to a `graver run` and takes no other job; \
+                                  submit to a `graver domain`"
+                    }),
                     Ok(request) => answer(request, &link, &board, &queue, conversation),
                     Err(error) => json!({ "error": format!("not a request: {error}") }),
                 },
