@@ -4,6 +4,49 @@ use crate::exit::EXIT_CODES;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
+const RUN_EXAMPLES: &str = "\
+Examples:
+  graver run                                        the letters NASO, 20 mm, on a CoreXY
+  graver run jobs/square_arcs.ngc --machine machines/cartesian.toml
+  graver run --set letters.text=S --set letters.height=\"10 mm\" --out runs/s
+  graver run --set plant.axis.a.friction.coulomb=\"7 mN m\"   a plant that differs from the plan
+  graver run --json > summary.json                  for scripts
+
+While it runs, from another terminal: graver hold, resume, override, stop, status.";
+
+const SIMULATE_EXAMPLES: &str = "\
+Examples:
+  graver simulate                                   what `graver run` would mark
+  graver simulate jobs/square_arcs.ngc --out runs/a with recording, picture and report
+  graver simulate --set machine.path.jerk=\"1000 m/s^3\" --json";
+
+const PLAN_EXAMPLES: &str = "\
+Examples:
+  graver plan jobs/square_arcs.ngc                  time, length, limits, notes
+  graver plan --samples setpoints.csv               every setpoint, one row a millisecond
+  graver plan --ideal --set letters.style=h2        against the limits of the path only";
+
+const CHECK_EXAMPLES: &str = "\
+Examples:
+  graver check --machine machines/cartesian.toml    the machine file alone
+  graver check jobs/square_arcs.ngc                 and whether the machine can do the job";
+
+const KINEMATICS_EXAMPLES: &str = "\
+Examples, one object a line in and out, SI units and radians:
+  forward    {\"q\": [0.2, 0]}
+  inverse    {\"pose\": {\"position\": [0.1, 0.1]}}
+  jacobian   {\"q\": [0.2, 0]}
+  dynamics   {\"q\": [0.2, 0], \"qd\": [0, 0], \"qdd\": [10, 10]}
+  ellipse    {\"q\": [0.2, 0]}
+
+A line that asks for what cannot be gets {\"error\": {\"code\", \"detail\", ..}}, and the next one
+its answer; a line that is not such an object ends the command with exit code 2.";
+
+const SERVICES: &str = "\
+The services are graver drives, controller, planner and monitor with the same --instance;
+machine and drives are the domain's. deploy/ has systemd units. SIGTERM or Ctrl-C ends it with
+the machine at rest.";
+
 /// Real-time motion controller for laser marking and engraving machines.
 #[derive(Debug, Parser)]
 #[command(name = "graver", version, after_help = EXIT_CODES, propagate_version = true)]
@@ -17,45 +60,52 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run a job in real time: planner, controller, drives and monitor as processes.
+    #[command(after_help = RUN_EXAMPLES)]
     Run(RunArguments),
     /// Run the same stages in one process in virtual time, bit for bit repeatable.
+    #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(SimulateArguments),
-    /// Plan a job without running it.
+    /// Plan and check a job without running it.
+    #[command(after_help = PLAN_EXAMPLES)]
     Plan(PlanArguments),
-    /// Say whether a machine file and a job are sound.
+    /// Say whether a machine file is sound, and whether the machine can do a job.
+    #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArguments),
     /// Kinematics and dynamics: JSON lines in, JSON lines out.
+    #[command(after_help = KINEMATICS_EXAMPLES)]
     Kinematics(KinematicsArguments),
-    /// Measure this PC.
+    /// Measure this PC: latencies, planning speed, simulation speed.
     #[command(subcommand)]
     Bench(BenchCommand),
-    /// Hand a job to a running pipeline and follow it.
+    /// Hand a job to a pipeline that `graver domain` holds, and follow it to its end.
     Submit(SubmitArguments),
-    /// Feed hold: laser off, to rest along the path.
+    /// Feed hold: laser off at once, then to rest along the path.
     Hold(InstanceArguments),
     /// Go on from a hold without losing or doubling a mark.
     Resume(InstanceArguments),
     /// Play the job at another rate.
     Override(OverrideArguments),
-    /// Give the job up: laser off, to rest along the path.
+    /// Give the job up: laser off at once, then to rest along the path.
     Stop(InstanceArguments),
-    /// Clear a latched fault.
+    /// Clear a latched fault; the motors stay unpowered until `enable`.
     Reset(InstanceArguments),
-    /// Power the motors.
+    /// Power the motors; `run` and `submit` do so themselves.
     Enable(InstanceArguments),
-    /// Unpower the motors.
+    /// Unpower the motors, which must be at rest.
     Disable(InstanceArguments),
-    /// Say what a running pipeline is doing.
+    /// Say what a running pipeline is doing, with the process ids of its services.
     Status(InstanceArguments),
-    /// Create and hold an instance's channels; the four services run below it.
+    /// Create and hold an instance's channels, for services that somebody else starts, and run
+    /// the jobs that are submitted.
+    #[command(after_help = SERVICES)]
     Domain(DomainArguments),
-    /// The planner service.
+    /// The planner service: reads, plans and checks a job, and streams its setpoints.
     Planner(ServiceArguments),
-    /// The controller service.
+    /// The controller service: plays the setpoints and closes the loops, 1 kHz.
     Controller(ServiceArguments),
-    /// The drives service.
+    /// The drives service: the clock, the port to the motors, and the watchdog, 1 kHz.
     Drives(ServiceArguments),
-    /// The monitor service.
+    /// The monitor service: records and measures; nobody waits for it.
     Monitor(ServiceArguments),
     /// Hold a summary to what must be true of every one; for scripts.
     #[command(hide = true)]
@@ -78,11 +128,12 @@ pub enum Command {
 /// The machine and the changes to it.
 #[derive(Debug, Clone, Args)]
 pub struct MachineArguments {
-    /// Machine file; without it a built-in CoreXY.
+    /// Machine file (.toml); without it a built-in CoreXY.
     #[arg(long, value_name = "FILE")]
     pub machine: Option<PathBuf>,
-    /// Change a value: `letters.text=S`, `machine.path.jerk="5000 m/s^3"`, or `plant.…` for the
-    /// simulated plant alone. Can be repeated.
+    /// Change a value: of the job (letters.text=S), of the machine (machine.path.jerk="5000
+    /// m/s^3"), or of the simulated plant alone (plant.axis.a.motor.dc.resistance="2.8 ohm").
+    /// Can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }
@@ -90,7 +141,7 @@ pub struct MachineArguments {
 /// Which running pipeline is meant.
 #[derive(Debug, Clone, Args)]
 pub struct InstanceArguments {
-    /// Name of the pipeline.
+    /// Name of the pipeline: 1 to 32 of a-z, 0-9, '_' and '-'.
     #[arg(long, value_name = "NAME", default_value = "default")]
     pub instance: String,
     /// Print one JSON object on stdout.
@@ -111,10 +162,11 @@ pub struct DrivesArguments {
     /// What to drive.
     #[arg(long, value_enum, default_value = "sim")]
     pub drives: DrivesKind,
-    /// Let no deadline slip, as on hardware: a late command closes the gate.
+    /// Let no deadline slip, as on hardware: a command later than 0.3 ms closes the gate for that
+    /// cycle. Without it the simulated plant waits for up to 100 ms.
     #[arg(long)]
     pub strict: bool,
-    /// CPU for controller and drives; without it the last one.
+    /// CPU for controller and drives; without it the last one if SCHED_FIFO is allowed, else any.
     #[arg(long, value_name = "CPU")]
     pub core: Option<usize>,
     /// Ask for no real-time scheduling, even where it is allowed.
@@ -152,7 +204,7 @@ pub struct SimulateArguments {
     /// Run folder; without it nothing is written.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Seed of the simulation's random numbers; the nominal plant draws none.
+    /// Where the encoders' counts lie: 0 puts the start on a count, other seeds between two.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Print one JSON object on stdout.
@@ -182,7 +234,7 @@ pub struct PlanArguments {
 /// Arguments of `check`.
 #[derive(Debug, Clone, Args)]
 pub struct CheckArguments {
-    /// Job to check on the machine.
+    /// Job to check on the machine; without it the machine file alone.
     pub job: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -236,9 +288,9 @@ pub enum BenchCommand {
 #[derive(Debug, Clone, Args)]
 pub struct LatencyArguments {
     /// How long to measure [s].
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     pub seconds: f64,
-    /// Print each period of the drives' clock [ns], one a line, and nothing else.
+    /// Print each period of the drives' clock [ns], one a line, and nothing else on stdout.
     #[arg(long)]
     pub periods: bool,
     #[command(flatten)]
@@ -261,7 +313,7 @@ pub struct BenchArguments {
     #[allow(missing_docs)]
     pub machine: MachineArguments,
     /// How long to measure [s].
-    #[arg(long, value_name = "SECONDS", default_value_t = 3.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 3.0, value_parser = seconds)]
     pub seconds: f64,
     /// Print one JSON object on stdout.
     #[arg(long)]
@@ -287,7 +339,7 @@ pub struct SubmitArguments {
 /// Arguments of `override`.
 #[derive(Debug, Clone, Args)]
 pub struct OverrideArguments {
-    /// Rate: `50 %` or `0.5`, between 10 % and 200 %; limits cap it.
+    /// Rate: "50 %" or 0.5, from 10 % to 200 %; no limit of the machine is broken for it.
     pub rate: String,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -314,4 +366,16 @@ pub struct ServiceArguments {
     /// Name of the pipeline.
     #[arg(long, value_name = "NAME", default_value = "default")]
     pub instance: String,
+}
+
+/// Reads a length of time [s] that can be waited for.
+fn seconds(text: &str) -> Result<f64, String> {
+    /// A week.
+    const LONGEST: f64 = 604_800.0;
+    let value: f64 = text.parse().map_err(|_| "a number of seconds is due".to_owned())?;
+    if value > 0.0 && value <= LONGEST {
+        Ok(value)
+    } else {
+        Err(format!("{value} s is not above 0 and at most {LONGEST} s"))
+    }
 }

@@ -37,7 +37,7 @@ pub fn summary(summary: &Summary, as_json: bool) -> Result<Exit, Failure> {
 
 /// Prints a failure. With `as_json` the object is a summary too, so that scripts read one kind.
 pub fn failure(failure: &Failure, as_json: bool) {
-    eprintln!("graver: {}", failure.refusal.text.trim_end());
+    eprintln!("graver: {}", failure.refusal.text.trim());
     if as_json {
         let mut summary =
             Summary::new(failure.outcome(), JobSummary::default(), MachineSummary::default());
@@ -55,7 +55,7 @@ pub struct ProgressLine {
 
 impl ProgressLine {
     /// A line that is drawn if standard error is a terminal.
-    pub fn new() -> Self {
+    pub fn on_terminal() -> Self {
         Self { shown: std::io::stderr().is_terminal() }
     }
 

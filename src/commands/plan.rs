@@ -54,7 +54,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         machine: input.machine.name.clone(),
         time: plan.facts.duration,
         plan_time,
-        program: job.program.clone(),
+        program: job.program,
         facts: plan.facts,
     };
     if arguments.json {
@@ -71,7 +71,7 @@ fn print_text(report: &PlanReport) {
     eprintln!("machine   {}", report.machine);
     eprintln!("strokes   {}, {:.3} mm", facts.strokes, facts.length * 1e3);
     eprintln!("time      {:.4} s", report.time);
-    eprintln!("speed     {:.4} m/s while the laser is on", facts.speed);
+    eprintln!("speed     {:.4} m/s at most while the laser is on", facts.speed);
     eprintln!(
         "limits    path acceleration {:.1} %, path jerk {:.1} %",
         facts.uses.path_acceleration * 100.0,

@@ -70,7 +70,7 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
                 JobRun::offer(&mut pipeline, &job, folder, started, Some(submission))?.follow()
             });
             if let Err(failure) = ran {
-                eprintln!("graver: {}", failure.refusal.text.trim_end());
+                eprintln!("graver: {}", failure.refusal.text.trim());
                 let _ = news.send(News::End(json!({ "error": failure.refusal.message })));
             }
         }

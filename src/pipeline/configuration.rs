@@ -7,7 +7,7 @@ use crate::inputs::Overrides;
 use drives::Deadlines;
 use machine::Machine;
 use runtime::Instance;
-use runtime::thread::{Placement, RealtimeOptions};
+use runtime::thread::{Placement, RealtimeOptions, last_core};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -50,8 +50,16 @@ impl Configuration {
     /// The configuration that the command line asks for.
     ///
     /// # Errors
-    /// A machine file that cannot be read.
+    /// A machine file that cannot be read, or a CPU that is not there.
     pub fn new(machine: &MachineArguments, drives: &DrivesArguments) -> Result<Self, Failure> {
+        if let Some(core) = drives.core
+            && core > last_core()
+        {
+            return Err(Failure::bad_input(format!(
+                "--core {core}: the CPUs that this process may use end at {}",
+                last_core()
+            )));
+        }
         let machine_text = match &machine.machine {
             None => None,
             Some(path) => {
