@@ -16,7 +16,7 @@ use operators::{Operators, Submission};
 use runtime::domain::Role;
 use runtime::operator::OperatorLink;
 use runtime::{Domain, Instance, Publisher, Reading, Subscriber};
-use services::{Ended, Services};
+use services::{Ended, Remedy, Services};
 use signals::{
     ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorVerb, PlannerReport,
     Progress,
@@ -121,7 +121,6 @@ impl Pipeline {
             domain,
         };
         if starter == Starter::Own {
-            pipeline.await_services()?;
             pipeline.enable()?;
         }
         Ok(pipeline)
@@ -196,15 +195,15 @@ impl Pipeline {
         self.domain.peer(role).is_some()
     }
 
+    /// Waits until every service has spoken. A controller that powers the motors sooner meets
+    /// drives that know nobody yet, and they stop for good.
     fn await_services(&mut self) -> Result<(), Failure> {
         let started = Instant::now();
-        while !self.is_up() {
-            if let Some(ended) = self.look()?.first() {
-                return Err(Failure::service(format!("{ended} while starting")));
-            }
+        while let Some(role) = self.silent() {
+            self.look_while_starting()?;
             if started.elapsed() > START_PATIENCE {
                 return Err(Failure::service(format!(
-                    "the services did not come up within {} s",
+                    "the {role} did not come up within {} s",
                     START_PATIENCE.as_secs()
                 )));
             }
@@ -213,22 +212,45 @@ impl Pipeline {
         Ok(())
     }
 
-    fn is_up(&self) -> bool {
-        self.heard.progress.published.0 != 0
-            && self.heard.planner.published.0 != 0
-            && self.heard.drives.cycle.0 != 0
-            && self.has(Role::Monitor)
+    /// A service that is not there or has not spoken yet. A monitor that others start may stay
+    /// away: nobody waits for it.
+    fn silent(&self) -> Option<Role> {
+        let heard = &self.heard;
+        [
+            (Role::Planner, heard.planner.published.0 != 0),
+            (Role::Controller, heard.progress.published.0 != 0),
+            (Role::Drives, heard.drives.cycle.0 != 0),
+            (Role::Monitor, true),
+        ]
+        .into_iter()
+        .filter(|(role, _)| *role != Role::Monitor || self.starter == Starter::Own)
+        .find(|(role, spoke)| !spoke || !self.has(*role))
+        .map(|(role, _)| role)
     }
 
-    /// Powers the motors and waits until the controller is ready for a stream.
+    /// Looks, and gives up when a service has ended that the machine cannot do without.
+    fn look_while_starting(&mut self) -> Result<(), Failure> {
+        for ended in self.look()? {
+            match ended.remedy {
+                Remedy::Restarted => eprintln!("graver: {ended}"),
+                Remedy::Stop => return Err(Failure::service(format!("{ended} while starting"))),
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits for the services, powers the motors and waits until the controller is ready for a
+    /// stream.
     ///
     /// # Errors
-    /// A controller that does not become ready, with its state and fault.
+    /// A service that does not come up or ends, or a controller that does not become ready, with
+    /// its state and fault.
     pub fn enable(&mut self) -> Result<(), Failure> {
+        self.await_services()?;
         let started = Instant::now();
         let mut asked = self.ask(OperatorVerb::Enable, 0.0);
         loop {
-            self.look()?;
+            self.look_while_starting()?;
             let state = ControllerState::from_wire(self.heard.progress.state);
             if state == ControllerState::Idle {
                 return Ok(());
