@@ -179,7 +179,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         let sag = mechanism
             .stiffness()
             .and_then(|stiffness| stiffness.try_inverse())
-            .map_or_else(Joints::zeros, |compliance| compliance * mechanism.gravity(&load));
+            .map_or_else(Joints::zeros, |compliance| compliance * mechanism.gravity(&load, branch));
         let motors = Motors::of(&axes);
         let angle = (load + sag).component_div(&motors.ratio);
         let dynamics = Dynamics::new(mechanism, motors, &load)?;

@@ -72,8 +72,9 @@ fn energy(dynamics: &Dynamics<2, CoreXy>, state: &State<2>) -> f64 {
     let stretch = motors.ratio.component_mul(&state.angle) - state.load;
     let square = |v: &Vector2<f64>| v.component_mul(v);
     let rotors = motors.inertia.dot(&square(&state.speed));
-    let load =
-        state.load_speed.dot(&(dynamics.mechanism().mass_matrix(&state.load) * state.load_speed));
+    let load = state
+        .load_speed
+        .dot(&(dynamics.mechanism().mass_matrix(&state.load, ()) * state.load_speed));
     let belts = stretch.dot(&(dynamics.mechanism().stiffness().unwrap() * stretch));
     let windings = motors.windings.inductance.dot(&square(&state.current));
     0.5 * (rotors + load + belts + windings)

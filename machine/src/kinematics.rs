@@ -96,7 +96,10 @@ pub trait Mechanism<const N: usize>: Clone + Send + 'static {
     ) -> Result<Joints<N>, KinematicsError>;
 
     /// Tool velocity per joint rate.
-    fn jacobian(&self, q: &Joints<N>) -> Jacobian<N>;
+    ///
+    /// Here and in the dynamics `branch` says which of several poses `q` stands for, as in
+    /// [`Self::forward`]: the actuated joints alone do not tell how a closed chain is assembled.
+    fn jacobian(&self, q: &Joints<N>, branch: Self::Branch) -> Jacobian<N>;
 
     /// The joints' motion for a motion of the tool, up to jerk.
     ///
@@ -109,14 +112,16 @@ pub trait Mechanism<const N: usize>: Clone + Send + 'static {
         previous: &Joints<N>,
     ) -> Result<JointMotion<N>, KinematicsError>;
 
-    /// Inertia of the load in joint coordinates, rotors excluded.
-    fn mass_matrix(&self, q: &Joints<N>) -> SMatrix<f64, N, N>;
+    /// Inertia of the load in joint coordinates, symmetric and positive definite, rotors excluded
+    /// [kg or kg·m²].
+    fn mass_matrix(&self, q: &Joints<N>, branch: Self::Branch) -> SMatrix<f64, N, N>;
 
-    /// Coriolis, centrifugal and gravity efforts of the load.
-    fn bias(&self, q: &Joints<N>, velocity: &Joints<N>) -> Joints<N>;
+    /// Coriolis, centrifugal and gravity efforts of the load with the joints at `q` [m or rad],
+    /// moving at `velocity` [m/s or rad/s]; in [N or N·m].
+    fn bias(&self, q: &Joints<N>, velocity: &Joints<N>, branch: Self::Branch) -> Joints<N>;
 
-    /// The part of [`Self::bias`] that is there at rest.
-    fn gravity(&self, q: &Joints<N>) -> Joints<N>;
+    /// The part of [`Self::bias`] that is there at rest [N or N·m].
+    fn gravity(&self, q: &Joints<N>, branch: Self::Branch) -> Joints<N>;
 
     /// Stiffness of the transmission [N/m or N·m/rad], symmetric; `None` when it is rigid.
     fn stiffness(&self) -> Option<SMatrix<f64, N, N>>;
@@ -124,10 +129,10 @@ pub trait Mechanism<const N: usize>: Clone + Send + 'static {
     /// Damping of the transmission [N·s/m or N·m·s/rad], symmetric.
     fn damping(&self) -> SMatrix<f64, N, N>;
 
-    /// Efforts on the load side of the transmission for a motion of the joints.
-    fn inverse_dynamics(&self, motion: &JointMotion<N>) -> Joints<N> {
-        self.mass_matrix(&motion.position) * motion.acceleration
-            + self.bias(&motion.position, &motion.velocity)
+    /// Efforts on the load side of the transmission for a motion of the joints [N or N·m].
+    fn inverse_dynamics(&self, motion: &JointMotion<N>, branch: Self::Branch) -> Joints<N> {
+        self.mass_matrix(&motion.position, branch) * motion.acceleration
+            + self.bias(&motion.position, &motion.velocity, branch)
     }
 }
 

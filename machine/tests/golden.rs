@@ -73,12 +73,12 @@ impl Compare {
         check_pair("velocity", motor(&motion.velocity), pair(&pose["qd"]));
         check_pair("acceleration", motor(&motion.acceleration), pair(&pose["qdd"]));
 
-        let effort = mechanism.inverse_dynamics(&motion).component_mul(&ratio);
+        let effort = mechanism.inverse_dynamics(&motion, branch).component_mul(&ratio);
         check_pair("tau", Vector2::new(effort[0], effort[1]), pair(&pose["tau"]));
         let power = effort.dot(&motion.velocity.component_div(&ratio));
         check("power", power, pose["power"].as_f64().unwrap(), 1.0);
 
-        let j = plane(&mechanism.jacobian(&q), &self.ratio);
+        let j = plane(&mechanism.jacobian(&q, branch), &self.ratio);
         for row in 0..2 {
             let expected = pair(&pose["J"][row]);
             check_pair("J", Vector2::new(j[(row, 0)], j[(row, 1)]), expected);

@@ -101,7 +101,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         let motion = mechanism
             .joint_motion(&tool, M::Branch::default(), &Joints::zeros())
             .map_err(|cause| Unreachable { time: 0.0, cause })?;
-        let effort = mechanism.inverse_dynamics(&motion);
+        let effort = mechanism.inverse_dynamics(&motion, M::Branch::default());
         let lead = Lead::new(&mechanism, effort, STEP);
         let end = (trajectory.end() / CYCLE_TIME).ceil() as i64;
         Ok(Self {
@@ -142,11 +142,12 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     fn advance(&mut self) -> Result<Look<N>, KinematicsError> {
         self.look += 1;
         let tool = self.trajectory.at(self.look as f64 * STEP, &mut self.cursor);
-        let motion = self.mechanism.joint_motion(&tool, M::Branch::default(), &self.joints)?;
-        let effort = self.mechanism.inverse_dynamics(&motion);
+        let branch = M::Branch::default();
+        let motion = self.mechanism.joint_motion(&tool, branch, &self.joints)?;
+        let effort = self.mechanism.inverse_dynamics(&motion, branch);
         // Inertia changes slowly beside the jerk: its own rate is left out where only a spring
         // without damper asks for it.
-        let effort_rate = self.mechanism.mass_matrix(&motion.position) * motion.jerk;
+        let effort_rate = self.mechanism.mass_matrix(&motion.position, branch) * motion.jerk;
         self.lead.advance(&effort, &effort_rate);
         self.joints = motion.position;
         self.effort = effort;
@@ -174,8 +175,9 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         mean /= STEPS as f64;
         let acceleration = (self.motor_velocity - before) / CYCLE_TIME;
 
-        let gravity = self.mechanism.gravity(&motion.position);
-        let impulse = self.mechanism.mass_matrix(&motion.position) * motion.velocity;
+        let branch = M::Branch::default();
+        let gravity = self.mechanism.gravity(&motion.position, branch);
+        let impulse = self.mechanism.mass_matrix(&motion.position, branch) * motion.velocity;
         let per_axis = |value: &dyn Fn(usize, &Drive) -> f64| {
             let values: [f64; N] = std::array::from_fn(|axis| value(axis, &self.drives[axis]));
             axis_array(&values)

@@ -195,7 +195,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
 
     /// Tool velocity per joint rate, in the directions in which the tool moves.
     fn tool_jacobian(&self, q: &Joints<N>) -> SMatrix<f64, 6, N> {
-        let mut jacobian = self.mechanism.jacobian(q);
+        let mut jacobian = self.mechanism.jacobian(q, M::Branch::default());
         for (axis, ratio) in self.ratios().iter().enumerate() {
             jacobian.column_mut(axis).scale_mut(*ratio);
         }
@@ -220,7 +220,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         let velocity = self.joints("qd", request.qd.as_ref())?;
         let acceleration = self.joints("qdd", request.qdd.as_ref())?;
         let motion = JointMotion { position, velocity, acceleration, jerk: Joints::zeros() };
-        let mut effort = self.mechanism.inverse_dynamics(&motion);
+        let mut effort = self.mechanism.inverse_dynamics(&motion, M::Branch::default());
         if let Some(wrench) = &request.wrench {
             if wrench.len() > 6 {
                 return Err(bad(format!("\"wrench\" has {} values, at most 6", wrench.len())));
@@ -228,7 +228,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
             // The tool pushes on the work with this wrench: virtual work gives Jᵀ·w at the joints.
             let wrench =
                 nalgebra::Vector6::from_fn(|row, _| wrench.get(row).copied().unwrap_or(0.0));
-            effort += self.mechanism.jacobian(&position).transpose() * wrench;
+            effort += self.mechanism.jacobian(&position, M::Branch::default()).transpose() * wrench;
         }
         let ratios = self.ratios();
         let mut shown = effort.component_mul(&ratios);

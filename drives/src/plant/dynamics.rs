@@ -134,7 +134,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             Some(stiffness) => Transmission::Elastic { stiffness, damping: mechanism.damping() },
             None => Transmission::Rigid,
         };
-        let mut matrix = mechanism.mass_matrix(home);
+        let mut matrix = mechanism.mass_matrix(home, M::Branch::default());
         if transmission == Transmission::Rigid {
             matrix += rotors(&motors);
         }
@@ -201,7 +201,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             }
             Transmission::Rigid => {
                 let (_, load) = self.accelerations(state, contacts);
-                let bias = self.mechanism.bias(&state.load, &state.load_speed);
+                let bias = self.bias(state);
                 // A held motor bears what the others' acceleration puts on its joint.
                 let load_side = self.inertia.matrix * load + bias;
                 shaft - motors.ratio.component_mul(&load_side)
@@ -222,6 +222,12 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         }
     }
 
+    /// Coriolis, centrifugal and gravity efforts of the load [N or N·m].
+    #[inline(always)]
+    fn bias(&self, state: &State<N>) -> Joints<N> {
+        self.mechanism.bias(&state.load, &state.load_speed, M::Branch::default())
+    }
+
     /// Accelerations of motors [rad/s²] and load [m/s² or rad/s²].
     #[inline(always)] // Four calls a step through memory cost as much as the arithmetic.
     fn accelerations(
@@ -233,7 +239,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         let torque = motors.windings.torque_constant.component_mul(&state.current)
             - motors.viscous.component_mul(&state.speed)
             - contacts.torque();
-        let bias = self.mechanism.bias(&state.load, &state.load_speed);
+        let bias = self.bias(state);
         match self.transmission {
             Transmission::Elastic { .. } => {
                 let effort = self.transmitted(state);
@@ -275,7 +281,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// Follows a mass matrix that depends on the position. One that cannot be inverted, at a
     /// singular position, leaves the last good one in force.
     fn refresh(&mut self, load: &Joints<N>) -> Constancy {
-        let mut matrix = self.mechanism.mass_matrix(load);
+        let mut matrix = self.mechanism.mass_matrix(load, M::Branch::default());
         if self.transmission == Transmission::Rigid {
             matrix += rotors(&self.motors);
         }

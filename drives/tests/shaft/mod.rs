@@ -33,7 +33,7 @@ impl Mechanism<1> for Shaft {
         Ok(Vector1::new(pose.position.x))
     }
 
-    fn jacobian(&self, _q: &Joints<1>) -> Jacobian<1> {
+    fn jacobian(&self, _q: &Joints<1>, _branch: ()) -> Jacobian<1> {
         Jacobian::<1>::from_column_slice(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     }
 
@@ -51,16 +51,16 @@ impl Mechanism<1> for Shaft {
         })
     }
 
-    fn mass_matrix(&self, q: &Joints<1>) -> SMatrix<f64, 1, 1> {
+    fn mass_matrix(&self, q: &Joints<1>, _branch: ()) -> SMatrix<f64, 1, 1> {
         SMatrix::from_element(self.spread * (1.0 + q[0] * q[0]))
     }
 
-    fn bias(&self, q: &Joints<1>, velocity: &Joints<1>) -> Joints<1> {
+    fn bias(&self, q: &Joints<1>, velocity: &Joints<1>, _branch: ()) -> Joints<1> {
         // Lagrange: ½·dM/dq·q̇².
         Vector1::new(self.load + self.spread * q[0] * velocity[0] * velocity[0])
     }
 
-    fn gravity(&self, _q: &Joints<1>) -> Joints<1> {
+    fn gravity(&self, _q: &Joints<1>, _branch: ()) -> Joints<1> {
         Vector1::new(self.load)
     }
 

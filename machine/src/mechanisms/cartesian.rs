@@ -53,7 +53,7 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
         Ok(Self::joints(&pose.position))
     }
 
-    fn jacobian(&self, _q: &Joints<N>) -> Jacobian<N> {
+    fn jacobian(&self, _q: &Joints<N>, _branch: ()) -> Jacobian<N> {
         Jacobian::from_fn(|row, column| if row == column { 1.0 } else { 0.0 })
     }
 
@@ -72,15 +72,15 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
         })
     }
 
-    fn mass_matrix(&self, _q: &Joints<N>) -> SMatrix<f64, N, N> {
+    fn mass_matrix(&self, _q: &Joints<N>, _branch: ()) -> SMatrix<f64, N, N> {
         SMatrix::from_diagonal(&SVector::from(self.mass))
     }
 
-    fn bias(&self, q: &Joints<N>, _velocity: &Joints<N>) -> Joints<N> {
-        self.gravity(q)
+    fn bias(&self, q: &Joints<N>, _velocity: &Joints<N>, _branch: ()) -> Joints<N> {
+        self.gravity(q, ())
     }
 
-    fn gravity(&self, _q: &Joints<N>) -> Joints<N> {
+    fn gravity(&self, _q: &Joints<N>, _branch: ()) -> Joints<N> {
         SVector::from_fn(|row, _| if row == 2 { self.mass[row] * STANDARD_GRAVITY } else { 0.0 })
     }
 

@@ -54,7 +54,7 @@ impl Mechanism<2> for CoreXy {
         Ok(belts(&pose.position))
     }
 
-    fn jacobian(&self, _q: &Joints<2>) -> Jacobian<2> {
+    fn jacobian(&self, _q: &Joints<2>, _branch: ()) -> Jacobian<2> {
         let mut jacobian = Jacobian::zeros();
         jacobian[(0, 0)] = 0.5;
         jacobian[(0, 1)] = 0.5;
@@ -78,16 +78,16 @@ impl Mechanism<2> for CoreXy {
         })
     }
 
-    fn mass_matrix(&self, _q: &Joints<2>) -> Matrix2<f64> {
+    fn mass_matrix(&self, _q: &Joints<2>, _branch: ()) -> Matrix2<f64> {
         // Source 003 eq. 4.6 and 4.7: τ = Jᵀ·M·a.
         seen_from_belts(self.mass)
     }
 
-    fn bias(&self, q: &Joints<2>, _velocity: &Joints<2>) -> Joints<2> {
-        self.gravity(q)
+    fn bias(&self, q: &Joints<2>, _velocity: &Joints<2>, _branch: ()) -> Joints<2> {
+        self.gravity(q, ())
     }
 
-    fn gravity(&self, _q: &Joints<2>) -> Joints<2> {
+    fn gravity(&self, _q: &Joints<2>, _branch: ()) -> Joints<2> {
         Joints::zeros()
     }
 
