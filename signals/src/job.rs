@@ -89,3 +89,37 @@ sample! {
         reserved: u32,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{JobOffer, MAX_PATH, PlannerPhase};
+
+    #[test]
+    fn an_offer_carries_its_folder() {
+        for folder in ["", "/tmp/run", "/tmp/Grüße aus Köln", &"x".repeat(MAX_PATH)] {
+            let offer = JobOffer::new(7, folder);
+            assert_eq!(offer.as_ref().and_then(JobOffer::folder), Some(folder));
+            assert_eq!(offer.map(|offer| offer.stream), Some(7));
+        }
+        assert_eq!(JobOffer::new(7, &"x".repeat(MAX_PATH + 1)), None);
+        assert_eq!(JobOffer::default().folder(), Some(""), "no folder withdraws the stream");
+    }
+
+    #[test]
+    fn bytes_that_are_no_path_are_none() {
+        let mut offer = JobOffer { folder_length: MAX_PATH as u64 + 1, ..JobOffer::default() };
+        assert_eq!(offer.folder(), None);
+        offer.folder_length = u64::MAX;
+        assert_eq!(offer.folder(), None);
+        (offer.folder_length, offer.folder[0]) = (1, 0xFF);
+        assert_eq!(offer.folder(), None);
+    }
+
+    #[test]
+    fn phases_keep_their_numbers() {
+        for number in 0..=4 {
+            assert_eq!(PlannerPhase::from_wire(number) as u32, number);
+        }
+        assert_eq!(PlannerPhase::from_wire(99), PlannerPhase::Idle);
+    }
+}

@@ -1,21 +1,20 @@
 //! The laser's part of a cycle: gate, power, and when inside the cycle they change.
 
 use crate::sample;
-use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// The most gate edges one cycle can hold; the planner refuses a job that needs more.
 pub const MAX_EDGES: usize = 16;
 
-/// One change of the laser inside a cycle.
-#[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout)]
-#[repr(C)]
-pub struct GateEdge {
-    /// Time from the start of the cycle [ns], below the period.
-    pub offset: u32,
-    /// The gate from here on: 0 closed, otherwise open and marking the stroke with this number.
-    pub gate: u32,
-    /// Power from here on, as a fraction of full scale, 0..=1.
-    pub power: f64,
+sample! {
+    /// One change of the laser inside a cycle.
+    GateEdge = "graver.GateEdge.v1" {
+        /// Time from the start of the cycle [ns], below the period.
+        offset: u32,
+        /// The gate from here on: 0 closed, otherwise open and marking the stroke with this number.
+        gate: u32,
+        /// Power from here on, as a fraction of full scale, 0..=1.
+        power: f64,
+    }
 }
 
 sample! {
@@ -79,5 +78,68 @@ impl LaserCycle {
         self.edges[index] = edge;
         self.edge_count += 1;
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{GateEdge, LaserCycle, MAX_EDGES};
+
+    fn edge(offset: u32, gate: u32, power: f64) -> GateEdge {
+        GateEdge { offset, gate, power }
+    }
+
+    fn cycle(gate: u32, power: f64, edges: &[GateEdge]) -> LaserCycle {
+        let mut cycle = LaserCycle { gate, power, ..LaserCycle::OFF };
+        assert!(edges.iter().all(|edge| cycle.push(*edge)));
+        cycle
+    }
+
+    #[test]
+    fn a_cycle_in_order_is_valid() {
+        assert!(LaserCycle::OFF.is_valid());
+        assert!(cycle(3, 1.0, &[]).is_valid());
+        assert!(
+            cycle(0, 0.0, &[edge(0, 1, 0.5), edge(0, 0, 0.0), edge(999_999, 2, 1.0)]).is_valid()
+        );
+        assert!(cycle(0, 0.0, &[edge(7, 1, 0.5); MAX_EDGES]).is_valid());
+    }
+
+    #[test]
+    fn a_cycle_that_makes_no_sense_is_not() {
+        for power in [-0.1, 1.000_001, f64::NAN, f64::INFINITY] {
+            assert!(!cycle(1, power, &[]).is_valid(), "{power} at the start");
+            assert!(!cycle(0, 0.0, &[edge(0, 1, power)]).is_valid(), "{power} at an edge");
+        }
+        assert!(!cycle(0, 0.0, &[edge(1_000_000, 1, 0.5)]).is_valid(), "beyond the cycle");
+        assert!(!cycle(0, 0.0, &[edge(5, 1, 0.5), edge(4, 0, 0.0)]).is_valid(), "back in time");
+        let count = MAX_EDGES as u32 + 1;
+        for edge_count in [count, u32::MAX] {
+            assert!(!LaserCycle { edge_count, ..LaserCycle::OFF }.is_valid(), "{edge_count}");
+        }
+    }
+
+    #[test]
+    fn edges_that_do_not_count_are_not_looked_at() {
+        let mut cycle = cycle(0, 0.0, &[edge(3, 1, 0.5)]);
+        cycle.edges[1] = edge(u32::MAX, 9, f64::NAN);
+        assert!(cycle.is_valid());
+        assert_eq!(cycle.last(), (1, 0.5));
+    }
+
+    #[test]
+    fn light_anywhere_in_the_cycle_is_light() {
+        assert!(!LaserCycle::OFF.is_lit());
+        assert!(cycle(1, 0.5, &[edge(0, 0, 0.0)]).is_lit());
+        assert!(cycle(0, 0.0, &[edge(9, 1, 0.5), edge(10, 0, 0.0)]).is_lit());
+        assert_eq!(cycle(4, 0.25, &[]).last(), (4, 0.25));
+    }
+
+    #[test]
+    fn a_full_cycle_takes_no_more() {
+        let mut cycle = cycle(0, 0.0, &[edge(0, 1, 1.0); MAX_EDGES]);
+        let before = cycle;
+        assert!(!cycle.push(edge(1, 0, 0.0)));
+        assert_eq!(cycle, before);
     }
 }

@@ -15,3 +15,32 @@ pub const TURN: f64 = core::f64::consts::TAU;
 pub fn nearest_turn(angle: f64, reference: f64) -> f64 {
     angle + TURN * ((reference - angle) / TURN).round()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{TURN, nearest_turn};
+
+    #[test]
+    fn the_nearest_turn_is_within_half_a_turn_and_the_same_angle() {
+        let mut reference = -40.0;
+        while reference < 40.0 {
+            for angle in [-7.0, -3.2, -0.1, 0.0, 1.0, 3.1, 6.0, 100.0] {
+                let nearest = nearest_turn(angle, reference);
+                let off = (nearest - reference).abs();
+                assert!(off <= TURN / 2.0 + 1e-12, "{angle} near {reference}: {nearest}");
+                let turns = (nearest - angle) / TURN;
+                assert!(
+                    (turns - turns.round()).abs() < 1e-12,
+                    "{angle} near {reference}: {nearest}"
+                );
+            }
+            reference += 0.37;
+        }
+    }
+
+    #[test]
+    fn an_angle_near_its_reference_stays_to_the_bit() {
+        assert_eq!(nearest_turn(1.25, 0.75), 1.25);
+        assert!(nearest_turn(f64::NAN, 0.0).is_nan());
+    }
+}
