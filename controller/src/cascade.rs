@@ -34,11 +34,14 @@ impl ProportionalIntegral {
     }
 
     /// Integrates after the output was formed (forward Euler). The integral gets no more of the
-    /// output's range than the feedforward leaves to it.
+    /// output's range than the feedforward leaves to it, and keeps its value where there is no
+    /// number to add.
     fn integrate(&mut self, error: f64, feedforward: f64, cycle_time: f64) {
         let next = self.accumulated + self.integral * cycle_time * error;
         let given = feedforward.clamp(-self.limit, self.limit);
-        self.accumulated = next.clamp(-self.limit - given, self.limit - given);
+        if next.is_finite() && given.is_finite() {
+            self.accumulated = next.clamp(-self.limit - given, self.limit - given);
+        }
     }
 
     /// One cycle on its own: output, then integration.
@@ -228,6 +231,23 @@ mod tests {
             assert!(drive.voltage <= 12.0 && drive.current <= 5.2);
         }
         assert!(cascade.velocity.accumulated.abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_not_a_number_goes_out_and_stays_in_no_integral() {
+        let mut cascade = Cascade::new(&Machine::builtin().axes[0]);
+        for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX] {
+            for slot in 0..7 {
+                let at = |index: usize| if index == slot { number } else { 0.0 };
+                let reference =
+                    Reference { position: at(0), velocity: at(1), current: at(2), voltage: at(3) };
+                let measured = Measurement { position: at(4), velocity: at(5), current: at(6) };
+                let drive = cascade.step(&reference, &measured, true);
+                assert!(drive.voltage.is_nan() || drive.voltage.abs() <= 12.0, "{drive:?}");
+                let kept = [cascade.velocity.accumulated, cascade.current.accumulated];
+                assert!(kept.iter().all(|kept| kept.is_finite()), "{number} in slot {slot}");
+            }
+        }
     }
 
     #[test]
