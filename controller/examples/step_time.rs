@@ -7,6 +7,7 @@ use std::time::Instant;
 use controller::{Controller, Inputs, Outputs, Peers};
 use machine::Machine;
 use signals::feedback::status;
+use signals::time::CYCLE_TIME;
 use signals::{
     CommandMode, ControllerState, Cycle, Feedback, Nanoseconds, OperatorRequest, OperatorVerb,
     Setpoint, math,
@@ -23,14 +24,15 @@ const TURN: u64 = 500;
 fn main() {
     let machine = Machine::builtin();
     let home = [machine.home[0] + machine.home[1], machine.home[0] - machine.home[1]];
+    let pulsation = math::TURN / (TURN as f64 * CYCLE_TIME);
     let turn: Vec<Setpoint> = (0..TURN)
         .map(|sequence| {
             let angle = math::TURN * sequence as f64 / TURN as f64;
             let mut setpoint = Setpoint { stream: 1, sequence, ..Setpoint::default() };
             for (index, home) in home.iter().enumerate() {
                 setpoint.position[index] = home + 0.005 * (1.0 - math::cos(angle));
-                setpoint.velocity[index] = 0.05 * math::sin(angle);
-                setpoint.acceleration[index] = 0.5 * math::cos(angle);
+                setpoint.velocity[index] = 0.005 * pulsation * math::sin(angle);
+                setpoint.acceleration[index] = 0.005 * pulsation * pulsation * math::cos(angle);
                 setpoint.effort[index] = 0.001 * math::cos(angle);
             }
             setpoint.laser.gate = 1;

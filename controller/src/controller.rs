@@ -19,6 +19,11 @@
 //! | `Holding`, `Stopping` | voltage | along the stream to rest | off |
 //! | `Stopping` after a fault | voltage while the axes follow, else quick stop | the same | off |
 //!
+//! A hold that nobody asked for ends by itself, and the mark is taken up where it was left:
+//!
+//! - light was lost, because a command came too late and drives kept its cycle dark;
+//! - setpoints ran out, and a planner that lives has sent more.
+//!
 //! # Glossary
 //!
 //! - *Stream time*: the planner's time, in setpoints; see [`player`](crate::player).
@@ -27,91 +32,37 @@
 //!   effect, and the one at which it ends.
 //! - *Finding*: something wrong, not yet a fault. The first finding becomes the latched fault.
 
+mod answer;
+mod requests;
+mod transitions;
+
 use crate::alignment::Alignment;
-use crate::cascade::{Cascade, Measurement};
+use crate::cascade::Cascade;
 use crate::exchange::{Inputs, Outputs, Peers, Presence};
 use crate::feedforward::Feedforward;
 use crate::intake::Intake;
 use crate::player::{Event, Player};
+use crate::state::{AfterRest, State};
 use crate::statistics::Statistics;
-use crate::supervision::{Finding, Supervision, Tracking};
+use crate::stream_time::{ONE, StreamTime};
+use crate::supervision::{Elapsed, Finding, Supervision, Tracking};
+use answer::PROGRESS_INTERVAL;
 use machine::Machine;
 use signals::feedback::status;
 use signals::{
-    Command, CommandMode, ControllerState, Cycle, Fault, FaultCode, Feedback, LaserCycle, MAX_AXES,
-    Nanoseconds, OperatorReply, OperatorRequest, OperatorVerb, Progress, RealtimeFacts,
+    CommandMode, ControllerReport, Fault, FaultCode, Feedback, LaserCycle, MAX_AXES, Nanoseconds,
+    RealtimeFacts,
 };
-
-/// Cycles between two progress samples.
-const PROGRESS_INTERVAL: u64 = 5;
 
 /// Cycles between two reports.
 const REPORT_INTERVAL: u64 = 1000;
 
-/// Cycles of standing still before an axis counts as at rest without a plan, and of holding
-/// before it counts as enabled.
-const STANDING: u32 = 20;
+/// Times in a row that light may be lost at one place before the machine is stopped.
+const MOST_LOSSES: u32 = 3;
 
-/// Cycles that enabling, or a quick stop, may take.
-const PATIENCE: u32 = 1000;
-
-/// What the controller is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum State {
-    Disabled,
-    /// Waiting for the power, then holding for a moment.
-    Enabling {
-        waited: u32,
-        held: u32,
-    },
-    Idle,
-    Running,
-    Holding(AfterRest),
-    Stopping,
-    /// Coming to rest with a fault latched.
-    Failing {
-        tracking: Tracking,
-        waited: u32,
-    },
-    Faulted,
-}
-
-/// What follows once a hold has come to rest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum AfterRest {
-    Wait,
-    Resume,
-}
-
-impl State {
-    fn to_wire(self) -> ControllerState {
-        match self {
-            Self::Disabled => ControllerState::Disabled,
-            Self::Enabling { .. } => ControllerState::Enabling,
-            Self::Idle => ControllerState::Idle,
-            Self::Running => ControllerState::Running,
-            Self::Holding(_) => ControllerState::Holding,
-            Self::Stopping | Self::Failing { .. } => ControllerState::Stopping,
-            Self::Faulted => ControllerState::Faulted,
-        }
-    }
-
-    fn mode(self) -> CommandMode {
-        match self {
-            Self::Disabled | Self::Faulted => CommandMode::Disabled,
-            Self::Failing { tracking: Tracking::Lost, .. } => CommandMode::QuickStop,
-            _ => CommandMode::Voltage,
-        }
-    }
-
-    /// Whether the plan holds the axes, so that they must follow it.
-    fn follows(self) -> bool {
-        match self {
-            Self::Enabling { held, .. } => held > 0,
-            state => state.mode() == CommandMode::Voltage,
-        }
-    }
-}
+/// Light lost this soon after the place where it was lost before counts as lost at one place:
+/// about the length of a ramp [setpoints].
+const ONE_PLACE: StreamTime = StreamTime(128 * ONE);
 
 /// The controller of one machine. Everything is allocated in [`Controller::new`].
 #[derive(Debug)]
@@ -129,6 +80,11 @@ pub struct Controller {
     /// The stream being played, from its first setpoint until it is over; 0 for none.
     playing: u64,
     completed: bool,
+    /// The final report of a stream that ended in this step.
+    ended: Option<ControllerReport>,
+    /// Where light was lost last, and how often in a row about there.
+    lost_at: StreamTime,
+    losses: u32,
     cycles: u64,
     reset_ticket: u64,
 }
@@ -153,6 +109,9 @@ impl Controller {
             statistics: Statistics::new(machine),
             playing: 0,
             completed: false,
+            ended: None,
+            lost_at: StreamTime::default(),
+            losses: 0,
             cycles: 0,
             reset_ticket: 0,
             machine: machine.clone(),
@@ -180,17 +139,15 @@ impl Controller {
                 self.fail(finding.at(now));
             }
         }
-        let cycles = match self.check(feedback, inputs.peers) {
-            Ok(cycles) => cycles,
-            Err(finding) => {
-                self.fail(finding.at(now));
-                1
-            }
-        };
-        outputs.reply = inputs.request.map(|request| self.request(&request));
-        self.transition(now, feedback, outputs);
-        for _ in 0..cycles {
-            self.advance(now, feedback);
+        let elapsed = self.check(feedback, inputs.peers).unwrap_or_else(|finding| {
+            self.fail(finding.at(now));
+            Elapsed::ONE
+        });
+        self.make_up(elapsed, now);
+        outputs.reply = inputs.request.map(|request| self.request(&request, feedback.cycle));
+        self.transition(now, feedback);
+        for _ in 0..elapsed.cycles {
+            self.advance(feedback);
         }
         if self.state.follows()
             && let Err(finding) = self.supervision.motion(feedback, &self.feedforward.now().angle)
@@ -198,12 +155,21 @@ impl Controller {
             self.fail(finding.at(now));
         }
         self.command(now, inputs, &mut outputs.command);
+        let voltages = &outputs.command.voltage;
+        if let Some(index) = voltages.iter().position(|voltage| !voltage.is_finite()) {
+            let value = voltages[index];
+            let code = FaultCode::NotFinite;
+            self.fail(Finding::on(index, code, value, 0.0, Tracking::Lost).at(now));
+            self.command(now, inputs, &mut outputs.command);
+        }
         if self.playing != 0 {
             let now = self.feedforward.now();
             self.statistics.cycle(&outputs.command, feedback, now);
-            if outputs.report.is_none() && self.cycles.is_multiple_of(REPORT_INTERVAL) {
-                outputs.report = Some(self.statistics.report());
-            }
+        }
+        outputs.report = self.ended.take();
+        let due = self.playing != 0 && self.cycles.is_multiple_of(REPORT_INTERVAL);
+        if outputs.report.is_none() && due {
+            outputs.report = Some(self.statistics.report());
         }
         let changed = self.state.to_wire() != state_before;
         if changed || outputs.report.is_some() || self.cycles.is_multiple_of(PROGRESS_INTERVAL) {
@@ -211,12 +177,30 @@ impl Controller {
         }
     }
 
-    /// Looks at the feedback and the peers: how many cycles have gone by.
-    fn check(&mut self, feedback: &Feedback, peers: Peers) -> Result<u64, Finding> {
+    /// Drives has died, and no feedback will come any more: what is left to say. The axes are
+    /// beyond reach; the drives' own watchdog has stopped them.
+    pub fn abandon(&mut self, now: Nanoseconds, outputs: &mut Outputs) {
+        (outputs.progress, outputs.report, outputs.reply) = (None, None, None);
+        if self.state.mode() == CommandMode::Disabled {
+            return;
+        }
+        self.fail(Finding::new(FaultCode::DrivesLost, 0.0, 0.0, Tracking::Lost).at(now));
+        self.end_in_fault(outputs.command.cycle);
+        outputs.report = self.ended.take();
+        outputs.command.laser = LaserCycle::OFF;
+        outputs.command.stroke = 0;
+        outputs.command.mode = self.state.mode() as u32;
+        outputs.command.state = self.state.to_wire() as u32;
+        outputs.command.fault = self.fault;
+        outputs.progress = Some(self.progress(now, &outputs.command));
+    }
+
+    /// Looks at the feedback and the peers: what went by.
+    fn check(&mut self, feedback: &Feedback, peers: Peers) -> Result<Elapsed, Finding> {
         let seen = self.supervision.feedback(feedback);
         if self.state.mode() == CommandMode::Disabled {
             // Unpowered, nothing that drives says is a fault; enabling looks again.
-            return Ok(seen.unwrap_or(1));
+            return Ok(seen.unwrap_or(Elapsed::ONE));
         }
         let lost = |peer: Presence, code: FaultCode, tracking: Tracking| match peer {
             Presence::Present => Ok(()),
@@ -224,10 +208,10 @@ impl Controller {
         };
         lost(peers.drives, FaultCode::DrivesLost, Tracking::Lost)?;
         lost(peers.supervisor, FaultCode::SupervisorLost, Tracking::Sound)?;
-        if self.playing != 0 {
+        if self.intake.started() != 0 {
             lost(peers.planner, FaultCode::PlannerLost, Tracking::Sound)?;
         }
-        let cycles = seen?;
+        let elapsed = seen?;
         if self.state.follows() {
             self.supervision.drives(feedback)?;
         }
@@ -235,144 +219,25 @@ impl Controller {
             // Drives keeps the gate closed: going on would leave marks out.
             return Err(Finding::new(FaultCode::DriveFault, 0.0, 0.0, Tracking::Sound));
         }
-        Ok(cycles)
+        Ok(elapsed)
     }
 
-    /// Carries a request out, or refuses it.
-    fn request(&mut self, request: &OperatorRequest) -> OperatorReply {
-        let met = self.state.to_wire();
-        let accepted =
-            OperatorVerb::from_wire(request.verb).is_some_and(|verb| self.obey(verb, request));
-        OperatorReply {
-            ticket: request.ticket,
-            accepted: u32::from(accepted),
-            state: met as u32,
-            reserved: 0,
-            value: self.player.wanted_rate(),
+    /// Where drives kept cycles dark for want of a command, the light lost in them is owed.
+    fn make_up(&mut self, elapsed: Elapsed, now: Nanoseconds) {
+        if self.playing == 0 {
+            return;
         }
-    }
-
-    fn obey(&mut self, verb: OperatorVerb, request: &OperatorRequest) -> bool {
-        match (verb, self.state) {
-            (OperatorVerb::Enable, State::Disabled) => {
-                self.state = State::Enabling { waited: 0, held: 0 };
-            }
-            (OperatorVerb::Disable, State::Idle | State::Enabling { .. }) => {
-                self.state = State::Disabled;
-            }
-            (OperatorVerb::Hold, State::Running | State::Holding(_)) => {
-                self.player.hold();
-                self.state = State::Holding(AfterRest::Wait);
-            }
-            (OperatorVerb::Resume, State::Holding(_)) => {
-                self.state = State::Holding(AfterRest::Resume);
-            }
-            (OperatorVerb::Stop, State::Running | State::Holding(_)) => {
-                self.player.hold();
-                self.state = State::Stopping;
-            }
-            (OperatorVerb::Stop, State::Idle | State::Disabled) if self.intake.started() != 0 => {
-                self.intake.finish();
-                self.completed = false;
-            }
-            (OperatorVerb::Reset, State::Faulted) => {
-                self.state = State::Disabled;
-                self.fault = Fault::default();
-                self.reset_ticket = u64::from(request.ticket);
-                self.supervision.reset();
-            }
-            (OperatorVerb::Override, _) => return self.player.set_rate(request.value),
-            (OperatorVerb::Start, State::Disabled | State::Enabling { .. } | State::Idle) => {
-                let stream = request.value as u64;
-                return stream as f64 == request.value && self.intake.start(stream);
-            }
-            _ => return false,
+        let Some(from) = self.player.miss(elapsed, self.intake.lookahead()) else { return };
+        let same_place = self.losses > 0 && from < self.lost_at + ONE_PLACE;
+        self.losses = if same_place { self.losses + 1 } else { 1 };
+        self.lost_at = from;
+        if self.losses > MOST_LOSSES {
+            let (value, limit) = (f64::from(self.losses), f64::from(MOST_LOSSES));
+            let code = FaultCode::StaleCommand;
+            self.fail(Finding::new(code, value, limit, Tracking::Sound).at(now));
+        } else if self.state == State::Running {
+            self.state = State::Holding(AfterRest::Resume);
         }
-        true
-    }
-
-    /// Changes the state where time or the feedback asks for it.
-    fn transition(&mut self, now: Nanoseconds, feedback: &Feedback, outputs: &mut Outputs) {
-        match self.state {
-            State::Enabling { waited, held } => self.enable(now, feedback, waited, held),
-            State::Idle if self.intake.is_ready() => self.begin(now, feedback.cycle),
-            State::Running if self.is_at_end() && self.player.is_at_rest() => {
-                outputs.report = Some(self.finish(true));
-                self.state = State::Idle;
-            }
-            State::Running if !self.is_at_end() && self.alignment.is_done() => {
-                self.player.resume(self.intake.lookahead());
-            }
-            State::Holding(AfterRest::Resume) if self.player.is_at_rest() => {
-                self.state = State::Running;
-            }
-            State::Stopping if self.player.is_at_rest() && self.alignment.is_done() => {
-                outputs.report = Some(self.finish(false));
-                self.state = State::Idle;
-            }
-            State::Failing { tracking, waited } => {
-                let at_rest = match tracking {
-                    Tracking::Sound => self.player.is_at_rest() && self.alignment.is_done(),
-                    Tracking::Lost => self.supervision.standing() >= STANDING,
-                };
-                self.state = State::Failing { tracking, waited: waited + 1 };
-                if at_rest || waited >= PATIENCE {
-                    if self.playing != 0 {
-                        outputs.report = Some(self.finish(false));
-                    }
-                    self.intake.finish();
-                    self.state = State::Faulted;
-                }
-            }
-            _ => {}
-        }
-    }
-
-    /// Waits for the power and for standstill, then holds for a moment where the axes stand.
-    fn enable(&mut self, now: Nanoseconds, feedback: &Feedback, waited: u32, held: u32) {
-        let ready = held > 0
-            || feedback.has(status::POWERED)
-                && !feedback.has(status::STOPPED_ALONE)
-                && !feedback.fault.is_some()
-                && self.supervision.standing() > 0;
-        self.state = if held >= STANDING {
-            State::Idle
-        } else {
-            State::Enabling { waited: waited + 1, held: if ready { held + 1 } else { 0 } }
-        };
-        if waited >= PATIENCE {
-            let (value, limit) = (f64::from(waited), f64::from(PATIENCE));
-            let finding = Finding::new(FaultCode::DriveFault, value, limit, Tracking::Lost);
-            self.fail(finding.at(now));
-        }
-    }
-
-    /// Begins the stream in hand, from where the axes stand.
-    fn begin(&mut self, now: Nanoseconds, cycle: Cycle) {
-        self.player.rewind();
-        let lookahead = self.intake.lookahead();
-        let start = self.feedforward.plan(lookahead, self.player.after());
-        match Alignment::new(&self.machine, self.feedforward.after(), &start) {
-            Ok(alignment) => {
-                self.alignment = alignment;
-                self.playing = self.intake.started();
-                self.statistics.begin(self.playing, cycle);
-                self.state = State::Running;
-                if alignment.is_done() {
-                    self.player.resume(lookahead);
-                }
-            }
-            Err(finding) => self.fail(finding.at(now)),
-        }
-    }
-
-    /// The stream is over; what was counted.
-    fn finish(&mut self, completed: bool) -> signals::ControllerReport {
-        self.playing = 0;
-        self.completed = completed;
-        self.intake.finish();
-        self.player.rewind();
-        self.statistics.finish(completed, self.fault)
     }
 
     /// Laser off and axes to rest; the first finding is the fault.
@@ -382,10 +247,7 @@ impl Controller {
         }
         self.player.hold();
         self.state = match self.state {
-            State::Disabled | State::Faulted => {
-                self.intake.finish();
-                State::Faulted
-            }
+            State::Disabled | State::Faulted => State::Faulted,
             State::Failing { tracking: Tracking::Sound, .. }
                 if finding.tracking == Tracking::Lost =>
             {
@@ -397,7 +259,7 @@ impl Controller {
     }
 
     /// Goes on by one cycle along the stream, or stands.
-    fn advance(&mut self, now: Nanoseconds, feedback: &Feedback) {
+    fn advance(&mut self, feedback: &Feedback) {
         if !self.state.follows() {
             let tool = self.tool_measured(feedback);
             if feedback.position.iter().all(|position| position.is_finite()) {
@@ -422,122 +284,13 @@ impl Controller {
         self.feedforward.advance(planned);
         match event {
             Event::Paused => self.state = State::Holding(AfterRest::Wait),
-            Event::Starved => {
-                let time = self.player.next().time.seconds();
-                let code = FaultCode::StreamStarved;
-                self.fail(Finding::new(code, time, 0.0, Tracking::Sound).at(now));
-            }
+            Event::Starved => self.state = State::Holding(AfterRest::Supply { waited: 0 }),
             Event::None | Event::Ended => {}
         }
-    }
-
-    /// Writes the command.
-    fn command(&mut self, now: Nanoseconds, inputs: &Inputs<'_>, command: &mut Command) {
-        let feedback = inputs.feedback;
-        let lookahead = self.intake.lookahead();
-        let (laser, outputs, newest) = if self.playing == 0 {
-            (LaserCycle::OFF, 0, (Nanoseconds(0), Nanoseconds(0)))
-        } else {
-            let sequence = self.player.after().time.sequence();
-            let newest = (lookahead.setpoint(sequence).published, lookahead.received(sequence));
-            let outputs = lookahead.setpoint(self.player.outputs_at().sequence()).outputs;
-            (self.player.laser(lookahead), outputs, newest)
-        };
-        // The player is dark unless it plays; a fault found after it went on makes it dark too.
-        let laser = match self.state {
-            State::Running | State::Holding(_) => laser,
-            _ => LaserCycle::OFF,
-        };
-        *command = Command {
-            epoch: feedback.epoch,
-            cycle: feedback.cycle,
-            reset: self.reset_ticket,
-            stream: self.playing,
-            stroke: u64::from(stroke(&laser)),
-            received: inputs.received,
-            published: now,
-            setpoint_published: newest.0,
-            setpoint_received: newest.1,
-            mode: self.state.mode() as u32,
-            state: self.state.to_wire() as u32,
-            outputs,
-            stream_time: self.player.now().time.seconds(),
-            rate: self.player.now().rate,
-            tool: self.feedforward.now().tool,
-            laser,
-            fault: self.fault,
-            ..Command::default()
-        };
-        let follows = self.state.follows();
-        let axes = self.machine.axes.iter().zip(&mut self.cascades).enumerate();
-        for (index, (axis, cascade)) in axes {
-            let reference = self.feedforward.reference(index, axis);
-            let target = self.feedforward.target(index, axis);
-            let measured = Measurement {
-                position: feedback.position[index],
-                velocity: feedback.velocity[index],
-                current: feedback.current[index],
-            };
-            let error = reference.position - measured.position;
-            command.reference[index] = reference.position;
-            command.position[index] = target.position;
-            command.velocity[index] = target.velocity;
-            command.effort[index] = target.effort;
-            if !follows {
-                continue;
-            }
-            command.following_error[index] = error;
-            let held_by_friction =
-                self.feedforward.stands(index) && error.abs() <= axis.encoder.resolution();
-            let drive = cascade.step(&reference, &measured, !held_by_friction);
-            command.voltage[index] = drive.voltage;
-            if self.playing != 0 {
-                self.statistics.drive(index, &drive);
-            }
-        }
-    }
-
-    fn progress(&self, now: Nanoseconds, command: &Command) -> Progress {
-        let lookahead = self.intake.lookahead();
-        let mut position = [0.0; MAX_AXES];
-        let angles = self.feedforward.now().angle;
-        for (position, (axis, angle)) in
-            position.iter_mut().zip(self.machine.axes.iter().zip(&angles))
-        {
-            *position = angle * axis.ratio;
-        }
-        Progress {
-            published: now,
-            stream: lookahead.stream(),
-            accepted: lookahead.accepted(),
-            played: lookahead.played(),
-            room: lookahead.room() as u64,
-            stroke: command.stroke,
-            cycles: self.cycles,
-            finished_stream: self.intake.finished(),
-            rate: command.rate,
-            tool: command.tool,
-            position,
-            state: command.state,
-            completed: u32::from(self.completed),
-            fault: self.fault,
-        }
-    }
-
-    /// Whether the stream in hand has been played to its last setpoint.
-    fn is_at_end(&self) -> bool {
-        let lookahead = self.intake.lookahead();
-        lookahead.is_complete() && self.player.after().time >= lookahead.end()
     }
 
     /// Where the tool is while no plan holds it.
     fn tool_measured(&self, feedback: &Feedback) -> [f64; 3] {
         if feedback.has(status::TOOL_KNOWN) { feedback.tool } else { self.feedforward.now().tool }
     }
-}
-
-/// The first stroke that is marked in the cycle, 0 for none.
-fn stroke(laser: &LaserCycle) -> u32 {
-    let edges = laser.edges().iter().map(|edge| edge.gate);
-    core::iter::once(laser.gate).chain(edges).find(|gate| *gate != 0).unwrap_or(0)
 }

@@ -21,12 +21,23 @@ impl Stretch {
     }
 }
 
+/// The edges of more than one setpoint fall into one cycle and do not fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TooManyEdges;
+
 /// The laser over `stretch`, dark before `dark_until`. Edges keep their stream time; power follows
 /// the rate, so that each length of line gets the same light.
-pub fn laser(lookahead: &Lookahead, stretch: Stretch, dark_until: StreamTime) -> LaserCycle {
+///
+/// # Errors
+/// More changes than a cycle can hold: none is left out silently.
+pub fn laser(
+    lookahead: &Lookahead,
+    stretch: Stretch,
+    dark_until: StreamTime,
+) -> Result<LaserCycle, TooManyEdges> {
     let rate = stretch.rate();
     if stretch.to <= stretch.from || stretch.to <= dark_until {
-        return LaserCycle::OFF;
+        return Ok(LaserCycle::OFF);
     }
     let mut cycle = LaserCycle::OFF;
     let start = stretch.from.max(dark_until);
@@ -35,7 +46,7 @@ pub fn laser(lookahead: &Lookahead, stretch: Stretch, dark_until: StreamTime) ->
     let period = CYCLE_PERIOD.0 as f64;
     let planned = &lookahead.setpoint(first).laser;
     if stretch.from.fraction() == 0.0 && stretch.from == start && stretch.to.0 - start.0 == ONE {
-        return *planned;
+        return Ok(*planned);
     }
     // What is on where the light may begin: the last edge that has passed by then.
     let passed = start.fraction() * period;
@@ -50,35 +61,30 @@ pub fn laser(lookahead: &Lookahead, stretch: Stretch, dark_until: StreamTime) ->
         (cycle.gate, cycle.power) = (gate, power_at_rate(power));
     } else if gate != 0 {
         let offset = (start - stretch.from).setpoints() / rate * period;
-        push(&mut cycle, offset, gate, power_at_rate(power));
+        push(&mut cycle, offset, gate, power_at_rate(power))?;
     }
     for sequence in first..=last {
         let laser = &lookahead.setpoint(sequence).laser;
         let into = (StreamTime::of(sequence) - stretch.from).setpoints();
         // A setpoint starts with what the one before ended with, unless the planner says otherwise.
         if sequence != first && (laser.gate, power_at_rate(laser.power)) != cycle.last() {
-            push(&mut cycle, into / rate * period, laser.gate, power_at_rate(laser.power));
+            push(&mut cycle, into / rate * period, laser.gate, power_at_rate(laser.power))?;
         }
         for edge in laser.edges() {
             let begun = sequence != first || f64::from(edge.offset) > passed;
             let offset = (into + f64::from(edge.offset) / period) / rate * period;
             if begun && offset < period {
-                push(&mut cycle, offset, edge.gate, power_at_rate(edge.power));
+                push(&mut cycle, offset, edge.gate, power_at_rate(edge.power))?;
             }
         }
     }
-    cycle
+    Ok(cycle)
 }
 
-/// Adds an edge. Three cycles' worth of edges may not fit into one: then the cycle ends in the dark
-/// rather than with light that nobody ends.
-fn push(cycle: &mut LaserCycle, offset: f64, gate: u32, power: f64) {
+/// Adds an edge.
+fn push(cycle: &mut LaserCycle, offset: f64, gate: u32, power: f64) -> Result<(), TooManyEdges> {
     let offset = (offset.round().max(0.0) as u32).min(CYCLE_PERIOD.0 as u32 - 1);
-    if !cycle.push(GateEdge { offset, gate, power })
-        && let Some(last) = cycle.edges.last_mut()
-    {
-        (last.gate, last.power) = (0, 0.0);
-    }
+    if cycle.push(GateEdge { offset, gate, power }) { Ok(()) } else { Err(TooManyEdges) }
 }
 
 #[cfg(test)]
@@ -118,7 +124,7 @@ mod tests {
         let (mut lit, mut exposure, mut now) = (0.0, 0.0, at(from));
         while now < at(to) {
             let stretch = Stretch { from: now, to: now + at(rate) };
-            let cycle = laser(&ring, stretch, at(dark_until));
+            let cycle = laser(&ring, stretch, at(dark_until)).unwrap();
             assert!(cycle.is_valid(), "{cycle:?}");
             let (mut since, mut gate, mut power) = (0.0, cycle.gate, cycle.power);
             let end = GateEdge { offset: 1_000_000, gate: 0, power: 0.0 };
@@ -166,7 +172,7 @@ mod tests {
             let stretch =
                 Stretch { from: StreamTime::of(sequence), to: StreamTime::of(sequence + 1) };
             let cycle = laser(&ring, stretch, StreamTime(0));
-            assert_eq!(cycle, ring.setpoint(sequence).laser);
+            assert_eq!(cycle, Ok(ring.setpoint(sequence).laser));
         }
     }
 
@@ -175,7 +181,24 @@ mod tests {
         let ring = ring();
         for (from, to) in [(3.0, 2.0), (2.0, 2.0)] {
             let stretch = Stretch { from: at(from), to: at(to) };
-            assert_eq!(laser(&ring, stretch, StreamTime(0)), LaserCycle::OFF);
+            assert_eq!(laser(&ring, stretch, StreamTime(0)), Ok(LaserCycle::OFF));
         }
+    }
+
+    #[test]
+    fn edges_that_do_not_fit_are_not_left_out() {
+        let mut ring = Lookahead::new();
+        for sequence in 0..3 {
+            let mut setpoint = Setpoint { stream: 1, sequence, ..Setpoint::default() };
+            for slot in 0..10 {
+                let gate = 1 - slot % 2;
+                let edge = GateEdge { offset: slot * 100_000, gate, power: f64::from(gate) };
+                assert!(setpoint.laser.push(edge));
+            }
+            ring.accept(&setpoint, Nanoseconds(0), 2.0).unwrap();
+        }
+        let play = |from, to| laser(&ring, Stretch { from: at(from), to: at(to) }, StreamTime(0));
+        assert_eq!(play(0.0, 1.0).unwrap().edges().len(), 10);
+        assert_eq!(play(0.0, 2.0), Err(TooManyEdges));
     }
 }

@@ -6,6 +6,7 @@
 
 use crate::lookahead::Lookahead;
 use crate::rate_limit::RateLimit;
+use crate::stream_time::StreamTime;
 use crate::supervision::{Finding, Supervision, Tracking};
 use machine::Machine;
 use signals::{FaultCode, Nanoseconds, Setpoint};
@@ -75,6 +76,12 @@ impl Intake {
             && (self.lookahead.is_complete() || self.lookahead.accepted() >= BEGINNING)
     }
 
+    /// Whether the stream can go on from `time` after it ran dry.
+    pub fn is_supplied(&self, time: StreamTime) -> bool {
+        let ahead = self.lookahead.accepted().saturating_sub(time.sequence());
+        self.lookahead.is_complete() || ahead >= BEGINNING
+    }
+
     /// The stream in hand is over.
     pub fn finish(&mut self) {
         self.finished = self.finished.max(self.started);
@@ -108,6 +115,12 @@ impl Intake {
             return Ok(());
         }
         supervision.setpoint(setpoint)?;
+        let newest = self.lookahead.accepted().checked_sub(1);
+        let before = newest.map(|sequence| self.lookahead.setpoint(sequence));
+        let continues = setpoint.sequence == self.lookahead.accepted();
+        if continues {
+            supervision.continuity(before, setpoint)?;
+        }
         let largest_rate = self.rate_limit.of(setpoint);
         self.lookahead.accept(setpoint, received, largest_rate).map_err(|broken| {
             let (value, limit) = (broken.sequence as f64, broken.expected as f64);

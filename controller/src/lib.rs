@@ -17,6 +17,7 @@ pub mod player;
 pub mod ramp;
 pub mod rate_limit;
 pub mod service;
+mod state;
 pub mod statistics;
 pub mod stream_time;
 pub mod supervision;

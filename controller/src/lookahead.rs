@@ -155,16 +155,38 @@ impl Lookahead {
         self.received[self.nearest(sequence)]
     }
 
-    /// The largest rate that all setpoints from `from` to `to` allow, up to a block more at either
-    /// end. What has not come in yet is taken to allow no more than the planned rate.
-    pub fn largest_rate(&self, from: StreamTime, to: StreamTime) -> f64 {
-        let known = if self.complete || to <= self.end() { LARGEST_RATE } else { 1.0 };
-        self.blocks(from, to).fold(known, |rate, block| rate.min(block.largest_rate))
+    /// The largest rate at `from` that all setpoints up to `to` allow, up to a block more at either
+    /// end. What has not come in yet is taken to allow no more than the planned rate. `before`
+    /// gives the rate from which a limit can still be kept, so many setpoints before it.
+    pub fn largest_rate(
+        &self,
+        from: StreamTime,
+        to: StreamTime,
+        before: impl Fn(f64, f64) -> f64,
+    ) -> f64 {
+        let distance = |time: StreamTime| (time - from).setpoints();
+        let known = self.complete || to <= self.end();
+        let unknown = if known { LARGEST_RATE } else { before(1.0, distance(self.end())) };
+        let blocks = self.blocks(from, to).map(|(start, block)| {
+            if block.largest_rate < LARGEST_RATE {
+                before(block.largest_rate, distance(start))
+            } else {
+                LARGEST_RATE
+            }
+        });
+        blocks.fold(unknown, f64::min)
     }
 
     /// Whether there may be light between `from` and `to`, or up to a block outside.
     pub fn may_be_lit(&self, from: StreamTime, to: StreamTime) -> bool {
-        self.blocks(from, to).any(|block| block.lit)
+        self.blocks(from, to).any(|(_, block)| block.lit)
+    }
+
+    /// Whether any setpoint from the one at or before `from` to `to` has light; a look at each, for
+    /// short stretches.
+    pub fn is_lit(&self, from: StreamTime, to: StreamTime) -> bool {
+        let last = to.min(self.end()).sequence();
+        (from.sequence()..=last).any(|sequence| self.setpoint(sequence).laser.is_lit())
     }
 
     /// Whether the stream itself is at rest at `time`, its transmissions relaxed.
@@ -177,11 +199,18 @@ impl Lookahead {
         })
     }
 
-    fn blocks(&self, from: StreamTime, to: StreamTime) -> impl Iterator<Item = &Block> {
+    /// The blocks with setpoints from `from` to `to`, with where each starts.
+    fn blocks(
+        &self,
+        from: StreamTime,
+        to: StreamTime,
+    ) -> impl Iterator<Item = (StreamTime, &Block)> {
         let block = |sequence: u64| sequence / BLOCK as u64;
         let last = block(to.min(self.end()).sequence());
         let first = block(from.max(self.beginning()).sequence());
-        (first..=last).map(|index| &self.blocks[index as usize % BLOCKS])
+        (first..=last).map(|index| {
+            (StreamTime::of(index * BLOCK as u64), &self.blocks[index as usize % BLOCKS])
+        })
     }
 
     fn nearest(&self, sequence: u64) -> usize {
@@ -250,6 +279,10 @@ mod tests {
         assert!(ring.played() > 10, "going back takes nothing back");
     }
 
+    fn largest(ring: &Lookahead, from: StreamTime, to: StreamTime) -> f64 {
+        ring.largest_rate(from, to, |limit, _| limit)
+    }
+
     #[test]
     fn summarises_blocks_and_forgets_old_ones() {
         let mut ring = Lookahead::new();
@@ -263,15 +296,15 @@ mod tests {
             if sequence == 1000 {
                 let around = |from, to| (StreamTime::of(from), StreamTime::of(to));
                 let (from, to) = around(100, 300);
-                assert_eq!((ring.largest_rate(from, to), ring.may_be_lit(from, to)), (1.25, true));
+                assert_eq!((largest(&ring, from, to), ring.may_be_lit(from, to)), (1.25, true));
                 let (from, to) = around(300, 900);
-                assert_eq!((ring.largest_rate(from, to), ring.may_be_lit(from, to)), (2.0, false));
+                assert_eq!((largest(&ring, from, to), ring.may_be_lit(from, to)), (2.0, false));
                 let (from, to) = around(300, 1100);
-                assert_eq!(ring.largest_rate(from, to), 1.0, "the unknown is played as planned");
+                assert_eq!(largest(&ring, from, to), 1.0, "the unknown is played as planned");
             }
         }
         let slow = 200 + CAPACITY as u64 + 64;
-        assert_eq!(ring.largest_rate(StreamTime::of(slow), StreamTime::of(slow)), 1.25);
+        assert_eq!(largest(&ring, StreamTime::of(slow), StreamTime::of(slow)), 1.25);
         assert!(!ring.may_be_lit(StreamTime::of(1300), StreamTime::of(2990)));
     }
 }

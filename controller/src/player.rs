@@ -10,11 +10,12 @@
 //! the dark. A resume goes back far enough to be at full rate again where light was first left
 //! out, and lights exactly there. Where none was left out, nothing is played again.
 
-use crate::gate::{self, Stretch};
+use crate::gate::{self, Stretch, TooManyEdges};
 use crate::lookahead::Lookahead;
-use crate::ramp::{Ramp, Rate, Slew};
+use crate::ramp::{Ramp, Rate, Slew, rate_before};
 use crate::rate_limit::LARGEST_RATE;
 use crate::stream_time::{ONE, StreamTime};
+use crate::supervision::Elapsed;
 use signals::LaserCycle;
 use signals::setpoint::flags;
 use signals::time::CYCLE_TIME;
@@ -22,9 +23,13 @@ use signals::time::CYCLE_TIME;
 /// The slowest that an override goes.
 pub const SMALLEST_RATE: f64 = 0.1;
 
-/// How far ahead rates are limited: slowing from the largest rate to the planned one takes 424
-/// setpoints.
-const HORIZON: StreamTime = StreamTime(576 * ONE);
+/// How far ahead rates are limited: slowing from the largest rate to the planned one may begin 878
+/// setpoints before.
+const HORIZON: StreamTime = StreamTime(960 * ONE);
+
+/// Cycles without a command after which drives has stopped the axes, and more than supervision
+/// lets go by.
+const MOST_MISSED: u64 = 3;
 
 /// Setpoints never played into while more may come: the neighbours of an interpolation.
 const RESERVE: StreamTime = StreamTime(2 * ONE);
@@ -155,20 +160,48 @@ impl Player {
         self.activity == Activity::Resting
     }
 
+    /// Whether light was left out that the stream has not come back to yet.
+    pub fn owes_light(&self) -> bool {
+        self.owes_light_from.is_some()
+    }
+
     /// Closes the gate from `next` on and comes to rest along the path.
     pub fn hold(&mut self) {
         match self.activity {
-            Activity::Playing(_) => {
-                // `after` is what the coming `advance` makes `next`.
-                if self.after.time >= self.dark_until {
-                    self.dark_until = self.after.time;
-                    self.owes_light_from = None;
-                }
-                self.activity = Activity::Braking;
-            }
+            // `after` is what the coming `advance` makes `next`.
+            Activity::Playing(_) => self.brake_in_the_dark(self.after.time),
             Activity::Rewinding(_) | Activity::Turning => self.activity = Activity::Braking,
             Activity::Resting | Activity::Braking => {}
         }
+    }
+
+    /// Of the `elapsed` cycles that the coming advances make up for, drives kept the last dark:
+    /// brakes if light was lost in them, and gives the place where the first began.
+    pub fn miss(&mut self, elapsed: Elapsed, lookahead: &Lookahead) -> Option<StreamTime> {
+        // The command given last acts from `next` to `after`; for later cycles there was none.
+        let sent = elapsed.missed >= elapsed.cycles && self.marking;
+        let unsent = elapsed.cycles > 1 && matches!(self.activity, Activity::Playing(_));
+        let cycles = elapsed.cycles.saturating_sub(1).min(MOST_MISSED) as i64;
+        let from = if sent { self.next.time } else { self.after.time };
+        let from = from.max(self.dark_until);
+        let to = self.after.time + StreamTime(cycles * LARGEST_RATE as i64 * ONE);
+        let lost = elapsed.missed > 0 && (sent || unsent) && lookahead.is_lit(from, to);
+        if !lost {
+            return None;
+        }
+        self.brake_in_the_dark(from);
+        self.marking = false;
+        self.owes_light_from = Some(from);
+        Some(from)
+    }
+
+    /// Brakes; the gate was last open before `from`.
+    fn brake_in_the_dark(&mut self, from: StreamTime) {
+        if from >= self.dark_until {
+            self.dark_until = from;
+            self.owes_light_from = None;
+        }
+        self.activity = Activity::Braking;
     }
 
     /// Goes on from rest: at once where the stream itself rests, else from as far back as the
@@ -202,6 +235,9 @@ impl Player {
 
     /// Goes on by one cycle.
     pub fn advance(&mut self, lookahead: &Lookahead) -> Event {
+        if self.marking && self.owes_light_from.is_some_and(|from| from < self.after.time) {
+            self.owes_light_from = None;
+        }
         self.now = self.next;
         self.next = self.after;
         self.marking = matches!(self.activity, Activity::Playing(_));
@@ -217,8 +253,7 @@ impl Player {
                 let rate = self.ramp.toward(allowed, slew);
                 let reach = from + self.ramp.stopping_distance(rate, Slew::STOP) + RESERVE;
                 if reach > lookahead.end() && !lookahead.is_complete() {
-                    self.dark_until = self.dark_until.max(from);
-                    self.activity = Activity::Braking;
+                    self.brake_in_the_dark(from);
                     self.marking = false;
                     event = Event::Starved;
                     self.ramp.toward(Rate::ZERO, Slew::STOP)
@@ -272,16 +307,19 @@ impl Player {
     }
 
     /// The laser from `next` to `after`.
-    pub fn laser(&mut self, lookahead: &Lookahead) -> LaserCycle {
+    ///
+    /// # Errors
+    /// More edges than a cycle can hold.
+    pub fn laser(&mut self, lookahead: &Lookahead) -> Result<LaserCycle, TooManyEdges> {
         let stretch = Stretch { from: self.next.time, to: self.after.time };
         let cycle = gate::laser(lookahead, stretch, self.dark_until);
         if self.marking {
             return cycle;
         }
-        if cycle.is_lit() && self.owes_light_from.is_none() {
+        if cycle.map_or(true, |cycle| cycle.is_lit()) && self.owes_light_from.is_none() {
             self.owes_light_from = Some(stretch.from.max(self.dark_until));
         }
-        LaserCycle::OFF
+        Ok(LaserCycle::OFF)
     }
 
     /// Where the digital outputs stand: they do not go back with a rewind.
@@ -321,7 +359,7 @@ impl Player {
         if self.wanted <= Rate::ONE {
             return self.wanted;
         }
-        let largest = lookahead.largest_rate(from, from + HORIZON);
+        let largest = lookahead.largest_rate(from, from + HORIZON, rate_before);
         self.wanted.min(Rate::below(largest))
     }
 }

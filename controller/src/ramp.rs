@@ -8,7 +8,9 @@
 //! 2.5 m/s² along the path. Where the plan brakes at its limit of 10 m/s² already, the sum peaks
 //! 5 % above it, because the share of the plan falls with the square of the rate.
 
+use crate::rate_limit::LARGEST_RATE;
 use crate::stream_time::{FRACTION_BITS, StreamTime};
+use signals::time::CYCLE_TIME;
 
 /// Cycles of the moving average; a power of two.
 pub const LENGTH: usize = 32;
@@ -50,8 +52,21 @@ pub struct Slew(i64);
 impl Slew {
     /// To and from rest: ṙ ≤ 10/s, r̈ ≤ 312/s².
     pub const STOP: Self = Self(Rate::ONE.0 / 100);
-    /// Between rates while marking: ṙ ≤ 4/s, r̈ ≤ 125/s².
-    pub const OVERRIDE: Self = Self(Rate::ONE.0 / 250);
+    /// Between rates while marking: ṙ ≤ 2/s, r̈ ≤ 62.5/s².
+    pub const OVERRIDE: Self = Self(Rate::ONE.0 / 500);
+}
+
+/// Largest |ṙ| of [`Slew::OVERRIDE`] [1/s].
+pub const OVERRIDE_CHANGE: f64 = 2.0;
+
+/// Time of the moving average [s]: |r̈| is at most |ṙ| over it.
+pub const AVERAGING: f64 = LENGTH as f64 * CYCLE_TIME;
+
+/// The largest rate from which [`Slew::OVERRIDE`] comes down to `limit` within `distance` setpoints:
+/// `d(r²)/ds = 2·ṙ`, after the distance on which the average still lags at the largest rate.
+pub fn rate_before(limit: f64, distance: f64) -> f64 {
+    let way = (distance - 2.0 * LARGEST_RATE * LENGTH as f64).max(0.0) * CYCLE_TIME;
+    (limit * limit + 2.0 * OVERRIDE_CHANGE * way).sqrt()
 }
 
 /// The rate in the making.
@@ -191,6 +206,23 @@ mod tests {
                 way = way + run(&mut ramp, target, Slew::STOP, 1);
             }
             assert_eq!(Ramp::starting_distance(target, Slew::STOP), way, "{target:?}");
+        }
+    }
+
+    #[test]
+    fn slowing_down_as_late_as_allowed_keeps_the_limit() {
+        for (start, limit) in [(2.0, 1.0), (2.0, 1.9), (1.3, 1.0), (1.05, 1.04)] {
+            let mut ramp = Ramp::new();
+            ramp.jump(Rate::nearest(start));
+            let (mut left, mut cycles) = (1200.0, 0);
+            while left > 0.0 {
+                let allowed = Rate::nearest(rate_before(limit, left).min(start));
+                left -= run(&mut ramp, allowed, Slew::OVERRIDE, 1).setpoints();
+                cycles += 1;
+            }
+            assert!(ramp.rate() <= limit + 1e-7, "{} instead of {limit} from {start}", ramp.rate());
+            // Slowing down at once, from 1200 setpoints before, would take longer.
+            assert!(f64::from(cycles) < 1200.0 / limit);
         }
     }
 

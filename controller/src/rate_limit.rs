@@ -1,10 +1,13 @@
 //! The largest rate at which a setpoint keeps every limit.
 //!
 //! At rate `r` velocity goes with `r`, acceleration and its torque with `r²`, jerk with `r³`, and
-//! laser power with `r`. As planned is always allowed: the planner's checker vouches for rate 1.
+//! laser power with `r`. While the rate changes, `v·ṙ` comes to the acceleration and
+//! `3·a·r·ṙ + v·r̈` to the jerk; room is left for both. As planned is always allowed: the planner's
+//! checker vouches for rate 1.
 
+use crate::ramp::{AVERAGING, OVERRIDE_CHANGE};
 use machine::{Axis, Machine};
-use signals::{Setpoint, math};
+use signals::Setpoint;
 
 /// The fastest a stream is ever played.
 pub const LARGEST_RATE: f64 = 2.0;
@@ -15,6 +18,13 @@ const VOLTAGE_SHARE: f64 = 0.9;
 
 /// Share of the power stage's current that a rate may use up.
 const CURRENT_SHARE: f64 = 0.9;
+
+/// Edges in a setpoint beyond which it is not played faster: two cycles' worth, with a change of
+/// power at the start of each setpoint, must fit into one.
+const MOST_EDGES: u32 = 5;
+
+/// Newton steps from [`LARGEST_RATE`] down to a root that is at least 1: the error squares with each.
+const NEWTON_STEPS: usize = 7;
 
 /// The limits that a rate must keep, as reciprocals: this is asked once a cycle.
 #[derive(Debug, Clone)]
@@ -59,35 +69,43 @@ impl RateLimit {
     /// The largest rate for `setpoint`, 1..=[`LARGEST_RATE`].
     pub fn of(&self, setpoint: &Setpoint) -> f64 {
         let lit = setpoint.laser.is_lit();
-        let mut velocity = setpoint.path_velocity * if lit { self.marking } else { self.moving };
+        let path_velocity = setpoint.path_velocity;
+        let mut velocity = path_velocity * if lit { self.marking } else { self.moving };
         let mut acceleration = setpoint.path_acceleration * self.acceleration;
         let mut jerk = setpoint.path_jerk * self.jerk;
+        // What a change of the rate adds, in shares of the limits, per ṙ and r̈.
+        let mut pull = path_velocity * self.acceleration;
+        let (mut twist, mut jolt) =
+            (setpoint.path_acceleration * self.jerk, path_velocity * self.jerk);
         let mut rate = LARGEST_RATE;
         let joints = setpoint.velocity.iter().zip(&setpoint.acceleration).zip(&setpoint.jerk);
-        let efforts = setpoint.effort.iter().zip(&setpoint.static_effort);
-        for ((axis, ((speed, joint_acceleration), joint_jerk)), (effort, standing)) in
+        let efforts = setpoint.effort.iter().zip(&setpoint.static_effort).zip(&setpoint.momentum);
+        for ((axis, ((speed, joint_acceleration), joint_jerk)), ((effort, standing), momentum)) in
             self.axes.iter().zip(joints).zip(efforts)
         {
-            velocity = velocity.max(speed.abs() * axis.velocity);
-            acceleration = acceleration.max(joint_acceleration.abs() * axis.acceleration);
+            let (speed, joint_acceleration) = (speed.abs(), joint_acceleration.abs());
+            velocity = velocity.max(speed * axis.velocity);
+            acceleration = acceleration.max(joint_acceleration * axis.acceleration);
             jerk = jerk.max(joint_jerk.abs() * axis.jerk);
-            let motor = axis.motor_rate(speed.abs(), (effort - standing).abs(), standing.abs());
-            rate = rate.min(motor);
+            pull = pull.max(speed * axis.acceleration);
+            twist = twist.max(joint_acceleration * axis.jerk);
+            jolt = jolt.max(speed * axis.jerk);
+            let constant = standing.abs() + momentum.abs() * OVERRIDE_CHANGE;
+            rate = rate.min(axis.motor_rate(speed, (effort - standing).abs(), constant));
         }
         if lit {
             velocity = velocity.max(brightest(setpoint));
+        }
+        if setpoint.laser.edge_count > MOST_EDGES {
+            rate = 1.0;
         }
         // Only above these shares does the largest rate break the limit.
         if velocity * LARGEST_RATE > 1.0 {
             rate = rate.min(1.0 / velocity);
         }
-        if acceleration * LARGEST_RATE * LARGEST_RATE > 1.0 {
-            rate = rate.min(1.0 / acceleration.sqrt());
-        }
-        if jerk * LARGEST_RATE * LARGEST_RATE * LARGEST_RATE > 1.0 {
-            rate = rate.min(1.0 / math::cbrt(jerk));
-        }
-        rate.max(1.0)
+        rate = rate.min(largest_root(acceleration, 0.0, pull * OVERRIDE_CHANGE - 1.0));
+        let constant = jolt * OVERRIDE_CHANGE / AVERAGING - 1.0;
+        rate.min(largest_cubic_root(jerk, 3.0 * twist * OVERRIDE_CHANGE, constant)).max(1.0)
     }
 }
 
@@ -129,6 +147,24 @@ fn largest_root(a: f64, b: f64, c: f64) -> f64 {
         // The stable form: b and the root have the same sign.
         -2.0 * c / (b + (b * b - 4.0 * a * c).sqrt())
     }
+}
+
+/// The largest `r` in 1..=[`LARGEST_RATE`] with `a·r³ + b·r + c ≤ 0`, for `a, b ≥ 0`; 1 or less
+/// without.
+fn largest_cubic_root(a: f64, b: f64, c: f64) -> f64 {
+    let value = |r: f64| (a * r * r + b) * r + c;
+    let mut rate = LARGEST_RATE;
+    if value(rate) <= 0.0 {
+        return rate;
+    }
+    // Convex and rising: from above, Newton's method comes down to the root and not beyond.
+    for _ in 0..NEWTON_STEPS {
+        rate -= value(rate) / (3.0 * a * rate * rate + b);
+        if rate < 1.0 {
+            break;
+        }
+    }
+    rate
 }
 
 /// The highest power in the cycle that starts at `setpoint`.

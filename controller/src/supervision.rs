@@ -5,6 +5,7 @@
 
 use machine::{Axis, Machine};
 use signals::feedback::status;
+use signals::setpoint::flags;
 use signals::time::CYCLE_TIME;
 use signals::{AxisArray, Cycle, Fault, FaultCode, Feedback, MAX_AXES, Nanoseconds, Setpoint};
 
@@ -20,6 +21,17 @@ const EXCESS: f64 = 1.001;
 
 /// Rounding of a planned position against its soft limit [m or rad].
 const ROUNDING: f64 = 1e-9;
+
+/// Share of the largest following error by which a setpoint may differ from where the speeds of
+/// both lead from the one before. The planned motion leaves 10⁻⁹ m.
+const DISCONTINUITY: f64 = 0.01;
+
+/// Share of the largest following error by which the lead may change between two setpoints; the
+/// largest planned jerk changes it by a hundredth.
+const LEAD_STEP: f64 = 0.25;
+
+/// Share of the largest following error that an axis may move in a cycle at a planned rest.
+const CREEP: f64 = 0.001;
 
 /// Time over which the heating of a winding is averaged [s]; short against a real winding's.
 const HEATING_TIME: f64 = 5.0;
@@ -67,6 +79,21 @@ impl Finding {
     }
 }
 
+/// What went by between two feedbacks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Elapsed {
+    /// Cycles, at least 1.
+    pub cycles: u64,
+    /// How many of them drives began without a fresh command, and therefore in the dark. They are
+    /// the last ones: whatever came between the two feedbacks, nobody answered.
+    pub missed: u64,
+}
+
+impl Elapsed {
+    /// One cycle, as it should be.
+    pub const ONE: Self = Self { cycles: 1, missed: 0 };
+}
+
 /// The watch over feedback and motors.
 #[derive(Debug, Clone)]
 pub struct Supervision {
@@ -82,6 +109,7 @@ struct Seen {
     epoch: u64,
     cycle: Cycle,
     overruns: u64,
+    missed: u64,
 }
 
 impl Supervision {
@@ -106,21 +134,25 @@ impl Supervision {
         self.standing
     }
 
-    /// Takes a feedback: how many cycles after the last one it is.
+    /// Takes a feedback: what went by since the last one.
     ///
     /// # Errors
     /// The same or an older cycle, a gap, another run of drives, a number that is not finite, or
     /// too many overruns in a row.
-    pub fn feedback(&mut self, feedback: &Feedback) -> Result<u64, Finding> {
-        let seen =
-            Seen { epoch: feedback.epoch, cycle: feedback.cycle, overruns: feedback.overruns };
+    pub fn feedback(&mut self, feedback: &Feedback) -> Result<Elapsed, Finding> {
+        let seen = Seen {
+            epoch: feedback.epoch,
+            cycle: feedback.cycle,
+            overruns: feedback.overruns,
+            missed: feedback.missed,
+        };
         let before = self.seen.replace(seen);
         self.watch_standing(feedback);
         if let Some(index) = not_finite(feedback, self.axes.len()) {
             let value = feedback.position.get(index).copied().unwrap_or_default();
             return Err(Finding::on(index, FaultCode::NotFinite, value, 0.0, Tracking::Lost));
         }
-        let Some(before) = before else { return Ok(1) };
+        let Some(before) = before else { return Ok(Elapsed::ONE) };
         let gap = seen.cycle.0.saturating_sub(before.cycle.0);
         if before.epoch != seen.epoch || gap == 0 || gap > LARGEST_GAP {
             let limit = LARGEST_GAP as f64;
@@ -133,7 +165,9 @@ impl Supervision {
             let (value, limit) = (self.overruns as f64, OVERRUNS as f64);
             return Err(Finding::new(FaultCode::Overrun, value, limit, Tracking::Sound));
         }
-        Ok(gap)
+        // Nobody answered the feedbacks in between.
+        let missed = seen.missed.saturating_sub(before.missed).clamp(gap - 1, gap);
+        Ok(Elapsed { cycles: gap, missed })
     }
 
     /// Whether drives says that something is wrong on its side, with the motors powered.
@@ -216,7 +250,10 @@ impl Supervision {
             if let Some(value) = numbers.iter().find(|value| !value.is_finite()) {
                 return Err(Finding::on(index, FaultCode::NotFinite, *value, 0.0, sound));
             }
-            let [position, velocity, acceleration, jerk, ..] = numbers;
+            let [position, velocity, acceleration, jerk, _, _, effort, ..] = numbers;
+            let friction =
+                axis.friction.coulomb + axis.friction.viscous * (velocity / axis.ratio).abs();
+            let torque = axis.motor.torque_constant * axis.motor.current + friction;
             let [lower, upper] = limits.position;
             let broken = [
                 (lower - position, ROUNDING, position, lower),
@@ -229,10 +266,45 @@ impl Supervision {
                     limits.acceleration,
                 ),
                 (jerk.abs(), limits.jerk * EXCESS, jerk, limits.jerk),
+                (effort.abs(), torque * EXCESS, effort, torque),
             ];
             if let Some((_, _, value, limit)) = broken.iter().find(|(size, most, ..)| size > most) {
                 let code = FaultCode::SetpointLimit;
                 return Err(Finding::on(index, code, *value, *limit, sound));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether `setpoint` continues from `before`, or starts at rest without one, and rests where it
+    /// promises to.
+    ///
+    /// # Errors
+    /// A jump of position or lead, motion or light at a planned rest; with the axis and joint units.
+    pub fn continuity(
+        &self,
+        before: Option<&Setpoint>,
+        setpoint: &Setpoint,
+    ) -> Result<(), Finding> {
+        let (code, sound) = (FaultCode::SetpointLimit, Tracking::Sound);
+        let ends = setpoint.has(flags::LAST) || setpoint.has(flags::PAUSE);
+        if ends && setpoint.laser.is_lit() {
+            return Err(Finding::new(code, setpoint.sequence as f64, 0.0, sound));
+        }
+        for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
+            let unit = axis.limits.following_error;
+            let (jump, step) = before.map_or((0.0, 0.0), |before| {
+                let speeds = before.velocity[index] + setpoint.velocity[index];
+                let moved = setpoint.position[index] - before.position[index];
+                let lead = setpoint.lead[index] - before.lead[index];
+                (moved - speeds / 2.0 * CYCLE_TIME, lead)
+            });
+            let rests = ends || before.is_none();
+            let creep = if rests { setpoint.velocity[index] * CYCLE_TIME } else { 0.0 };
+            let shares = [(jump, DISCONTINUITY), (step, LEAD_STEP), (creep, CREEP)];
+            let broken = shares.iter().find(|(value, share)| value.abs() > share * unit);
+            if let Some((value, share)) = broken {
+                return Err(Finding::on(index, code, *value, share * unit, sound));
             }
         }
         Ok(())

@@ -6,36 +6,7 @@ mod support;
 
 use machine::Machine;
 use signals::{ControllerState, OperatorVerb};
-use support::{Bench, Job, Move, Part, Record, job, lit_stretches, two_marks};
-
-/// Edges are whole nanoseconds of a cycle; two of them bound a stretch [s].
-const EDGE: f64 = 3e-9;
-
-fn started(machine: &Machine, job: &Job) -> Bench {
-    let mut bench = Bench::enabled(machine);
-    assert!(bench.ask(Some(job), OperatorVerb::Start, 1.0));
-    bench.until(Some(job), ControllerState::Running, 20);
-    bench
-}
-
-/// Runs until stream time `time` [s] is at most two cycles away.
-fn reach(bench: &mut Bench, job: &Job, time: f64) {
-    while bench.last().command.stream_time < time - 2e-3 {
-        bench.run(Some(job), 1);
-    }
-}
-
-/// Every planned stretch lit exactly once, in order.
-fn check_marks(bench: &Bench, job: &Job, power: f64, case: &str) {
-    let (stretches, exposure) = lit_stretches(&bench.records);
-    assert_eq!(stretches.len(), job.lit.len(), "{case}: {stretches:?} instead of {:?}", job.lit);
-    for (found, planned) in stretches.iter().zip(&job.lit) {
-        let apart = (found.0 - planned.0).abs().max((found.1 - planned.1).abs());
-        assert!(apart < EDGE, "{case}: {found:?} instead of {planned:?}");
-    }
-    let planned: f64 = job.lit.iter().map(|(on, off)| (off - on) * power).sum();
-    assert!((exposure - planned).abs() < 1e-7, "{case}: exposure {exposure} not {planned}");
-}
+use support::{Move, Part, Record, check_marks, job, reach, started, two_marks};
 
 /// Largest second difference of the references, as an acceleration of the joints [m/s²].
 fn sharpest(records: &[Record], machine: &Machine) -> f64 {

@@ -35,7 +35,7 @@ fn play(rate: f64, cycles: usize) -> (f64, ControllerReport) {
 fn an_override_keeps_every_limit_and_the_light_per_length() {
     // Half of the joints' sum: the tool moves at half of the path coordinate, so jerk is used to
     // 50/500, acceleration to 1/10, speed to 0.05/0.25.
-    for (rate, cycles) in [(1.7, 10), (2.0, 300), (0.3, 400), (0.1, 10)] {
+    for (rate, cycles) in [(1.7, 10), (2.0, 60), (0.3, 400), (0.1, 10)] {
         let (fastest, report) = play(rate, cycles);
         let uses = [report.path_acceleration_use, report.path_jerk_use, report.velocity_use[0]];
         assert!(uses.iter().all(|share| *share <= 1.0), "{uses:?} at rate {rate}");
@@ -61,7 +61,8 @@ fn an_override_stops_at_the_limits_of_what_lies_ahead() {
     bench.until(Some(&job), ControllerState::Running, 30);
     bench.until(Some(&job), ControllerState::Idle, 4000);
     let report = bench.reports.last().unwrap();
-    assert!(report.path_jerk_use > 0.99 && report.path_jerk_use <= 1.0, "{report:?}");
+    // What is left is room for the change of the rate: `3·a·r·ṙ + v·r̈` is 35 m/s³ of 500 at most.
+    assert!(report.path_jerk_use > 0.92 && report.path_jerk_use <= 1.0, "{report:?}");
     let fastest = bench.played().map(|record| record.command.rate).fold(0.0, f64::max);
     assert!(fastest > 1.35, "{fastest}: the cruise allows more");
 }

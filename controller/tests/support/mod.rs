@@ -254,6 +254,8 @@ pub struct Bench {
     pub sent: usize,
     /// Setpoints that the planner has sent at most, by now.
     pub supply: usize,
+    /// Commands that will come too late for their cycle.
+    pub late: u32,
     latched: Command,
     ticket: u32,
 }
@@ -277,6 +279,7 @@ impl Bench {
             peers: Peers::default(),
             sent: 0,
             supply: usize::MAX,
+            late: 0,
             latched: Command::default(),
             ticket: 0,
         }
@@ -340,6 +343,41 @@ impl Bench {
             self.motors.iter().map(|motor| motor.angle * motor.axis.ratio).collect();
         let tracking = signals::artwork::distance(&tool(&joints), &outputs.command.tool);
         self.records.push(Record { feedback: self.feedback, command: outputs.command, tracking });
+        self.run_motors();
+        if self.late == 0 {
+            self.latched = outputs.command;
+        } else {
+            self.late -= 1;
+            self.miss();
+            self.records.last_mut().unwrap().command.laser = LaserCycle::OFF;
+        }
+        outputs.reply
+    }
+
+    /// Cycles whose feedback the controller never sees. The records keep what it had promised.
+    pub fn skip(&mut self, cycles: u64) {
+        for _ in 0..cycles {
+            self.feedback.cycle = self.feedback.cycle.next();
+            self.feedback.deadline = self.feedback.deadline + CYCLE_PERIOD;
+            for motor in &mut self.motors {
+                motor.counts = motor.read();
+            }
+            self.run_motors();
+            self.miss();
+            let mut record = *self.last();
+            record.command.stream_time += CYCLE_TIME * record.command.rate;
+            record.command.laser = LaserCycle::OFF;
+            self.records.push(record);
+        }
+    }
+
+    /// As drives do: the axes go on with what they have, in the dark.
+    fn miss(&mut self) {
+        self.feedback.missed += 1;
+        self.latched.laser = LaserCycle::OFF;
+    }
+
+    fn run_motors(&mut self) {
         for (index, motor) in self.motors.iter_mut().enumerate() {
             let voltage = match self.latched.mode() {
                 CommandMode::Disabled => None,
@@ -348,8 +386,6 @@ impl Bench {
             };
             motor.run(voltage);
         }
-        self.latched = outputs.command;
-        outputs.reply
     }
 
     /// Cycles without anything special.
@@ -422,4 +458,34 @@ pub fn lit_stretches(records: &[Record]) -> (Vec<(f64, f64)>, f64) {
         }
     }
     (stretches, exposure)
+}
+
+/// Edges are whole nanoseconds of a cycle; two of them bound a stretch [s].
+const EDGE: f64 = 3e-9;
+
+/// Every planned stretch lit exactly once, in order.
+pub fn check_marks(bench: &Bench, job: &Job, power: f64, case: &str) {
+    let (stretches, exposure) = lit_stretches(&bench.records);
+    assert_eq!(stretches.len(), job.lit.len(), "{case}: {stretches:?} instead of {:?}", job.lit);
+    for (found, planned) in stretches.iter().zip(&job.lit) {
+        let apart = (found.0 - planned.0).abs().max((found.1 - planned.1).abs());
+        assert!(apart < EDGE, "{case}: {found:?} instead of {planned:?}");
+    }
+    let planned: f64 = job.lit.iter().map(|(on, off)| (off - on) * power).sum();
+    assert!((exposure - planned).abs() < 1e-7, "{case}: exposure {exposure} not {planned}");
+}
+
+/// A bench that has just begun to play `job`.
+pub fn started(machine: &Machine, job: &Job) -> Bench {
+    let mut bench = Bench::enabled(machine);
+    assert!(bench.ask(Some(job), OperatorVerb::Start, 1.0));
+    bench.until(Some(job), ControllerState::Running, 20);
+    bench
+}
+
+/// Runs until stream time `time` [s] is at most two cycles away.
+pub fn reach(bench: &mut Bench, job: &Job, time: f64) {
+    while bench.last().command.stream_time < time - 2e-3 {
+        bench.run(Some(job), 1);
+    }
 }

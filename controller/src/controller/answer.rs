@@ -1,0 +1,124 @@
+//! What the controller says: the command that answers a feedback, and the progress.
+
+use super::Controller;
+use crate::cascade::Measurement;
+use crate::exchange::Inputs;
+use crate::gate::TooManyEdges;
+use crate::state::State;
+use crate::supervision::{Finding, Tracking};
+use signals::{Command, FaultCode, LaserCycle, MAX_AXES, MAX_EDGES, Nanoseconds, Progress};
+
+/// Cycles between two progress samples.
+pub(super) const PROGRESS_INTERVAL: u64 = 5;
+
+impl Controller {
+    /// Writes the command.
+    pub(super) fn command(&mut self, now: Nanoseconds, inputs: &Inputs<'_>, command: &mut Command) {
+        let feedback = inputs.feedback;
+        let light = match self.playing {
+            0 => Ok(LaserCycle::OFF),
+            _ => self.player.laser(self.intake.lookahead()),
+        };
+        let laser = light.unwrap_or_else(|TooManyEdges| {
+            let limit = MAX_EDGES as f64;
+            let code = FaultCode::SetpointLimit;
+            self.fail(Finding::new(code, limit + 1.0, limit, Tracking::Sound).at(now));
+            LaserCycle::OFF
+        });
+        let lookahead = self.intake.lookahead();
+        let (outputs, newest) = if self.playing == 0 {
+            (0, (Nanoseconds(0), Nanoseconds(0)))
+        } else {
+            let sequence = self.player.after().time.sequence();
+            let newest = (lookahead.setpoint(sequence).published, lookahead.received(sequence));
+            let outputs = lookahead.setpoint(self.player.outputs_at().sequence()).outputs;
+            (outputs, newest)
+        };
+        // The player is dark unless it plays; a fault found after it went on makes it dark too.
+        let laser = match self.state {
+            State::Running | State::Holding(_) => laser,
+            _ => LaserCycle::OFF,
+        };
+        *command = Command {
+            epoch: feedback.epoch,
+            cycle: feedback.cycle,
+            reset: self.reset_ticket,
+            stream: self.playing,
+            stroke: u64::from(stroke(&laser)),
+            received: inputs.received,
+            published: now,
+            setpoint_published: newest.0,
+            setpoint_received: newest.1,
+            mode: self.state.mode() as u32,
+            state: self.state.to_wire() as u32,
+            outputs,
+            stream_time: self.player.now().time.seconds(),
+            rate: self.player.now().rate,
+            tool: self.feedforward.now().tool,
+            laser,
+            fault: self.fault,
+            ..Command::default()
+        };
+        let follows = self.state.follows();
+        let axes = self.machine.axes.iter().zip(&mut self.cascades).enumerate();
+        for (index, (axis, cascade)) in axes {
+            let reference = self.feedforward.reference(index, axis);
+            let target = self.feedforward.target(index, axis);
+            let measured = Measurement {
+                position: feedback.position[index],
+                velocity: feedback.velocity[index],
+                current: feedback.current[index],
+            };
+            let error = reference.position - measured.position;
+            command.reference[index] = reference.position;
+            command.position[index] = target.position;
+            command.velocity[index] = target.velocity;
+            command.effort[index] = target.effort;
+            if !follows {
+                continue;
+            }
+            command.following_error[index] = error;
+            let held_by_friction =
+                self.feedforward.stands(index) && error.abs() <= axis.encoder.resolution();
+            let drive = cascade.step(&reference, &measured, !held_by_friction);
+            command.voltage[index] = drive.voltage;
+            if self.playing != 0 {
+                self.statistics.drive(index, &drive);
+            }
+        }
+    }
+
+    /// How far the stream has come.
+    pub(super) fn progress(&self, now: Nanoseconds, command: &Command) -> Progress {
+        let lookahead = self.intake.lookahead();
+        let mut position = [0.0; MAX_AXES];
+        let angles = self.feedforward.now().angle;
+        for (position, (axis, angle)) in
+            position.iter_mut().zip(self.machine.axes.iter().zip(&angles))
+        {
+            *position = angle * axis.ratio;
+        }
+        Progress {
+            published: now,
+            stream: lookahead.stream(),
+            accepted: lookahead.accepted(),
+            played: lookahead.played(),
+            room: lookahead.room() as u64,
+            stroke: command.stroke,
+            cycles: self.cycles,
+            finished_stream: self.intake.finished(),
+            rate: command.rate,
+            tool: command.tool,
+            position,
+            state: command.state,
+            completed: u32::from(self.completed),
+            fault: self.fault,
+        }
+    }
+}
+
+/// The first stroke that is marked in the cycle, 0 for none.
+fn stroke(laser: &LaserCycle) -> u32 {
+    let edges = laser.edges().iter().map(|edge| edge.gate);
+    core::iter::once(laser.gate).chain(edges).find(|gate| *gate != 0).unwrap_or(0)
+}

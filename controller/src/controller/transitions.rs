@@ -1,0 +1,145 @@
+//! How the controller goes from state to state, where time or the feedback asks for it.
+
+use super::Controller;
+use crate::alignment::Alignment;
+use crate::state::{AfterRest, State};
+use crate::supervision::{Finding, Tracking};
+use signals::feedback::status;
+use signals::{Cycle, FaultCode, Feedback, Nanoseconds};
+
+/// Cycles of standing still before an axis counts as at rest without a plan, and of holding
+/// before it counts as enabled.
+const STANDING: u32 = 20;
+
+/// Cycles that enabling, or a quick stop, may take.
+const PATIENCE: u32 = 1000;
+
+/// Cycles for which a planner that lives may send nothing: a minute, longer than any computer is
+/// merely busy.
+const SUPPLY_PATIENCE: u32 = 60_000;
+
+impl Controller {
+    /// Changes the state where time or the feedback asks for it.
+    pub(super) fn transition(&mut self, now: Nanoseconds, feedback: &Feedback) {
+        match self.state {
+            State::Enabling { waited, held } => self.enable(now, feedback, waited, held),
+            // Drives may not have found all peers yet.
+            State::Idle if feedback.has(status::GATE_INHIBITED) => {}
+            State::Idle if self.intake.is_ready() => self.begin(now, feedback.cycle),
+            State::Running if self.is_over() && self.player.is_at_rest() => {
+                self.finish(true);
+                self.state = State::Idle;
+            }
+            State::Running if !self.is_over() && self.alignment.is_done() => {
+                self.player.resume(self.intake.lookahead());
+            }
+            State::Holding(AfterRest::Resume) if self.player.is_at_rest() => {
+                self.state = State::Running;
+            }
+            State::Holding(AfterRest::Supply { waited }) if self.player.is_at_rest() => {
+                self.await_supply(now, waited);
+            }
+            State::Stopping if self.player.is_at_rest() && self.alignment.is_done() => {
+                self.finish(false);
+                self.state = State::Idle;
+            }
+            State::Failing { tracking, waited } => {
+                let at_rest = match tracking {
+                    Tracking::Sound => self.player.is_at_rest() && self.alignment.is_done(),
+                    Tracking::Lost => self.supervision.standing() >= STANDING,
+                };
+                self.state = State::Failing { tracking, waited: waited + 1 };
+                if at_rest || waited >= PATIENCE {
+                    self.end_in_fault(feedback.cycle);
+                }
+            }
+            State::Faulted if self.intake.started() != 0 => self.end_in_fault(feedback.cycle),
+            _ => {}
+        }
+    }
+
+    /// Waits for the power and for standstill, then holds for a moment where the axes stand.
+    fn enable(&mut self, now: Nanoseconds, feedback: &Feedback, waited: u32, held: u32) {
+        let ready = held > 0
+            || feedback.has(status::POWERED)
+                && !feedback.has(status::STOPPED_ALONE)
+                && !feedback.fault.is_some()
+                && self.supervision.standing() > 0;
+        self.state = if held >= STANDING {
+            State::Idle
+        } else {
+            State::Enabling { waited: waited + 1, held: if ready { held + 1 } else { 0 } }
+        };
+        if waited >= PATIENCE {
+            let (value, limit) = (f64::from(waited), f64::from(PATIENCE));
+            let finding = Finding::new(FaultCode::DriveFault, value, limit, Tracking::Lost);
+            self.fail(finding.at(now));
+        }
+    }
+
+    /// Goes on as soon as there is enough to play, or gives up waiting.
+    fn await_supply(&mut self, now: Nanoseconds, waited: u32) {
+        self.state = if self.intake.is_supplied(self.player.after().time) {
+            State::Running
+        } else {
+            State::Holding(AfterRest::Supply { waited: waited + 1 })
+        };
+        if waited >= SUPPLY_PATIENCE {
+            let time = self.player.after().time.seconds();
+            let code = FaultCode::StreamStarved;
+            self.fail(Finding::new(code, time, 0.0, Tracking::Sound).at(now));
+        }
+    }
+
+    /// Begins the stream in hand, from where the axes stand.
+    fn begin(&mut self, now: Nanoseconds, cycle: Cycle) {
+        self.player.rewind();
+        let lookahead = self.intake.lookahead();
+        let start = self.feedforward.plan(lookahead, self.player.after());
+        match Alignment::new(&self.machine, self.feedforward.after(), &start) {
+            Ok(alignment) => {
+                self.alignment = alignment;
+                self.playing = self.intake.started();
+                self.statistics.begin(self.playing, cycle);
+                self.losses = 0;
+                self.state = State::Running;
+                if alignment.is_done() {
+                    self.player.resume(lookahead);
+                }
+            }
+            Err(finding) => self.fail(finding.at(now)),
+        }
+    }
+
+    /// Unpowered, with the fault latched; a stream in hand is given up.
+    pub(super) fn end_in_fault(&mut self, cycle: Cycle) {
+        self.state = State::Faulted;
+        if self.intake.started() != 0 {
+            self.give_up(cycle);
+        }
+    }
+
+    /// Gives the started stream up, begun or not: whoever started it waits for the report.
+    pub(super) fn give_up(&mut self, cycle: Cycle) {
+        if self.playing == 0 {
+            self.statistics.begin(self.intake.started(), cycle);
+        }
+        self.finish(false);
+    }
+
+    /// The stream is over; the report says what was counted.
+    fn finish(&mut self, completed: bool) {
+        self.playing = 0;
+        self.completed = completed;
+        self.intake.finish();
+        self.player.rewind();
+        self.ended = Some(self.statistics.finish(completed, self.fault));
+    }
+
+    /// Whether the stream in hand has been played to its last setpoint, no light being owed.
+    fn is_over(&self) -> bool {
+        let lookahead = self.intake.lookahead();
+        let at_end = lookahead.is_complete() && self.player.after().time >= lookahead.end();
+        at_end && !self.player.owes_light()
+    }
+}

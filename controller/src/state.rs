@@ -1,0 +1,66 @@
+//! The states of the controller, with what each has to remember.
+
+use crate::supervision::Tracking;
+use signals::{CommandMode, ControllerState};
+
+/// What the controller is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum State {
+    Disabled,
+    /// Waiting for the power, then holding for a moment.
+    Enabling {
+        waited: u32,
+        held: u32,
+    },
+    Idle,
+    Running,
+    Holding(AfterRest),
+    Stopping,
+    /// Coming to rest with a fault latched.
+    Failing {
+        tracking: Tracking,
+        waited: u32,
+    },
+    Faulted,
+}
+
+/// What follows once a hold has come to rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum AfterRest {
+    /// A person decides.
+    Wait,
+    /// The stream goes on.
+    Resume,
+    /// The stream goes on when enough of it has come in.
+    Supply { waited: u32 },
+}
+
+impl State {
+    pub(crate) fn to_wire(self) -> ControllerState {
+        match self {
+            Self::Disabled => ControllerState::Disabled,
+            Self::Enabling { .. } => ControllerState::Enabling,
+            Self::Idle => ControllerState::Idle,
+            Self::Running => ControllerState::Running,
+            Self::Holding(_) => ControllerState::Holding,
+            Self::Stopping | Self::Failing { .. } => ControllerState::Stopping,
+            Self::Faulted => ControllerState::Faulted,
+        }
+    }
+
+    pub(crate) fn mode(self) -> CommandMode {
+        match self {
+            Self::Disabled | Self::Faulted => CommandMode::Disabled,
+            Self::Failing { tracking: Tracking::Lost, .. } => CommandMode::QuickStop,
+            _ => CommandMode::Voltage,
+        }
+    }
+
+    /// Whether the plan holds the axes, so that they must follow it.
+    pub(crate) fn follows(self) -> bool {
+        match self {
+            Self::Enabling { held, .. } => held > 0,
+            state => state.mode() == CommandMode::Voltage,
+        }
+    }
+}
