@@ -33,14 +33,17 @@ pub fn run(
     realtime: &RealtimeOptions,
 ) -> Result<(), ServiceError> {
     let mut cycle = ServiceCycle::open(domain, machine)?;
+    // What is missing for real time is in the facts; the supervisor says it once for all.
     let realtime = thread::enter_realtime(realtime);
     cycle.controller.set_realtime(realtime.facts);
     cycle.wake.drain()?;
     loop {
-        cycle.wake.wait_until(clock::now() + LOOK)?;
-        let received = clock::now();
+        let woken = cycle.wake.wait_until(clock::now() + LOOK)?;
         while let Some(feedback) = cycle.feedbacks.newest()? {
-            cycle.answer(&feedback, received)?;
+            cycle.answer(&feedback, clock::now())?;
+        }
+        if !woken {
+            cycle.look_after_drives()?;
         }
         if cycle.shall_end() {
             return Ok(());
@@ -102,6 +105,20 @@ impl ServiceCycle {
         if let Some(reply) = self.outputs.reply {
             self.operators.answer(reply);
         }
+        self.report()
+    }
+
+    /// No feedback has come for long: if drives is dead none will, and whoever waits for the end of
+    /// a stream must hear of it.
+    fn look_after_drives(&mut self) -> Result<(), ServiceError> {
+        if self.peers.state(Role::Drives) != PeerState::Dead {
+            return Ok(());
+        }
+        self.controller.abandon(clock::now(), &mut self.outputs);
+        self.report()
+    }
+
+    fn report(&mut self) -> Result<(), ServiceError> {
         if let Some(progress) = &mut self.outputs.progress {
             progress.published = clock::now();
             self.progress.publish(progress)?;

@@ -113,7 +113,7 @@ fn a_dry_stream_goes_on_when_setpoints_come_again() {
     let machine = Machine::builtin();
     let job = two_marks(&machine, 0.25, 0.5);
     // From inside the run-in to the second mark; then again and again.
-    for supply in [251, 270, 300, 333, 400, 700] {
+    for supply in [251, 270, 300, 333, 400, 500] {
         let mut bench = run_dry(&machine, &job, supply);
         let case = format!("dry after {supply}");
         // A trickle does not set it off.

@@ -125,6 +125,13 @@ impl Bridge {
         self.watchdog.stop(Fault { code, axis: 0, value: 0.0, limit: 0.0, at: now });
     }
 
+    /// Leaves the port dark and unpowered; the last thing that a service does.
+    pub fn release(&mut self) {
+        self.latched = None;
+        self.in_force = Actuation::DISABLED;
+        self.port.exchange(&self.in_force, &mut self.measurement);
+    }
+
     /// Starts the cycle of `deadline` at `now`, not before it: puts the latched command in force,
     /// measures, and gives the feedback, whose `published` and `exchange` [`Self::stamp`] fills.
     pub fn begin(&mut self, now: Nanoseconds, deadline: Nanoseconds) -> &Feedback {

@@ -3,8 +3,11 @@
 //!
 //! A cycle: sleep until the deadline, look whether the peers live, let the bridge apply and
 //! measure, publish the feedback, wait for the command with a bound, latch it. The bound is strict
-//! on hardware and with `--strict`; simulated drives wait longer for a controller that is alive,
-//! and move the later deadlines by what that took.
+//! on hardware and with `--strict`; simulated drives wait longer for a controller that is alive and
+//! followed, and move the later deadlines by what that took.
+//!
+//! Told to end, or left by the supervisor, the service closes the gate at once. A live controller
+//! then brings the axes to rest; where it does not, drives stops them, and leaves when they rest.
 
 use crate::bridge::{Bridge, BridgeOptions, Deadlines, GatePermission};
 use crate::port::{Freshness, Port};
@@ -13,8 +16,9 @@ use runtime::peer::{PeerState, Peers};
 use runtime::thread::{self, RealtimeOptions};
 use runtime::wake::{Listener, Notifier, Wake};
 use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, signal};
+use signals::feedback::status;
 use signals::time::CYCLE_PERIOD;
-use signals::{Command, DrivesReport, FaultCode, Feedback, Nanoseconds};
+use signals::{Command, DrivesReport, FaultCode, Feedback, Nanoseconds, RealtimeFacts};
 
 /// How long drives waits for a command in its cycle, from the deadline, when it is strict.
 const STRICT_BOUND: Nanoseconds = Nanoseconds(300_000);
@@ -25,8 +29,11 @@ const SLIPPING_BOUND: Nanoseconds = Nanoseconds(100_000_000);
 /// Cycles between two reports.
 const REPORT_INTERVAL: u64 = 100;
 
-/// Cycles after which a service that shall end no longer waits for the axes to rest.
-const LAST_PATIENCE: u64 = 3000;
+/// How long a service that shall end leaves the axes to a live controller.
+const CONTROLLER_PATIENCE: Nanoseconds = Nanoseconds(1_000_000_000);
+
+/// How long a service that shall end waits for the axes to rest.
+const LAST_PATIENCE: Nanoseconds = Nanoseconds(3_000_000_000);
 
 /// How the service runs.
 #[derive(Debug, Clone, Copy)]
@@ -35,53 +42,40 @@ pub struct ServiceOptions {
     pub deadlines: Deadlines,
     /// Real-time set-up of the cycle's thread.
     pub realtime: RealtimeOptions,
-    /// How long before a deadline the thread stops sleeping and spins, 0 to only sleep.
-    pub margin: Nanoseconds,
 }
 
-/// Runs until it is told to end (SIGTERM) or nobody is left to obey; the axes are at rest then.
+/// Runs until it is told to end (SIGTERM) or the supervisor dies; the axes are at rest then.
 ///
 /// # Errors
-/// When a channel fails. The port is dropped, dark and unpowered, before this returns.
+/// When a channel fails, or another pipeline owns the real-time core. The port is unpowered and
+/// dark before this returns.
 pub fn run(
     domain: &Domain,
     port: Box<dyn Port + Send>,
     options: &ServiceOptions,
 ) -> Result<(), ServiceError> {
     let mut cycle = ServiceCycle::open(domain, port, options)?;
+    // What is missing for real time is in the facts; the supervisor says it once for all.
     let realtime = thread::enter_realtime(&options.realtime);
-    let mut clock = PeriodicClock::new(CYCLE_PERIOD, options.margin);
-    let mut patience = LAST_PATIENCE;
-    loop {
-        clock.wait();
-        let vitality = cycle.look_after_peers();
-        cycle.begin(clock.deadline())?;
-        cycle.await_command(vitality)?;
-        cycle.bridge.finish(clock::now());
-
-        let report = cycle.bridge.report(realtime.facts);
-        if report.cycle.0.is_multiple_of(REPORT_INTERVAL) || cycle.has_news(&report) {
-            cycle.publish(&report)?;
-        }
-        if cycle.shall_end(vitality) {
-            patience -= 1;
-            if report.at_rest == 1 || patience == 0 {
-                cycle.publish(&report)?;
-                return Ok(());
-            }
-        }
-        clock.advance();
-        if options.deadlines == Deadlines::Slipping {
-            clock.slip();
-        }
-    }
+    let _core = realtime.claim_core().map_err(std::io::Error::other)?;
+    let result = cycle.keep_running(realtime.spin_margin(), realtime.facts);
+    cycle.bridge.release();
+    result
 }
 
 /// Who is there, as one look at the peers tells.
 #[derive(Debug, Clone, Copy)]
 struct Vitality {
+    planner: PeerState,
     controller: PeerState,
     supervisor: PeerState,
+}
+
+impl Vitality {
+    /// Whether all are known to live. A peer that nobody has seen yet may be dead already.
+    fn is_complete(self) -> bool {
+        [self.planner, self.controller, self.supervisor].iter().all(|s| *s == PeerState::Alive)
+    }
 }
 
 struct ServiceCycle {
@@ -94,6 +88,8 @@ struct ServiceCycle {
     feedback_wake: Notifier,
     command_wake: Listener,
     reported: DrivesReport,
+    /// Since when the service shall end.
+    leaving: Option<Nanoseconds>,
 }
 
 impl ServiceCycle {
@@ -114,21 +110,63 @@ impl ServiceCycle {
             feedback_wake: domain.notifier(Wake::Feedback)?,
             command_wake: domain.listener(Wake::Command)?,
             reported: DrivesReport::default(),
+            leaving: None,
         })
     }
 
-    /// A peer that has died closes the gate at this very deadline; without a controller the axes
-    /// are stopped here, because nobody else can.
+    fn keep_running(
+        &mut self,
+        margin: Nanoseconds,
+        facts: RealtimeFacts,
+    ) -> Result<(), ServiceError> {
+        let mut clock = PeriodicClock::new(CYCLE_PERIOD, margin);
+        loop {
+            clock.wait();
+            let vitality = self.look_after_peers();
+            self.begin(clock.deadline())?;
+            self.await_command(vitality)?;
+            self.bridge.finish(clock::now());
+
+            let report = self.bridge.report(facts);
+            if report.cycle.0.is_multiple_of(REPORT_INTERVAL) || self.has_news(&report) {
+                self.publish(&report)?;
+            }
+            if self.may_end(&report) {
+                return self.publish(&report);
+            }
+            clock.advance();
+            if self.deadlines == Deadlines::Slipping {
+                clock.slip();
+            }
+        }
+    }
+
+    /// A peer that does not live closes the gate at this very deadline, and so does the end of this
+    /// service; without a controller the axes are stopped here, because nobody else can.
     fn look_after_peers(&mut self) -> Vitality {
-        let planner = self.peers.state(Role::Planner);
         let vitality = Vitality {
+            planner: self.peers.state(Role::Planner),
             controller: self.peers.state(Role::Controller),
             supervisor: self.peers.state(Role::Domain),
         };
-        let dead = [planner, vitality.controller, vitality.supervisor].contains(&PeerState::Dead);
-        self.bridge.permit(if dead { GatePermission::Inhibited } else { GatePermission::Granted });
+        let now = clock::now();
+        if signal::termination().is_some() || vitality.supervisor == PeerState::Dead {
+            self.leaving.get_or_insert(now);
+        }
+        let granted = vitality.is_complete() && self.leaving.is_none();
+        self.bridge.permit(if granted {
+            GatePermission::Granted
+        } else {
+            GatePermission::Inhibited
+        });
         if vitality.controller == PeerState::Dead {
-            self.bridge.stop(FaultCode::ControllerLost, clock::now());
+            self.bridge.stop(FaultCode::ControllerLost, now);
+        }
+        let left_alone = self.leaving.is_some_and(|since| now - since > CONTROLLER_PATIENCE);
+        if left_alone {
+            let lost = vitality.supervisor == PeerState::Dead;
+            let cause = if lost { FaultCode::SupervisorLost } else { FaultCode::DrivesLost };
+            self.bridge.stop(cause, now);
         }
         vitality
     }
@@ -143,8 +181,10 @@ impl ServiceCycle {
 
     /// Latches the answer to this cycle's feedback, or lets the bound pass.
     fn await_command(&mut self, vitality: Vitality) -> Result<(), ServiceError> {
-        let patient =
-            self.deadlines == Deadlines::Slipping && vitality.controller == PeerState::Alive;
+        // A controller that is not followed any more is not worth waiting for.
+        let patient = self.deadlines == Deadlines::Slipping
+            && vitality.controller == PeerState::Alive
+            && !self.bridge.feedback().has(status::STOPPED_ALONE);
         let bound = if patient { SLIPPING_BOUND } else { STRICT_BOUND };
         let until = self.bridge.feedback().deadline + bound;
         loop {
@@ -186,9 +226,9 @@ impl ServiceCycle {
         Ok(())
     }
 
-    /// Told to, or left alone: a controller that still lives brings the axes to rest first.
-    fn shall_end(&self, vitality: Vitality) -> bool {
-        signal::termination().is_some()
-            || (vitality.supervisor == PeerState::Dead && vitality.controller != PeerState::Alive)
+    /// Whether it shall end and the axes rest, or will not any more.
+    fn may_end(&self, report: &DrivesReport) -> bool {
+        let waited = self.leaving.map(|since| clock::now() - since);
+        waited.is_some_and(|waited| report.at_rest == 1 || waited > LAST_PATIENCE)
     }
 }

@@ -327,3 +327,36 @@ fn overruns_and_slips_are_counted_once() {
         assert_eq!(run.bridge.feedback().cycle, Cycle(3));
     }
 }
+
+#[test]
+fn a_released_port_is_dark_and_unpowered() {
+    use drives::{Actuation, Measurement, Port};
+    use std::sync::{Arc, Mutex};
+
+    /// Keeps what it is told.
+    struct Listening(Arc<Mutex<Vec<Actuation>>>);
+
+    impl Port for Listening {
+        fn axes(&self) -> usize {
+            2
+        }
+        fn gate_resolution(&self) -> Nanoseconds {
+            Nanoseconds(1)
+        }
+        fn exchange(&mut self, actuation: &Actuation, _: &mut Measurement) {
+            self.0.lock().unwrap().push(*actuation);
+        }
+    }
+
+    let told = Arc::new(Mutex::new(Vec::new()));
+    let options = BridgeOptions { epoch: EPOCH, deadlines: Deadlines::Strict };
+    let bridge = Bridge::new(Box::new(Listening(told.clone())), options);
+    let mut run = Run { bridge, deadline: Nanoseconds(5_000_000_000) };
+    run.answered(CommandMode::Disabled, LaserCycle::OFF);
+    run.answered(CommandMode::Voltage, lit());
+    run.answered(CommandMode::Voltage, lit());
+    let last = *told.lock().unwrap().last().unwrap();
+    assert!(last.mode == CommandMode::Voltage && last.laser.is_lit());
+    run.bridge.release();
+    assert_eq!(told.lock().unwrap().last(), Some(&Actuation::DISABLED));
+}

@@ -8,11 +8,6 @@ use drives::{PlantOptions, SimulatedPlant};
 use runtime::domain::Role;
 use runtime::thread::{CONTROLLER_PRIORITY, DRIVES_PRIORITY};
 use runtime::{Domain, Instance, signal};
-use signals::Nanoseconds;
-
-/// How long before a deadline drives stops sleeping and spins: longer than the timer is usually
-/// late, and too short to starve anybody on its core.
-const SPIN: Nanoseconds = Nanoseconds(0);
 
 /// Runs the service with this role.
 ///
@@ -37,7 +32,6 @@ pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
             let options = drives::service::ServiceOptions {
                 deadlines: configuration.deadlines(),
                 realtime: configuration.realtime_options(DRIVES_PRIORITY),
-                margin: SPIN,
             };
             drives::service::run(&domain, port, &options)
         }
