@@ -11,7 +11,7 @@ use monitor::summary::{ErrorSummary, Outcome, Summary};
 use planner::request::{JobRequest, REFUSAL_FILE, REQUEST_FILE, Refusal};
 use runtime::domain::Role;
 use runtime::signal;
-use signals::{OperatorVerb, PlannerPhase};
+use signals::{FaultCode, OperatorVerb, PlannerPhase};
 use std::time::{Duration, Instant};
 
 /// How long the controller may take to bring the axes to rest and say so.
@@ -147,9 +147,10 @@ impl<'a> JobRun<'a> {
                     return Ok(true);
                 }
                 if let Stage::Ending(since) = self.stage {
-                    let silent = !self.pipeline.has(Role::Controller);
-                    let rest = heard.drives.at_rest == 1 || !self.pipeline.has(Role::Drives);
-                    return Ok((silent && rest) || since.elapsed() > END_PATIENCE);
+                    // Without drives nothing moves, and a controller without feedback says nothing.
+                    let gone = !self.pipeline.has(Role::Drives);
+                    let silent = !self.pipeline.has(Role::Controller) && heard.drives.at_rest == 1;
+                    return Ok(gone || silent || since.elapsed() > END_PATIENCE);
                 }
             }
         }
@@ -198,7 +199,7 @@ impl<'a> JobRun<'a> {
         let message = format!("{ended}: {consequence}");
         eprintln!("graver: {message}");
         match ended.remedy {
-            Remedy::Restarted => self.ending.warnings.push(message),
+            Remedy::Restarted | Remedy::None => self.ending.warnings.push(message),
             Remedy::Stop => self.end_with(message),
         }
     }
@@ -215,6 +216,9 @@ impl<'a> JobRun<'a> {
             }
             Stage::Ready(_) | Stage::Playing if !self.pipeline.has(Role::Controller) => {
                 Some("the controller has ended: laser off, drives stops the axes")
+            }
+            Stage::Ready(_) | Stage::Playing if !self.pipeline.has(Role::Drives) => {
+                Some("drives has ended: start it, reset the fault and submit again")
             }
             _ => None,
         }
@@ -241,13 +245,22 @@ impl<'a> JobRun<'a> {
     }
 
     fn conclude(mut self) -> Result<Summary, Failure> {
-        self.ending.drives = Some(self.pipeline.heard.drives);
-        if self.ending.controller.is_some() {
-            self.await_recording();
-        } else {
+        if self.ending.controller.is_none() {
             self.pipeline.withdraw()?;
         }
-        self.ending.drives = Some(self.pipeline.heard.drives);
+        if self.folder.file(run_folder::SAMPLES).exists() {
+            self.await_recording();
+        }
+        let mut drives = self.pipeline.heard.drives;
+        if self.ending.controller.is_none()
+            && self.ending.error.is_some()
+            && !self.pipeline.has(Role::Drives)
+            && !drives.fault.is_some()
+        {
+            // The dead cannot say it, and a controller without feedback says nothing.
+            drives.fault.code = FaultCode::DrivesLost as u32;
+        }
+        self.ending.drives = Some(drives);
         let machine = self.pipeline.configuration.machine()?;
         let summary = conclusion::conclude(&self.folder, &machine, &self.ending, self.started)
             .map_err(Failure::service)?;

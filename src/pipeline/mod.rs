@@ -232,7 +232,7 @@ impl Pipeline {
     fn look_while_starting(&mut self) -> Result<(), Failure> {
         for ended in self.look()? {
             match ended.remedy {
-                Remedy::Restarted => eprintln!("graver: {ended}"),
+                Remedy::Restarted | Remedy::None => eprintln!("graver: {ended}"),
                 Remedy::Stop => return Err(Failure::service(format!("{ended} while starting"))),
             }
         }
@@ -271,7 +271,7 @@ impl Pipeline {
 
     /// Ends in order: laser, axes, processes. Nothing is left in shared memory afterwards.
     pub fn shut_down(mut self) {
-        if self.has(Role::Controller) {
+        if self.has(Role::Controller) && self.has(Role::Drives) {
             self.ask(OperatorVerb::Stop, 0.0);
             self.wait(|heard| {
                 !matches!(
@@ -288,7 +288,8 @@ impl Pipeline {
     fn wait(&mut self, condition: impl Fn(&Heard) -> bool) {
         let started = Instant::now();
         while !condition(&self.heard) && started.elapsed() < REST_PATIENCE {
-            if self.look().is_err() || !self.has(Role::Controller) {
+            let able = self.has(Role::Controller) && self.has(Role::Drives);
+            if !able || self.look().is_err() {
                 return;
             }
             std::thread::sleep(LOOK);

@@ -32,6 +32,8 @@ pub struct Ended {
 pub enum Remedy {
     /// Started again: nothing depends on it.
     Restarted,
+    /// Nothing: it has been started again before.
+    None,
     /// The machine is stopped.
     Stop,
 }
@@ -41,6 +43,7 @@ impl std::fmt::Display for Ended {
         write!(formatter, "{} (pid {}) {}", self.role, self.pid, self.how)?;
         match self.remedy {
             Remedy::Restarted => write!(formatter, "; started again"),
+            Remedy::None => write!(formatter, " once more; not started again"),
             Remedy::Stop => Ok(()),
         }
     }
@@ -87,13 +90,14 @@ impl Services {
             let pid = child.pid();
             service.child = None;
             domain.clean();
-            let mut remedy = Remedy::Stop;
-            if service.role == Role::Monitor {
-                remedy = Remedy::Restarted;
-                if service.restarts == 0 {
-                    service.restarts = 1;
-                    service.child = Some(spawn(domain, service.role)?);
-                }
+            let remedy = match (service.role, service.restarts) {
+                (Role::Monitor, 0) => Remedy::Restarted,
+                (Role::Monitor, _) => Remedy::None,
+                _ => Remedy::Stop,
+            };
+            if remedy == Remedy::Restarted {
+                service.restarts = 1;
+                service.child = Some(spawn(domain, service.role)?);
             }
             ended.push(Ended { role: service.role, pid, how: describe(status), remedy });
         }
