@@ -276,6 +276,10 @@ fn a_domain_takes_jobs_one_after_another() {
     // A refused job leaves the domain ready for the next one.
     assert_eq!(submit(&job, "third").json(0)["outcome"], "completed");
 
+    let again = place.start(&["controller", "--instance", &name]).wait();
+    assert_eq!(again.code, Some(4));
+    assert!(again.error.contains("already has a controller"), "{}", again.error);
+
     domain.signal(TERMINATE);
     assert_eq!(domain.wait().code, Some(0));
     for process in &started {

@@ -1,0 +1,303 @@
+//! SIGKILL of every process of a pipeline, at seeded moments of a run: the laser is off from the
+//! first deadline of drives after the death, the axes come to rest, the summary says what
+//! happened, nothing is left, and the next start is clean.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use monitor::recording::CycleRecord;
+use runtime::clock;
+use runtime::peer::Peer;
+use serde_json::Value;
+use signals::Nanoseconds;
+use support::{
+    Ended, KILL, PATIENCE, Place, Random, TERMINATE, is_lit, lines, number, service, services,
+};
+
+const RUN: &str = "run";
+
+/// Kills a process; the first instant at which it is known to be dead.
+fn kill(peer: &Peer) -> Nanoseconds {
+    peer.signal(KILL).unwrap();
+    assert!(peer.ended_within(PATIENCE), "pid {} survives", peer.pid());
+    clock::now()
+}
+
+/// Asserts that no cycle that began after `death` had any light, and says how many there were.
+///
+/// A feedback tells of the cycle that ended with it, so the light of the cycle that begins at a
+/// record's deadline stands in the record after it.
+fn assert_dark_since(death: Nanoseconds, records: &[CycleRecord], what: &str) -> usize {
+    let mut since = 0;
+    for pair in records.windows(2) {
+        let [begins, ends] = pair else { continue };
+        if begins.feedback.deadline >= death && ends.feedback.cycle == begins.feedback.cycle.next()
+        {
+            since += 1;
+            let cycle = begins.feedback.cycle.0;
+            assert!(!is_lit(ends), "{what}: lit in cycle {cycle}, {since} after the death");
+        }
+    }
+    since
+}
+
+/// Asserts that a job runs in this place as if nothing had been before, and leaves nothing.
+fn assert_starts_clean(place: &Place) {
+    let job = place.file("next.ngc", &lines(1));
+    let summary = place.run(&job, "next", &[]).wait().json(0);
+    assert_eq!(summary["outcome"], "completed");
+    assert_eq!(summary["marks"]["strokes_lost"], 0);
+    place.assert_nothing_left(&[]);
+}
+
+/// What is left to see after a service was killed in the middle of a run.
+struct Aftermath {
+    place: Place,
+    moment: String,
+    death: Nanoseconds,
+    services: Vec<Peer>,
+    ended: Ended,
+}
+
+/// Runs four lines and kills one service at a moment that `random` chooses.
+fn kill_during_run(role: &str, random: &mut Random) -> Aftermath {
+    let place = Place::new();
+    let job = place.file("lines.ngc", &lines(4));
+    let mut running = place.run(&job, RUN, &[]);
+    let played = 20 + random.below(1400);
+    let status = place.await_played(&mut running, played);
+    let services = services(&status);
+    let death = kill(&service(&status, role));
+    let moment = format!("{role} killed at {} of {}", status["played"], status["samples"]);
+    Aftermath { place, moment, death, services, ended: running.wait() }
+}
+
+impl Aftermath {
+    /// The summary of a run that could not go on, as printed and as kept.
+    fn aborted(&self, role: &str) -> Value {
+        let summary = self.ended.json(4);
+        let what = &self.moment;
+        support::assert_valid("summary", &summary);
+        assert_eq!(self.place.summary(RUN), summary, "{what}");
+        assert_eq!(summary["outcome"], "aborted", "{what}");
+        let message = summary["error"]["message"].as_str().unwrap();
+        assert!(message.contains(role) && message.contains("signal 9"), "{what}: {message}");
+        assert!(self.ended.error.contains(message), "{what}: {}", self.ended.error);
+        if !summary["marks"].is_null() {
+            assert_true_marks(&summary, what);
+        }
+        summary
+    }
+}
+
+/// Asserts that marks of a run that was cut short say that something is missing, and that what was
+/// marked lies where it should.
+fn assert_true_marks(summary: &Value, what: &str) {
+    let marked = number(summary, "/marks/length");
+    let missing = number(summary, "/marks/missing");
+    let length = number(summary, "/job/length");
+    assert!(missing > 1e-3, "{what}: only {missing} m missing");
+    // Each stroke end may be off by the accuracy of a stroke end.
+    let ends = 20e-6 * number(summary, "/job/strokes");
+    assert!((marked + missing - length).abs() <= 2.0 * ends, "{what}: {marked} + {missing}");
+    assert!(number(summary, "/marks/error_max") <= 20e-6, "{what}: {summary:#}");
+    assert_eq!(number(summary, "/marks/stray"), 0.0, "{what}");
+}
+
+#[test]
+fn without_a_planner_the_controller_brings_the_axes_to_rest_in_the_dark() {
+    let mut random = Random(1);
+    for _ in 0..3 {
+        let aftermath = kill_during_run("planner", &mut random);
+        let summary = aftermath.aborted("planner");
+        assert_eq!(summary["fault"]["code"], "planner_lost", "{}", aftermath.moment);
+        let records = aftermath.place.recording(RUN);
+        let since = assert_dark_since(aftermath.death, &records, &aftermath.moment);
+        assert!(since > 5, "{}: recorded only {since} cycles", aftermath.moment);
+        support::assert_ends_dark_and_at_rest(&records, 2);
+        aftermath.place.assert_nothing_left(&aftermath.services);
+        assert_starts_clean(&aftermath.place);
+    }
+}
+
+#[test]
+fn without_a_controller_drives_stops_the_axes_in_the_dark() {
+    let mut random = Random(2);
+    for _ in 0..3 {
+        let aftermath = kill_during_run("controller", &mut random);
+        let summary = aftermath.aborted("controller");
+        assert_eq!(summary["fault"]["code"], "controller_lost", "{}", aftermath.moment);
+        let records = aftermath.place.recording(RUN);
+        let since = assert_dark_since(aftermath.death, &records, &aftermath.moment);
+        assert!(since > 5, "{}: recorded only {since} cycles", aftermath.moment);
+        support::assert_ends_dark_and_at_rest(&records, 2);
+        aftermath.place.assert_nothing_left(&aftermath.services);
+        assert_starts_clean(&aftermath.place);
+    }
+}
+
+#[test]
+fn without_drives_the_simulated_plant_is_gone_and_the_summary_says_so() {
+    let mut random = Random(3);
+    for _ in 0..3 {
+        let aftermath = kill_during_run("drives", &mut random);
+        let summary = aftermath.aborted("drives");
+        assert_eq!(summary["fault"]["code"], "drives_lost", "{}", aftermath.moment);
+        let records = aftermath.place.recording(RUN);
+        assert_dark_since(aftermath.death, &records, &aftermath.moment);
+        aftermath.place.assert_nothing_left(&aftermath.services);
+        assert_starts_clean(&aftermath.place);
+    }
+}
+
+#[test]
+fn without_a_supervisor_the_services_end_and_the_monitor_writes_the_summary() {
+    let mut random = Random(4);
+    for _ in 0..3 {
+        let place = Place::new();
+        let job = place.file("lines.ngc", &lines(4));
+        let mut running = place.run(&job, RUN, &[]);
+        let status = place.await_played(&mut running, 20 + random.below(1400));
+        let what = format!("supervisor killed at {}", status["played"]);
+        let services = services(&status);
+        let death = kill(&running.peer());
+        assert_eq!(running.wait().code, None);
+        place.assert_nothing_left(&services);
+
+        let summary = place.summary(RUN);
+        support::assert_valid("summary", &summary);
+        assert_eq!(summary["outcome"], "aborted", "{what}");
+        let message = summary["error"]["message"].as_str().unwrap();
+        assert!(message.contains("supervisor"), "{what}: {message}");
+        assert_eq!(summary["fault"]["code"], "supervisor_lost", "{what}");
+        if !summary["marks"].is_null() {
+            assert_true_marks(&summary, &what);
+        }
+        let records = place.recording(RUN);
+        let since = assert_dark_since(death, &records, &what);
+        assert!(since > 5, "{what}: recorded only {since} cycles");
+        support::assert_ends_dark_and_at_rest(&records, 2);
+        assert_starts_clean(&place);
+    }
+}
+
+#[test]
+fn without_a_monitor_the_marks_are_unharmed() {
+    let mut random = Random(5);
+    for kills in [1, 1, 2] {
+        let place = Place::new();
+        let job = place.file("lines.ngc", &lines(4));
+        let mut running = place.run(&job, RUN, &[]);
+        let mut played = 20;
+        let mut killed = 0;
+        for _ in 0..kills {
+            played += random.below(600);
+            // The monitor that was started again has another pid.
+            let status = place.await_status(&mut running, "a new monitor", |status| {
+                let pid = status["services"]["monitor"].as_i64();
+                status["played"].as_u64() >= Some(played) && pid.is_some_and(|pid| pid != killed)
+            });
+            let monitor = service(&status, "monitor");
+            killed = i64::from(monitor.pid());
+            kill(&monitor);
+        }
+        let ended = running.wait();
+        let summary = ended.json(0);
+        support::assert_valid("summary", &summary);
+        assert_eq!(summary["outcome"], "completed");
+        let warnings = summary["warnings"].to_string();
+        assert!(warnings.contains("monitor") && warnings.contains("signal 9"), "{warnings}");
+        assert!(ended.error.contains("monitor"), "{}", ended.error);
+        if !summary["marks"].is_null() {
+            // A judgement of the whole job can only be of all its marks.
+            assert!(number(&summary, "/marks/missing") < 1e-4, "{summary:#}");
+            assert!(number(&summary, "/marks/double") < 1e-4, "{summary:#}");
+        }
+        let simulated = place.graver(&["simulate", job.to_str().unwrap(), "--json"]).json(0);
+        assert_eq!(summary["digest"], simulated["digest"]);
+        place.assert_nothing_left(&[]);
+        assert_starts_clean(&place);
+    }
+}
+
+#[test]
+fn a_service_that_dies_while_the_pipeline_starts_is_named() {
+    let mut random = Random(6);
+    for role in ["planner", "controller", "drives"] {
+        let place = Place::new();
+        let job = place.file("lines.ngc", &lines(4));
+        let mut running = place.run(&job, RUN, &[]);
+        let status = place
+            .await_status(&mut running, "a process", |status| status["services"][role].is_number());
+        std::thread::sleep(std::time::Duration::from_millis(random.below(100)));
+        kill(&service(&status, role));
+        let ended = running.wait();
+        let summary = ended.json(4);
+        assert_eq!(summary["outcome"], "aborted", "{role}");
+        let message = summary["error"]["message"].as_str().unwrap();
+        assert!(message.contains(role) && message.contains("signal 9"), "{role}: {message}");
+        place.assert_nothing_left(&[]);
+        assert_starts_clean(&place);
+    }
+}
+
+#[test]
+fn when_all_are_killed_at_once_the_next_start_removes_what_they_left() {
+    let place = Place::new();
+    let job = place.file("lines.ngc", &lines(4));
+    let mut running = place.run(&job, RUN, &[]);
+    let status = place.await_played(&mut running, 300);
+    let mut peers = services(&status);
+    peers.push(running.peer());
+    for peer in &peers {
+        peer.signal(KILL).unwrap();
+    }
+    for peer in &peers {
+        assert!(peer.ended_within(PATIENCE));
+    }
+    assert_eq!(running.wait().code, None);
+    assert_starts_clean(&place);
+}
+
+#[test]
+fn a_domain_goes_on_after_drives_was_started_again_and_the_fault_reset() {
+    let place = Place::new();
+    let name = place.instance().name().to_owned();
+    let mut domain = place.start(&["domain", "--no-realtime", "--instance", &name]);
+    place.await_status(&mut domain, "domain", |_| true);
+    let roles = ["monitor", "planner", "controller", "drives"];
+    let mut started = Vec::from(roles.map(|role| place.start(&[role, "--instance", &name])));
+
+    let job = place.file("lines.ngc", &lines(4));
+    let submit = |out: &str| {
+        let out = place.path(out);
+        let out = out.to_str().unwrap();
+        place.start(&["submit", job.to_str().unwrap(), "--json", "--out", out, "--instance", &name])
+    };
+    let first = submit("first");
+    let status = place.await_played(&mut domain, 300);
+    kill(&service(&status, "drives"));
+    let summary = first.wait().json(4);
+    assert_eq!(summary["outcome"], "aborted");
+    assert_eq!(summary["fault"]["code"], "drives_lost");
+
+    started.push(place.start(&["drives", "--instance", &name]));
+    let faulted = place.await_status(&mut domain, "faulted", |status| status["state"] == "faulted");
+    assert!(faulted["fault"].is_string(), "{faulted}");
+    // A fault is latched until a person resets it.
+    let refused = submit("refused").wait();
+    assert_ne!(refused.code, Some(0), "{}", refused.output);
+    assert_eq!(place.ask(&["reset"]).code, Some(0));
+    let summary = submit("second").wait().json(0);
+    assert_eq!(summary["outcome"], "completed");
+    assert!(number(&summary, "/marks/error_max") < 15e-6, "{summary:#}");
+
+    domain.signal(TERMINATE);
+    assert_eq!(domain.wait().code, Some(0));
+    for process in started {
+        process.signal(TERMINATE);
+        process.wait();
+    }
+    place.assert_nothing_left(&[]);
+}
