@@ -1,13 +1,14 @@
 //! `graver kinematics`: JSON lines in, JSON lines out, in order.
 
+pub mod lines;
+
+use self::lines::{Branch, Ellipse, ErrorBody, Reply, ReplyPose, Request};
 use crate::arguments::{KinematicsArguments, KinematicsVerb};
 use crate::exit::{Exit, Failure};
 use crate::inputs;
 use machine::kinematics::{JointMotion, Joints, KinematicsError};
 use machine::{Machine, Mechanism, MechanismVisitor, Pose};
 use nalgebra::{Matrix2, SMatrix, SymmetricEigen, Vector3};
-use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 use signals::math;
 use std::io::{BufRead, BufWriter, Write};
 
@@ -21,46 +22,6 @@ pub fn run(arguments: &KinematicsArguments) -> Result<Exit, Failure> {
     let output = BufWriter::new(std::io::stdout().lock());
     let mechanism = machine.mechanism.clone();
     mechanism.visit(Lines { machine, arguments, input, output })
-}
-
-/// One line of input; which keys it needs depends on the verb.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Request {
-    q: Option<Vec<f64>>,
-    qd: Option<Vec<f64>>,
-    qdd: Option<Vec<f64>>,
-    pose: Option<RequestPose>,
-    #[serde(default)]
-    previous: Option<Vec<f64>>,
-    #[serde(default)]
-    wrench: Option<Vec<f64>>,
-    #[serde(default)]
-    #[allow(dead_code, reason = "accepted for mechanisms without branches, where it is empty")]
-    branch: Option<serde_json::Map<String, Value>>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RequestPose {
-    position: Vec<f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct ErrorLine {
-    error: ErrorBody,
-}
-
-#[derive(Debug, Serialize)]
-struct ErrorBody {
-    code: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    axis: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    value: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    limit: Option<f64>,
-    detail: String,
 }
 
 struct Lines<'a, I, O> {
@@ -100,11 +61,8 @@ impl<I: BufRead, O: Write> MechanismVisitor for Lines<'_, I, O> {
                 }
             };
             let reply = answer.line(&request, &mut previous);
-            let written = match reply {
-                Ok(value) => serde_json::to_writer(&mut self.output, &value),
-                Err(error) => serde_json::to_writer(&mut self.output, &ErrorLine { error }),
-            };
-            written.map_err(Failure::service)?;
+            let reply = reply.unwrap_or_else(|error| Reply::Error { error });
+            serde_json::to_writer(&mut self.output, &reply).map_err(Failure::service)?;
             self.output.write_all(b"\n").map_err(Failure::service)?;
         }
         self.output.flush().map_err(Failure::service)?;
@@ -119,7 +77,7 @@ struct Answer<'a, const N: usize, M> {
 }
 
 impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
-    fn line(&self, request: &Request, previous: &mut Joints<N>) -> Result<Value, ErrorBody> {
+    fn line(&self, request: &Request, previous: &mut Joints<N>) -> Result<Reply, ErrorBody> {
         match self.arguments.verb {
             KinematicsVerb::Forward => self.forward(request),
             KinematicsVerb::Inverse => self.inverse(request, previous),
@@ -141,7 +99,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     fn joints(&self, key: &str, values: Option<&Vec<f64>>) -> Result<Joints<N>, ErrorBody> {
         let values = values.ok_or_else(|| missing(key))?;
         if values.len() != N {
-            return Err(bad(format!(
+            return Err(ErrorBody::bad_request(format!(
                 "\"{key}\" has {} values, the machine {N} axes",
                 values.len()
             )));
@@ -149,21 +107,22 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         Ok(Joints::<N>::from_fn(|axis, _| values[axis]).component_mul(&self.ratios()))
     }
 
-    fn forward(&self, request: &Request) -> Result<Value, ErrorBody> {
+    fn forward(&self, request: &Request) -> Result<Reply, ErrorBody> {
         let q = self.joints("q", request.q.as_ref())?;
         self.check_limits(&q)?;
         let pose = self
             .mechanism
             .forward(&q, M::Branch::default())
             .map_err(|error| self.kinematics_error(&error))?;
-        Ok(json!({ "pose": { "position": self.shown(&pose.position) }, "branch": {} }))
+        let pose = ReplyPose { position: self.shown(&pose.position) };
+        Ok(Reply::Forward { pose, branch: Branch::new() })
     }
 
-    fn inverse(&self, request: &Request, previous: &mut Joints<N>) -> Result<Value, ErrorBody> {
+    fn inverse(&self, request: &Request, previous: &mut Joints<N>) -> Result<Reply, ErrorBody> {
         let pose = request.pose.as_ref().ok_or_else(|| missing("pose"))?;
         let shown = self.dimensions();
         if pose.position.len() < shown || pose.position.len() > 3 {
-            return Err(bad(format!(
+            return Err(ErrorBody::bad_request(format!(
                 "\"position\" has {} values, the tool moves in {shown}",
                 pose.position.len()
             )));
@@ -179,18 +138,18 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
             .map_err(|error| self.kinematics_error(&error))?;
         self.check_limits(&q)?;
         *previous = q;
-        let margin: serde_json::Map<String, Value> = self
+        let margin = self
             .machine
             .axes
             .iter()
             .zip(q.iter())
             .map(|(axis, value)| {
                 let [lower, upper] = axis.limits.position;
-                (axis.name.clone(), json!((value - lower).min(upper - value)))
+                (axis.name.clone(), (value - lower).min(upper - value))
             })
             .collect();
         let shown = q.component_div(&self.ratios());
-        Ok(json!({ "q": shown.as_slice(), "branch": {}, "margin": margin }))
+        Ok(Reply::Inverse { q: shown.as_slice().to_vec(), branch: Branch::new(), margin })
     }
 
     /// Tool velocity per joint rate, in the directions in which the tool moves.
@@ -202,7 +161,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         jacobian
     }
 
-    fn jacobian(&self, request: &Request) -> Result<Value, ErrorBody> {
+    fn jacobian(&self, request: &Request) -> Result<Reply, ErrorBody> {
         let q = self.joints("q", request.q.as_ref())?;
         let jacobian = self.tool_jacobian(&q);
         let square = SMatrix::<f64, N, N>::from_fn(|row, column| jacobian[(row, column)]);
@@ -212,10 +171,10 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         let determinant = dynamic.clone().lu().determinant();
         let mut singular: Vec<f64> = dynamic.singular_values().iter().copied().collect();
         singular.sort_by(|a, b| b.total_cmp(a));
-        Ok(json!({ "j": rows, "det": determinant, "singular_values": singular }))
+        Ok(Reply::Jacobian { j: rows, det: determinant, singular_values: singular })
     }
 
-    fn dynamics(&self, request: &Request) -> Result<Value, ErrorBody> {
+    fn dynamics(&self, request: &Request) -> Result<Reply, ErrorBody> {
         let position = self.joints("q", request.q.as_ref())?;
         let velocity = self.joints("qd", request.qd.as_ref())?;
         let acceleration = self.joints("qdd", request.qdd.as_ref())?;
@@ -223,7 +182,10 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         let mut effort = self.mechanism.inverse_dynamics(&motion, M::Branch::default());
         if let Some(wrench) = &request.wrench {
             if wrench.len() > 6 {
-                return Err(bad(format!("\"wrench\" has {} values, at most 6", wrench.len())));
+                return Err(ErrorBody::bad_request(format!(
+                    "\"wrench\" has {} values, at most 6",
+                    wrench.len()
+                )));
             }
             // The tool pushes on the work with this wrench: virtual work gives Jᵀ·w at the joints.
             let wrench =
@@ -238,10 +200,10 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
                 *value += settings.motor.rotor_inertia * acceleration[axis] / settings.ratio;
             }
         }
-        Ok(json!({ "effort": shown.as_slice() }))
+        Ok(Reply::Dynamics { effort: shown.as_slice().to_vec() })
     }
 
-    fn ellipse(&self, request: &Request) -> Result<Value, ErrorBody> {
+    fn ellipse(&self, request: &Request) -> Result<Reply, ErrorBody> {
         let q = self.joints("q", request.q.as_ref())?;
         let jacobian = self.tool_jacobian(&q);
         let plane = jacobian.fixed_view::<2, N>(0, 0);
@@ -259,10 +221,10 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         // Kinetostatic duality (source 003 eq. 5.13, 5.14): the force ellipse is the inverse one.
         let right = core::f64::consts::FRAC_PI_2;
         let turned = if angle > 0.0 { angle - right } else { angle + right };
-        Ok(json!({
-            "velocity": { "axes": axes, "angle": angle },
-            "force": { "axes": [1.0 / axes[1], 1.0 / axes[0]], "angle": turned },
-        }))
+        Ok(Reply::Ellipse {
+            velocity: Ellipse { axes, angle },
+            force: Ellipse { axes: [1.0 / axes[1], 1.0 / axes[0]], angle: turned },
+        })
     }
 
     fn dimensions(&self) -> usize {
@@ -325,9 +287,5 @@ fn principal_axes(matrix: Matrix2<f64>) -> ([f64; 2], f64) {
 }
 
 fn missing(key: &str) -> ErrorBody {
-    bad(format!("\"{key}\" is missing"))
-}
-
-fn bad(detail: String) -> ErrorBody {
-    ErrorBody { code: "bad_request".into(), axis: None, value: None, limit: None, detail }
+    ErrorBody::bad_request(format!("\"{key}\" is missing"))
 }

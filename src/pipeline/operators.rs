@@ -60,6 +60,17 @@ pub enum Verb {
     Override,
 }
 
+/// The controller's answer to a verb, as `graver hold --json` and its like print it.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct VerbReply {
+    /// Whether it is carried out; otherwise the state does not allow it.
+    pub accepted: bool,
+    /// The state that the request met.
+    pub state: String,
+    /// The rate now wanted, 1 as planned.
+    pub value: f64,
+}
+
 impl From<Verb> for OperatorVerb {
     fn from(verb: Verb) -> Self {
         match verb {
@@ -142,10 +153,10 @@ fn answer(
     match request {
         Request::Status => json!(board.read()),
         Request::Verb { verb, value } => match link.request(verb.into(), value) {
-            Ok(reply) => json!({
-                "accepted": reply.accepted == 1,
-                "state": ControllerState::from_wire(reply.state).name(),
-                "value": reply.value,
+            Ok(reply) => json!(VerbReply {
+                accepted: reply.accepted == 1,
+                state: ControllerState::from_wire(reply.state).name().to_owned(),
+                value: reply.value,
             }),
             Err(error) => json!({ "error": error.to_string() }),
         },
