@@ -1,0 +1,116 @@
+//! Every JSON object that a command prints has a committed schema, generated from its type, and
+//! what is really printed is valid against it.
+//!
+//! `GRAVER_WRITE_SCHEMA=1 cargo test --test schemas` writes the schemas anew.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use graver::commands::bench::{LatencyReport, SpeedReport};
+use graver::commands::check::CheckReport;
+use graver::commands::kinematics::lines::Reply;
+use graver::commands::plan::PlanReport;
+use graver::pipeline::operators::VerbReply;
+use graver::pipeline::status::Status;
+use monitor::summary::Summary;
+use schemars::{Schema, schema_for};
+use support::{Place, assert_valid, lines};
+
+/// The schemas by the name of their file.
+fn schemas() -> [(&'static str, Schema); 8] {
+    [
+        ("check", schema_for!(CheckReport)),
+        ("kinematics", schema_for!(Reply)),
+        ("latency", schema_for!(LatencyReport)),
+        ("plan", schema_for!(PlanReport)),
+        ("reply", schema_for!(VerbReply)),
+        ("speed", schema_for!(SpeedReport)),
+        ("status", schema_for!(Status)),
+        ("summary", schema_for!(Summary)),
+    ]
+}
+
+#[test]
+fn the_committed_schemas_are_the_generated_ones() {
+    for (name, schema) in schemas() {
+        let path = support::source("docs/schema").join(format!("{name}.json"));
+        let generated = serde_json::to_string_pretty(&schema).unwrap() + "\n";
+        if std::env::var_os("GRAVER_WRITE_SCHEMA").is_some() {
+            std::fs::write(&path, &generated).unwrap();
+        }
+        let committed = std::fs::read_to_string(&path).unwrap_or_default();
+        assert_eq!(committed, generated, "{name}: write it anew with GRAVER_WRITE_SCHEMA=1");
+    }
+}
+
+#[test]
+fn a_schema_refuses_what_it_does_not_describe() {
+    for (name, schema) in schemas() {
+        let validator = jsonschema::validator_for(schema.as_value()).unwrap();
+        for value in [serde_json::json!({}), serde_json::json!([]), serde_json::json!(null)] {
+            assert!(!validator.is_valid(&value), "{name} allows {value}");
+        }
+    }
+}
+
+#[test]
+fn plan_and_check_print_what_their_schemas_say() {
+    let place = Place::new();
+    let job = place.file("lines.ngc", &lines(1));
+    let job = job.to_str().unwrap();
+    for machine in ["cartesian", "corexy"] {
+        let machine = support::source("machines").join(format!("{machine}.toml"));
+        let machine = machine.to_str().unwrap();
+        let graver = |command: &str, more: &[&str]| {
+            let mut arguments = vec![command, "--machine", machine, "--json"];
+            arguments.extend(more);
+            place.graver(&arguments).json(0)
+        };
+        assert_valid("plan", &graver("plan", &[job]));
+        assert_valid("plan", &graver("plan", &["--set", "letters.text=S"]));
+        assert_valid("check", &graver("check", &[job]));
+        let check = graver("check", &[]);
+        assert_valid("check", &check);
+        // The motor's table contradicts itself: source 003 table 3-3.
+        assert!(!check["warnings"].as_array().unwrap().is_empty(), "{check:#}");
+        assert_valid("summary", &graver("simulate", &[job]));
+    }
+    // Also when it fails, there is one object on standard output, a summary.
+    for command in ["plan", "check", "simulate", "run"] {
+        let refused = place.graver(&[command, "nowhere.ngc", "--json"]).json(2);
+        assert_valid("summary", &refused);
+        assert_eq!(refused["outcome"], "refused");
+        assert!(refused["error"]["message"].as_str().unwrap().contains("nowhere.ngc"));
+    }
+}
+
+#[test]
+fn benchmarks_print_what_their_schemas_say() {
+    let place = Place::new();
+    let job = place.file("lines.ngc", &lines(1));
+    for what in ["plan", "simulate"] {
+        let arguments = ["bench", what, job.to_str().unwrap(), "--seconds", "0.05", "--json"];
+        assert_valid("speed", &place.graver(&arguments).json(0));
+    }
+    let arguments = ["bench", "latency", "--seconds", "0.3", "--no-realtime", "--json"];
+    let latency = place.graver(&arguments).json(0);
+    assert_valid("latency", &latency);
+    assert!(latency["cycles"].as_u64().unwrap() > 0, "{latency:#}");
+}
+
+#[test]
+fn operators_are_told_what_the_schemas_say() {
+    let place = Place::new();
+    let job = place.file("lines.ngc", &lines(3));
+    let mut running = place.run(&job, "run", &[]);
+    place.await_played(&mut running, 50);
+    assert_valid("status", &place.ask(&["status", "--json"]).json(0));
+    assert_valid("reply", &place.ask(&["override", "150 %", "--json"]).json(0));
+    assert_valid("reply", &place.ask(&["reset", "--json"]).json(1));
+    assert_valid("reply", &place.ask(&["hold", "--json"]).json(0));
+    assert_valid("status", &place.ask(&["status", "--json"]).json(0));
+    assert_valid("reply", &place.ask(&["stop", "--json"]).json(0));
+    assert_valid("summary", &running.wait().json(1));
+    place.assert_nothing_left(&[]);
+}
