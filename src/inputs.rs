@@ -31,8 +31,7 @@ pub fn machine(arguments: &MachineArguments) -> Result<MachineInput, Failure> {
     let plant = if sorted.plant.is_empty() {
         machine.clone()
     } else {
-        let both: Vec<Override> = sorted.machine.iter().chain(&sorted.plant).cloned().collect();
-        load(file, &both)?
+        Machine::simulated(file, &sorted.machine, &sorted.plant)?
     };
     let folder = file.and_then(Path::parent).map(Path::to_owned);
     Ok(MachineInput { machine, plant, folder, job_overrides: sorted.job })

@@ -8,6 +8,12 @@ use crate::limits::{PathLimits, WorkArea};
 use crate::mechanisms::MechanismKind;
 use crate::process::{GcodeSettings, LaserSource};
 
+/// The built-in machine's file.
+pub(crate) const BUILTIN: &str = include_str!("../../machines/corexy.toml");
+
+/// Its name in errors.
+pub(crate) const BUILTIN_NAME: &str = "machines/corexy.toml";
+
 /// Everything that a machine file says, in SI units and free of contradictions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
@@ -61,7 +67,6 @@ impl Machine {
     /// # Errors
     /// Everything in the overrides that is not sound.
     pub fn builtin_with(overrides: &[Override]) -> Result<Self, DocumentError> {
-        let text = include_str!("../../machines/corexy.toml");
-        Self::parse("machines/corexy.toml", text, overrides)
+        Self::parse(BUILTIN_NAME, BUILTIN, overrides)
     }
 }

@@ -14,6 +14,9 @@ use crate::machine::Machine;
 /// What stands before a machine's keys in `--set machine.KEY=VALUE`.
 const PREFIX: &str = "machine.";
 
+/// What stands before the keys that are other in the simulated plant, `--set plant.KEY=VALUE`.
+const PLANT_PREFIX: &str = "plant.";
+
 impl Machine {
     /// Reads the machine file at `path`, with `overrides` laid over it.
     ///
@@ -21,6 +24,25 @@ impl Machine {
     /// Everything in the file or the overrides that is not sound, with its place.
     pub fn load(path: &Path, overrides: &[Override]) -> Result<Self, DocumentError> {
         validate::machine(Document::read(path)?.override_with(overrides, PREFIX)?)
+    }
+
+    /// The machine that is simulated where it differs from the one that is controlled: the machine
+    /// file at `path`, or the built-in one, with `overrides` and then those of the `plant` alone
+    /// laid over it.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn simulated(
+        path: Option<&Path>,
+        overrides: &[Override],
+        plant: &[Override],
+    ) -> Result<Self, DocumentError> {
+        let document = match path {
+            Some(path) => Document::read(path)?,
+            None => Document::parse(crate::machine::BUILTIN_NAME, crate::machine::BUILTIN)?,
+        };
+        let document = document.override_with(overrides, PREFIX)?;
+        validate::machine(document.override_with(plant, PLANT_PREFIX)?)
     }
 
     /// Reads a machine file from `text`; `file` is its name in errors.
