@@ -6,7 +6,12 @@
 //!
 //! With the numbers below a hold from rate 1 takes 0.1 s + 0.032 s. At 0.25 m/s it adds at most
 //! 2.5 m/s² along the path. Where the plan brakes at its limit of 10 m/s² already, the sum peaks
-//! 5 % above it, because the share of the plan falls with the square of the rate.
+//! 5 % above it, because the share of the plan falls with the square of the rate. To the jerk it
+//! adds `3·a·r·ṙ + v·r̈`, at most 300 and 78 m/s³ of the planner's 500. A machine with faster rapids
+//! gets more of both, in proportion to their speed.
+//!
+//! Overrides change the rate five times as gently: 0.5 m/s² and 60 + 16 m/s³. Above the planned rate
+//! there is room for that inside the limits; see [`rate_limit`](crate::rate_limit).
 
 use crate::rate_limit::LARGEST_RATE;
 use crate::stream_time::{FRACTION_BITS, StreamTime};
