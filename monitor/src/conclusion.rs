@@ -28,6 +28,9 @@ pub const LIGHT_LAG: u64 = 2;
 /// Name of the [`WatchNote`] in a run folder.
 pub const WATCH_FILE: &str = "monitor.json";
 
+/// Cycles that the controller counts beyond a stream's setpoints: the one that finds it at rest.
+const END_CYCLES: u64 = 1;
+
 /// What the monitor service notes when a recording is complete.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WatchNote {
@@ -134,7 +137,7 @@ pub fn summarise(
         summary.take_controller(report);
         summary.time = if report.completed == 1 {
             // What the stream took beyond its plan was holds and overrides.
-            let beyond = (report.cycles as f64 - plan.samples as f64) * CYCLE_TIME;
+            let beyond = (report.cycles as f64 - (plan.samples + END_CYCLES) as f64) * CYCLE_TIME;
             (plan.duration + beyond).max(0.0)
         } else {
             report.cycles as f64 * CYCLE_TIME

@@ -65,7 +65,7 @@ fn plan() -> PlanNote {
         strokes: 1,
         length: LENGTH,
         duration: 0.08,
-        samples: 100,
+        samples: 99,
         notes: vec![
             PlanRemark { line: 0, text: "everywhere".into() },
             PlanRemark { line: 7, text: "here".into() },
@@ -223,7 +223,7 @@ fn folder(below: &tempfile::TempDir, records: &[CycleRecord]) -> RunFolder {
     folder.write(run_folder::ARTWORK, serde_json::to_vec(&artwork()).unwrap()).unwrap();
     // The planner says more than a summary repeats.
     let plan = r#"{
-        "name": "line", "strokes": 1, "length": 0.02, "duration": 0.08, "samples": 100,
+        "name": "line", "strokes": 1, "length": 0.02, "duration": 0.08, "samples": 99,
         "speed": 0.25, "notes": [{"line": 7, "text": "here"}], "uses": {"path_speed": 0.5}
     }"#;
     folder.write(run_folder::PLAN, plan).unwrap();
