@@ -81,6 +81,7 @@ fn the_default_job_marks_what_simulate_marks() {
     assert_whole(&summary, 20e-6);
     assert_eq!(number(&summary, "/job/length"), number(&simulated, "/job/length"));
     assert_eq!(summary["limits"], simulated["limits"]);
+    assert_eq!((&summary["time"], &summary["cycles"]), (&simulated["time"], &simulated["cycles"]));
     let hops: Vec<_> = summary["latency"].as_object().unwrap().keys().cloned().collect();
     let expected = ["command", "compute", "exchange", "feedback", "loop", "setpoint", "wake"];
     assert_eq!(hops, expected);

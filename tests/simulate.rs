@@ -224,3 +224,17 @@ fn a_plant_that_differs_from_the_machine_file_is_marked_worse() {
         assert_eq!(other.report.digest, nominal.report.digest, "{name}, {change}");
     }
 }
+
+#[test]
+fn the_command_tells_the_planned_time_and_how_fast_it_went() {
+    let place = support::Place::new();
+    for set in ["letters.text=N", "letters.style=h1"] {
+        let planned = place.graver(&["plan", "--json", "--set", set]).json(0);
+        let summary = place.graver(&["simulate", "--json", "--set", set]).json(0);
+        let (planned, simulated) =
+            (support::number(&planned, "/time"), support::number(&summary, "/time"));
+        assert!((simulated - planned).abs() < 1e-9, "{set}: {simulated} s, planned {planned} s");
+        assert!(support::number(&summary, "/realtime_factor") > 0.0);
+        assert_eq!(summary["out"], serde_json::Value::Null);
+    }
+}
