@@ -13,6 +13,7 @@
 use crate::cascade::Reference;
 use crate::lookahead::Lookahead;
 use crate::player::Instant;
+use crate::winding::Winding;
 use machine::{Axis, Machine};
 use signals::time::CYCLE_TIME;
 use signals::{AxisArray, MAX_AXES};
@@ -49,6 +50,7 @@ pub struct Target {
 #[derive(Debug, Clone)]
 pub struct Feedforward {
     axes: Vec<Axis>,
+    windings: Vec<Winding>,
     before: Planned,
     now: Planned,
     next: Planned,
@@ -61,6 +63,7 @@ impl Feedforward {
         let resting = Planned { tool: machine.home, ..Planned::default() };
         Self {
             axes: machine.axes.clone(),
+            windings: machine.axes.iter().map(Winding::new).collect(),
             before: resting,
             now: resting,
             next: resting,
@@ -82,10 +85,20 @@ impl Feedforward {
     pub fn rest_at(&mut self, angle: &AxisArray, tool: [f64; 3]) {
         let resting = Planned { angle: *angle, tool, ..Planned::default() };
         (self.before, self.now, self.next, self.after) = (resting, resting, resting, resting);
+        self.windings.iter_mut().for_each(Winding::rest);
     }
 
     /// Goes on by one cycle, to `planned` at its end.
     pub fn advance(&mut self, planned: Planned) {
+        for (index, axis) in self.axes.iter().enumerate() {
+            let voltage = self.voltage(index, axis);
+            let Self { next, after, windings, .. } = self;
+            windings[index].advance(
+                voltage,
+                (after.angle[index] - next.angle[index]) / CYCLE_TIME,
+                after.speed[index] - next.speed[index],
+            );
+        }
         (self.before, self.now, self.next, self.after) = (self.now, self.next, self.after, planned);
     }
 
@@ -159,6 +172,16 @@ impl Feedforward {
 
     /// References and voltage for the axis with this index.
     pub fn reference(&self, index: usize, axis: &Axis) -> Reference {
+        Reference {
+            position: self.now.angle[index],
+            velocity: (self.now.angle[index] - self.before.angle[index]) / CYCLE_TIME,
+            current: self.windings[index].now(),
+            voltage: self.voltage(index, axis),
+        }
+    }
+
+    /// The voltage over the cycle in which the command acts.
+    fn voltage(&self, index: usize, axis: &Axis) -> f64 {
         let motor = &axis.motor;
         let friction = axis.friction.coulomb / motor.torque_constant;
         let current = |planned: &Planned| planned.torque[index] / motor.torque_constant;
@@ -167,14 +190,9 @@ impl Feedforward {
         let mean_current = (first + last) / 2.0 + friction * mean;
         let current_change = last - first + friction * (to - from);
         let angle_change = self.after.angle[index] - self.next.angle[index];
-        Reference {
-            position: self.now.angle[index],
-            velocity: (self.now.angle[index] - self.before.angle[index]) / CYCLE_TIME,
-            current: current(&self.now) + friction * direction(self.now.speed[index]),
-            voltage: motor.resistance * mean_current
-                + motor.inductance * current_change / CYCLE_TIME
-                + motor.torque_constant * angle_change / CYCLE_TIME,
-        }
+        motor.resistance * mean_current
+            + motor.inductance * current_change / CYCLE_TIME
+            + motor.torque_constant * angle_change / CYCLE_TIME
     }
 
     /// Targets for the axis with this index.

@@ -21,6 +21,7 @@ mod state;
 pub mod statistics;
 pub mod stream_time;
 pub mod supervision;
+mod winding;
 
 pub use controller::Controller;
 pub use exchange::{Inputs, Outputs, Peers, Presence};

@@ -1,0 +1,96 @@
+//! What the feedforward voltage makes of a winding's current by the instants of measurement.
+
+use machine::{Axis, DcMotor};
+use signals::math;
+use signals::time::CYCLE_TIME;
+
+/// The current that the feedforward voltage alone drives through one winding.
+///
+/// The voltage is even over a cycle, the back-EMF is not: at the end of a cycle, when the current is
+/// measured, it is off the planned one although its mean is right. Against the planned current the
+/// loop would correct what is no error, which cost 5 µm at the tool.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Winding {
+    /// Current at the measurement, and a cycle later [A].
+    now: f64,
+    next: f64,
+    /// What is left of a current after a cycle [1].
+    keep: f64,
+    /// Current per volt over a cycle [A/V].
+    per_volt: f64,
+    /// Current per change of speed over a cycle [A·s/rad].
+    per_change: f64,
+    torque_constant: f64,
+}
+
+impl Winding {
+    /// Of this axis, without current.
+    pub(crate) fn new(axis: &Axis) -> Self {
+        let DcMotor { resistance, inductance, torque_constant, .. } = axis.motor;
+        let time = inductance / resistance;
+        let keep = math::exp(-CYCLE_TIME / time);
+        // L·i′ + R·i = v − k·ω with ω = ω̄ + Δω·(t − T/2)/T, solved over one cycle.
+        let tilt =
+            CYCLE_TIME / 2.0 * time * (1.0 - keep) - time * (time - keep * (time + CYCLE_TIME));
+        Self {
+            now: 0.0,
+            next: 0.0,
+            keep,
+            per_volt: (1.0 - keep) / resistance,
+            per_change: -torque_constant * tilt / (inductance * CYCLE_TIME),
+            torque_constant,
+        }
+    }
+
+    /// Without current from now on.
+    pub(crate) fn rest(&mut self) {
+        (self.now, self.next) = (0.0, 0.0);
+    }
+
+    /// Current at the measurement [A].
+    pub(crate) fn now(&self) -> f64 {
+        self.now
+    }
+
+    /// Goes on by the cycle after the newest one, with an even `voltage` [V] and a mean `speed` that
+    /// changes evenly by `change` [rad/s].
+    pub(crate) fn advance(&mut self, voltage: f64, speed: f64, change: f64) {
+        let after = self.keep * self.next
+            + self.per_volt * (voltage - self.torque_constant * speed)
+            + self.per_change * change;
+        (self.now, self.next) = (self.next, after);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use machine::Machine;
+
+    #[test]
+    fn the_winding_is_the_exact_answer_to_an_even_voltage_and_a_tilted_speed() {
+        let machine = Machine::builtin();
+        let axis = &machine.axes[0];
+        let DcMotor { resistance, inductance, torque_constant, .. } = axis.motor;
+        let mut winding = Winding::new(axis);
+        let (mut current, mut speed) = (0.0, 0.0);
+        for cycle in 0..50 {
+            let (voltage, change) = (f64::from(cycle % 7) - 2.0, f64::from(cycle % 5) * 4.0 - 7.0);
+            winding.advance(voltage, speed + change / 2.0, change);
+            // Midpoint rule with 0.1 µs: its error is below 1e-8 of the current.
+            let steps = 10_000;
+            let step = CYCLE_TIME / f64::from(steps);
+            for index in 0..steps {
+                let slope = |current: f64, share: f64| {
+                    let emf = torque_constant * (speed + change * share);
+                    (voltage - resistance * current - emf) / inductance
+                };
+                let share = f64::from(index) / f64::from(steps);
+                let half = current + slope(current, share) * step / 2.0;
+                current += slope(half, share + 0.5 / f64::from(steps)) * step;
+            }
+            speed += change;
+            assert!((winding.next - current).abs() < 1e-7, "{cycle}: {} {current}", winding.next);
+        }
+    }
+}
