@@ -136,10 +136,10 @@ impl<'a> JobRun<'a> {
                 if !recorded {
                     self.ending.warnings.push("the monitor is not recording this job".into());
                 }
+                self.stage = Stage::Playing;
                 if !self.pipeline.ask(OperatorVerb::Start, self.stream as f64) {
                     self.end_with("the controller refused to start the job".into());
                 }
-                self.stage = Stage::Playing;
             }
             Stage::Playing | Stage::Ending(_) => {
                 if let Some(report) = report {
