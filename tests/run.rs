@@ -165,11 +165,11 @@ fn a_hold_and_a_resume_lose_and_double_no_mark() {
     for _ in 0..3 {
         played += 150 + random.below(300);
         place.await_played(&mut running, played);
-        assert_eq!(place.ask(&["hold"]).code, Some(0));
+        place.ask(&["hold"]).accepted();
         let held = place.await_status(&mut running, "at rest", |status| {
             status["state"] == "holding" && status["rate"].as_f64() == Some(0.0)
         });
-        assert_eq!(place.ask(&["resume"]).code, Some(0));
+        place.ask(&["resume"]).accepted();
         played = played.max(held["played"].as_u64().unwrap());
     }
     let summary = running.wait().json(0);
@@ -219,7 +219,7 @@ fn stop_gives_the_job_up_and_status_tells_all_along() {
     for verb in ["enable", "disable", "reset", "resume"] {
         assert_eq!(place.ask(&[verb]).code, Some(1), "{verb}");
     }
-    assert_eq!(place.ask(&["stop"]).code, Some(0));
+    place.ask(&["stop"]).accepted();
     let summary = running.wait().json(1);
     assert_eq!(summary["outcome"], "stopped");
     support::assert_ends_dark_and_at_rest(&place.recording("run"), 2);
@@ -235,7 +235,7 @@ fn a_program_pauses_until_a_person_resumes() {
     place.await_status(&mut running, "paused", |status| {
         status["state"] == "holding" && status["rate"].as_f64() == Some(0.0)
     });
-    assert_eq!(place.ask(&["resume"]).code, Some(0));
+    place.ask(&["resume"]).accepted();
     let summary = running.wait().json(0);
     assert_eq!(summary["outcome"], "completed");
     assert_eq!(number(&summary, "/job/strokes"), 2.0);

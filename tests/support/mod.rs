@@ -296,6 +296,11 @@ pub(crate) struct Ended {
 }
 
 impl Ended {
+    /// Asserts that it did what it was asked.
+    pub(crate) fn accepted(&self) {
+        assert_eq!(self.code, Some(0), "{}", self.error);
+    }
+
     /// Asserts the exit code, and gives the JSON object on standard output.
     pub(crate) fn json(&self, code: i32) -> Value {
         assert_eq!(self.code, Some(code), "{}\n{}", self.error, self.output);
