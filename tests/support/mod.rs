@@ -214,6 +214,15 @@ impl Place {
     }
 }
 
+impl Drop for Place {
+    fn drop(&mut self) {
+        // A test that failed half-way was killed half-way too: its own remains go with it.
+        for path in self.left() {
+            let _ = std::fs::remove_file(&path);
+        }
+    }
+}
+
 /// The service of this name in a status.
 pub(crate) fn service(status: &Value, name: &str) -> Peer {
     let pid = status["services"][name].as_i64().unwrap_or_else(|| panic!("no {name}: {status}"));
