@@ -22,8 +22,9 @@ const STREAM: u64 = 1;
 /// Setpoints handed over in one cycle at most, as the controller service does.
 const DRAIN: usize = 16;
 
-/// Cycles stepped between two visits of whoever examines the records.
-const CHUNK: usize = 4096;
+/// Cycles stepped between two visits of whoever examines the records: few enough for the records to
+/// stay in the cache.
+const CHUNK: usize = 256;
 
 /// Cycles after the stream's end in which its last light is still told.
 const LIGHT_LAG: usize = monitor::conclusion::LIGHT_LAG as usize + 1;
