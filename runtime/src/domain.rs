@@ -29,11 +29,11 @@ use crate::peer::Peer;
 use crate::wake::{self, Listener, Notifier, Wake};
 
 /// How long a service waits for its domain to appear: units start at the same time.
-pub const JOIN_PATIENCE: Duration = Duration::from_secs(3);
+pub const JOIN_PATIENCE: Duration = Duration::from_secs(10);
 
 /// How long creating a node may take; on a half-made management segment iceoryx2 would loop for
 /// ever.
-const NODE_PATIENCE: Duration = Duration::from_secs(3);
+const NODE_PATIENCE: Duration = Duration::from_secs(10);
 
 /// What a process is in its domain; each named role exists once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -27,7 +27,7 @@ use crate::domain::{Domain, DomainError, Entry};
 const SERVICE: &str = "operator-requests";
 
 /// How long a request may take without another word, the controller's cycles included.
-pub const PATIENCE: Duration = Duration::from_millis(500);
+pub const PATIENCE: Duration = Duration::from_secs(2);
 
 /// How often the controller's thread looks for requests: a person does not feel it.
 const LOOK_PERIOD: Duration = Duration::from_millis(5);

@@ -11,17 +11,17 @@ use monitor::summary::{ErrorSummary, Outcome, Summary};
 use planner::request::{JobRequest, REFUSAL_FILE, REQUEST_FILE, Refusal};
 use runtime::domain::Role;
 use runtime::signal;
-use signals::{FaultCode, OperatorVerb, PlannerPhase};
+use signals::{DrivesReport, FaultCode, OperatorVerb, PlannerPhase};
 use std::time::{Duration, Instant};
 
 /// How long the controller may take to bring the axes to rest and say so.
-const END_PATIENCE: Duration = Duration::from_secs(5);
+const END_PATIENCE: Duration = Duration::from_secs(10);
 
 /// How long the monitor may take to open its recording: without it the job runs unrecorded.
 const RECORDING_PATIENCE: Duration = Duration::from_secs(2);
 
 /// How long the monitor may take to complete its recording.
-const WATCH_PATIENCE: Duration = Duration::from_secs(5);
+const WATCH_PATIENCE: Duration = Duration::from_secs(10);
 
 /// How far a job has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,7 +62,16 @@ impl<'a> JobRun<'a> {
     ) -> Result<Self, Failure> {
         let request = serde_json::to_vec_pretty(job).map_err(Failure::service)?;
         folder.write(REQUEST_FILE, request).map_err(Failure::service)?;
-        for stale in [REFUSAL_FILE, WATCH_FILE, run_folder::SAMPLES] {
+        for stale in [
+            REFUSAL_FILE,
+            WATCH_FILE,
+            run_folder::SAMPLES,
+            run_folder::ARTWORK,
+            run_folder::PLAN,
+            run_folder::SUMMARY,
+            run_folder::REPORT,
+            run_folder::PICTURE,
+        ] {
             // What an earlier run left in the same folder is not ours.
             let _ = std::fs::remove_file(folder.file(stale));
         }
@@ -149,7 +158,8 @@ impl<'a> JobRun<'a> {
                 if let Stage::Ending(since) = self.stage {
                     // Without drives nothing moves, and a controller without feedback says nothing.
                     let gone = !self.pipeline.has(Role::Drives);
-                    let silent = !self.pipeline.has(Role::Controller) && heard.drives.at_rest == 1;
+                    let stopped = heard.drives.at_rest == 1 && heard.drives.fault.is_some();
+                    let silent = !self.pipeline.has(Role::Controller) && stopped;
                     return Ok(gone || silent || since.elapsed() > END_PATIENCE);
                 }
             }
@@ -251,16 +261,7 @@ impl<'a> JobRun<'a> {
         if self.folder.file(run_folder::SAMPLES).exists() {
             self.await_recording();
         }
-        let mut drives = self.pipeline.heard.drives;
-        if self.ending.controller.is_none()
-            && self.ending.error.is_some()
-            && !self.pipeline.has(Role::Drives)
-            && !drives.fault.is_some()
-        {
-            // The dead cannot say it, and a controller without feedback says nothing.
-            drives.fault.code = FaultCode::DrivesLost as u32;
-        }
-        self.ending.drives = Some(drives);
+        self.ending.drives = Some(self.drives_with_cause());
         let machine = self.pipeline.configuration.machine()?;
         let summary = conclusion::conclude(&self.folder, &machine, &self.ending, self.started)
             .map_err(Failure::service)?;
@@ -270,6 +271,22 @@ impl<'a> JobRun<'a> {
             let _ = submission.news.send(News::End(reply));
         }
         Ok(summary)
+    }
+
+    /// What drives reported, with the cause of a death that the dead cannot tell: a controller
+    /// without feedback says nothing, and drives without commands may name those first.
+    fn drives_with_cause(&self) -> DrivesReport {
+        let mut drives = self.pipeline.heard.drives;
+        if self.ending.controller.is_some() || self.ending.error.is_none() {
+            return drives;
+        }
+        let vague = matches!(drives.fault.code(), FaultCode::None | FaultCode::StaleCommand);
+        if vague && !self.pipeline.has(Role::Drives) {
+            drives.fault.code = FaultCode::DrivesLost as u32;
+        } else if vague && !self.pipeline.has(Role::Controller) {
+            drives.fault.code = FaultCode::ControllerLost as u32;
+        }
+        drives
     }
 
     /// Waits until the monitor has written all of it, as long as there is one.

@@ -29,10 +29,10 @@ use std::time::{Duration, Instant};
 pub const LOOK: Duration = Duration::from_millis(10);
 
 /// How long services may take to come up.
-const START_PATIENCE: Duration = Duration::from_secs(10);
+const START_PATIENCE: Duration = Duration::from_secs(30);
 
 /// How long the axes may take to come to rest.
-const REST_PATIENCE: Duration = Duration::from_secs(5);
+const REST_PATIENCE: Duration = Duration::from_secs(10);
 
 /// Who starts the services.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
