@@ -201,21 +201,25 @@ fn realtime(ending: &Ending) -> Realtime {
     let controller = ending.controller.map(|report| report.realtime);
     let drives = ending.drives.map(|report| report.realtime);
     let reported = [controller, drives];
-    let mut warnings = Vec::new();
+    let mut missing = Vec::new();
     if reported.iter().flatten().any(|facts| facts.fifo == 0) {
-        warnings.push(
-            "controller and drives do not both run under SCHED_FIFO: allow it with `ulimit -r 90`, \
-             LimitRTPRIO=90 in a unit, or CAP_SYS_NICE"
-                .to_owned(),
+        missing.push(
+            "no SCHED_FIFO (allow it with `ulimit -r 90`, LimitRTPRIO=90 in a unit, or \
+             CAP_SYS_NICE)",
         );
     }
     if reported.iter().flatten().any(|facts| facts.locked == 0) {
-        warnings.push(
-            "memory is not locked: allow it with `ulimit -l unlimited`, LimitMEMLOCK=infinity in \
-             a unit, or CAP_IPC_LOCK"
-                .to_owned(),
+        missing.push(
+            "no locked memory (allow it with `ulimit -l unlimited`, LimitMEMLOCK=infinity in a \
+             unit, or CAP_IPC_LOCK)",
         );
     }
+    let warnings = match missing.as_slice() {
+        [] => Vec::new(),
+        missing => {
+            vec![format!("controller and drives are not real-time: {}", missing.join(" and "))]
+        }
+    };
     // Of a thread that did not report, nothing is claimed.
     let unknown = RealtimeFacts { core: -1, ..RealtimeFacts::default() };
     Realtime::of(&controller.unwrap_or(unknown), &drives.unwrap_or(unknown), warnings)
