@@ -136,7 +136,6 @@ pub struct Plant<const N: usize, M: Mechanism<N>> {
     dynamics: Dynamics<N, M>,
     brake: Brake<N>,
     source: Source,
-    branch: M::Branch,
     weights: Weights<N>,
     substeps: u32,
     current_resolution: f64,
@@ -171,18 +170,19 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         }
         let axes = <[Axis; N]>::try_from(axes.to_vec())
             .map_err(|_| PlantError::AxisCount { expected: N, found: axes.len() })?;
-        let branch = M::Branch::default();
+        let branch = mechanism.branch();
         let pose = Pose::at(Vector3::from(home));
         let load = mechanism.inverse(&pose, branch, &Joints::zeros()).map_err(PlantError::Home)?;
+        let assembly = mechanism.assemble(&load, branch, None).map_err(PlantError::Home)?;
 
         // At rest, the motors stand ahead by what gravity stretches the transmission.
         let sag = mechanism
             .stiffness()
             .and_then(|stiffness| stiffness.try_inverse())
-            .map_or_else(Joints::zeros, |compliance| compliance * mechanism.gravity(&load, branch));
+            .map_or_else(Joints::zeros, |compliance| compliance * mechanism.gravity(&assembly));
         let motors = Motors::of(&axes);
         let angle = (load + sag).component_div(&motors.ratio);
-        let dynamics = Dynamics::new(mechanism, motors, &load)?;
+        let dynamics = Dynamics::new(mechanism, motors, assembly)?;
 
         let rate = dynamics.fastest();
         let substeps = (CYCLE_TIME / substep - 1e-9).max(rate * CYCLE_TIME / STABLE_PRODUCT).ceil();
@@ -192,7 +192,6 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         Ok(Self {
             brake: Brake::of(&axes),
             source: Source::new(laser),
-            branch,
             weights: motors.windings.weights(CYCLE_TIME / substeps),
             substeps: substeps as u32,
             current_resolution,
@@ -295,8 +294,10 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
                 measurement.current[row] = steps * self.current_resolution;
             }
         }
-        match self.dynamics.mechanism().forward(&self.state.load, self.branch) {
-            Ok(pose) => measurement.tool = Some(pose.position.into()),
+        match self.dynamics.assemble(&self.state.load) {
+            Ok(assembly) => {
+                measurement.tool = Some(self.dynamics.mechanism().pose(&assembly).position.into());
+            }
             Err(error) => self.fail(0, error.value, error.limit),
         }
         measurement.laser = self.light;

@@ -36,7 +36,7 @@ fn motor(parameters: &Value, inertia: f64, friction: Friction, load: f64) -> Dyn
     axis.motor.inductance = number(parameters, "L");
     axis.motor.torque_constant = number(parameters, "kt");
     axis.motor.voltage = number(parameters, "U");
-    Dynamics::new(Shaft { load, spread: 0.0 }, Motors::of(&[axis]), &Vector1::zeros()).unwrap()
+    Dynamics::new(Shaft { load, spread: 0.0 }, Motors::of(&[axis]), Vector1::zeros()).unwrap()
 }
 
 fn rest() -> State<1> {

@@ -72,9 +72,8 @@ fn energy(dynamics: &Dynamics<2, CoreXy>, state: &State<2>) -> f64 {
     let stretch = motors.ratio.component_mul(&state.angle) - state.load;
     let square = |v: &Vector2<f64>| v.component_mul(v);
     let rotors = motors.inertia.dot(&square(&state.speed));
-    let load = state
-        .load_speed
-        .dot(&(dynamics.mechanism().mass_matrix(&state.load, ()) * state.load_speed));
+    let load =
+        state.load_speed.dot(&(dynamics.mechanism().mass_matrix(&state.load) * state.load_speed));
     let belts = stretch.dot(&(dynamics.mechanism().stiffness().unwrap() * stretch));
     let windings = motors.windings.inductance.dot(&square(&state.current));
     0.5 * (rotors + load + belts + windings)
@@ -83,7 +82,7 @@ fn energy(dynamics: &Dynamics<2, CoreXy>, state: &State<2>) -> f64 {
 #[test]
 fn a_free_elastic_plant_keeps_its_energy() {
     let axes = axes(SMOOTH);
-    let mut dynamics = Dynamics::new(undamped(), Motors::of(&axes), &Vector2::zeros()).unwrap();
+    let mut dynamics = Dynamics::new(undamped(), Motors::of(&axes), Vector2::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let mut state = State { load: Vector2::new(2e-4, -1e-4), ..at_rest() };
     let before = energy(&dynamics, &state);
@@ -99,7 +98,7 @@ fn a_free_elastic_plant_keeps_its_energy() {
 #[test]
 fn electrical_work_is_heat_and_stored_energy() {
     let axes = axes(SMOOTH);
-    let mut dynamics = Dynamics::new(undamped(), Motors::of(&axes), &Vector2::zeros()).unwrap();
+    let mut dynamics = Dynamics::new(undamped(), Motors::of(&axes), Vector2::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let volts = Vector2::new(6.0, -2.0);
     let resistance = dynamics.motors().windings.resistance;
@@ -123,7 +122,7 @@ fn electrical_work_is_heat_and_stored_energy() {
 /// Load and motor positions after 20 ms at a substep, under a voltage that reverses.
 fn swing(friction: Friction, substep: f64) -> [f64; 4] {
     let axes = axes(friction);
-    let mut dynamics = Dynamics::new(corexy(), Motors::of(&axes), &Vector2::zeros()).unwrap();
+    let mut dynamics = Dynamics::new(corexy(), Motors::of(&axes), Vector2::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(substep);
     let steps = (5e-3 / substep).round() as usize;
     let mut state = at_rest();
@@ -189,7 +188,7 @@ fn a_sliding_rotor_stops_where_and_when_friction_says() {
     let (inertia, coulomb, speed) = (2e-6, 5e-3, 97.3);
     let axis = shaft::axis(inertia, Friction { coulomb, viscous: 0.0 });
     let mut dynamics =
-        Dynamics::new(Shaft { load: 0.0, spread: 0.0 }, Motors::of(&[axis]), &Vector1::zeros())
+        Dynamics::new(Shaft { load: 0.0, spread: 0.0 }, Motors::of(&[axis]), Vector1::zeros())
             .unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let zero = Vector1::zeros();
@@ -220,7 +219,7 @@ fn an_inertia_that_grows_slows_the_shaft_by_its_energy() {
     let (rotor, spread, speed) = (2e-6, 5e-6, 40.0);
     let axis = shaft::axis(rotor, SMOOTH);
     let mut dynamics =
-        Dynamics::new(Shaft { load: 0.0, spread }, Motors::of(&[axis]), &Vector1::zeros()).unwrap();
+        Dynamics::new(Shaft { load: 0.0, spread }, Motors::of(&[axis]), Vector1::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let zero = Vector1::zeros();
     let start = Vector1::new(speed);
@@ -294,7 +293,7 @@ fn belts_stretch_by_mass_over_stiffness() {
 /// Frequency of the load on held motors along a direction of the tool [Hz].
 fn mode(direction: [f64; 2]) -> f64 {
     let axes = axes(Friction { coulomb: 1e3, viscous: 0.0 });
-    let mut dynamics = Dynamics::new(undamped(), Motors::of(&axes), &Vector2::zeros()).unwrap();
+    let mut dynamics = Dynamics::new(undamped(), Motors::of(&axes), Vector2::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let [x, y] = direction;
     let mut state = State { load: Vector2::new(x + y, x - y) * 1e-5, ..at_rest() };

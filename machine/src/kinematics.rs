@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
+use crate::taylor::Taylor;
+
 /// Joint coordinates of a mechanism with `N` axes [m or rad].
 pub type Joints<const N: usize> = SVector<f64, N>;
 
@@ -25,6 +27,61 @@ impl Pose {
     }
 }
 
+/// How the tool is turned and how that changes; [`Attitude::LEVEL`] where nothing asks for more.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Attitude {
+    /// Orientation of the tool, its columns the tool's axes; the beam shines along −z of it.
+    pub rotation: Matrix3<f64>,
+    /// Angular velocity, machine frame [rad/s].
+    pub velocity: Vector3<f64>,
+    /// Angular acceleration [rad/s²].
+    pub acceleration: Vector3<f64>,
+    /// Angular jerk [rad/s³].
+    pub jerk: Vector3<f64>,
+}
+
+impl Attitude {
+    /// The tool points straight down, and stays so.
+    pub const LEVEL: Self = Self::fixed(Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0));
+
+    /// Turned by `rotation`, and staying so.
+    pub const fn fixed(rotation: Matrix3<f64>) -> Self {
+        let still = Vector3::new(0.0, 0.0, 0.0);
+        Self { rotation, velocity: still, acceleration: still, jerk: still }
+    }
+
+    /// The first three time derivatives of the rotation matrix.
+    pub fn rates(&self) -> [Matrix3<f64>; 3] {
+        let (w, a, j) = (
+            self.velocity.cross_matrix(),
+            self.acceleration.cross_matrix(),
+            self.jerk.cross_matrix(),
+        );
+        // R′ = ω×R, differentiated twice more.
+        let first = w * self.rotation;
+        let second = a * self.rotation + w * first;
+        let third = j * self.rotation + a * first * 2.0 + w * second;
+        [first, second, third]
+    }
+
+    /// Row by row, the entries of the rotation matrix as series.
+    pub fn series(&self) -> [[Taylor; 3]; 3] {
+        let [first, second, third] = self.rates();
+        core::array::from_fn(|row| {
+            core::array::from_fn(|column| {
+                let at = (row, column);
+                Taylor::new(self.rotation[at], first[at], second[at], third[at])
+            })
+        })
+    }
+}
+
+impl Default for Attitude {
+    fn default() -> Self {
+        Self::LEVEL
+    }
+}
+
 /// The tool's motion at one instant: exact derivatives of a planned path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolMotion {
@@ -36,6 +93,39 @@ pub struct ToolMotion {
     pub acceleration: Vector3<f64>,
     /// Its jerk [m/s³].
     pub jerk: Vector3<f64>,
+    /// How it is turned meanwhile.
+    pub attitude: Attitude,
+}
+
+impl ToolMotion {
+    /// At rest in `pose`.
+    pub fn rest(pose: &Pose) -> Self {
+        let still = Vector3::zeros();
+        Self {
+            position: pose.position,
+            velocity: still,
+            acceleration: still,
+            jerk: still,
+            attitude: Attitude::fixed(pose.rotation),
+        }
+    }
+
+    /// Where the tool is and how it is turned.
+    pub fn pose(&self) -> Pose {
+        Pose { position: self.position, rotation: self.attitude.rotation }
+    }
+
+    /// The position's coordinates as series.
+    pub fn series(&self) -> [Taylor; 3] {
+        core::array::from_fn(|row| {
+            Taylor::new(
+                self.position[row],
+                self.velocity[row],
+                self.acceleration[row],
+                self.jerk[row],
+            )
+        })
+    }
 }
 
 /// The joints' motion that gives the tool a [`ToolMotion`].
@@ -49,6 +139,24 @@ pub struct JointMotion<const N: usize> {
     pub acceleration: Joints<N>,
     /// [m/s³ or rad/s³].
     pub jerk: Joints<N>,
+}
+
+impl<const N: usize> JointMotion<N> {
+    /// At rest at `position` [m or rad].
+    pub fn rest(position: Joints<N>) -> Self {
+        let still = Joints::zeros();
+        Self { position, velocity: still, acceleration: still, jerk: still }
+    }
+
+    /// The motion whose joints are these series.
+    pub fn of_series(joints: &[Taylor; N]) -> Self {
+        Self {
+            position: Joints::from_fn(|row, _| joints[row].value),
+            velocity: Joints::from_fn(|row, _| joints[row].first),
+            acceleration: Joints::from_fn(|row, _| joints[row].second),
+            jerk: Joints::from_fn(|row, _| joints[row].third),
+        }
+    }
 }
 
 /// Why a pose or a joint vector has no answer. Nothing is ever clamped instead.
@@ -67,22 +175,102 @@ pub struct KinematicsError {
     pub detail: &'static str,
 }
 
+/// What a tool can be told: the part of a [`Pose`] that a mechanism can choose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Freedom {
+    /// x and y.
+    Plane,
+    /// x, y and z.
+    Space,
+    /// x, y, z and the direction of the tool, turning about itself left aside.
+    Axis,
+    /// x, y, z and the whole orientation.
+    Pose,
+}
+
+/// One way to solve a mechanism's equations, as `graver kinematics` names and shows it.
+pub trait Branch: Copy + core::fmt::Debug + PartialEq + Send + Sync + 'static {
+    /// Names and values, such as `working_mode`, `[1, -1]`; empty where there is one solution.
+    fn choices(&self) -> Vec<(&'static str, Vec<i32>)>;
+
+    /// The same with `name` set to `values`; `None` where there is no such name or value.
+    fn choose(self, name: &str, values: &[i32]) -> Option<Self>;
+}
+
+impl Branch for () {
+    fn choices(&self) -> Vec<(&'static str, Vec<i32>)> {
+        Vec::new()
+    }
+
+    fn choose(self, _name: &str, _values: &[i32]) -> Option<Self> {
+        None
+    }
+}
+
+/// How far a configuration is from where a mechanism can no longer do what is asked of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Margin {
+    /// The name, such as `type_1` or `center`.
+    pub name: &'static str,
+    /// Its value; 0 is the singularity.
+    pub value: f64,
+    /// What the value must not fall below.
+    pub limit: f64,
+}
+
 /// A mechanism with `N` actuated axes: pure functions of its dimensions and masses.
 ///
-/// Elasticity sits between the motor side and the load side of the transmission and is linear:
+/// [`Mechanism::assemble`] solves the chain once for a joint position; what depends on the position
+/// is then asked of the [`Mechanism::Assembly`] that it gives. Elasticity sits between the motor
+/// side and the load side of the transmission and is linear:
 /// `τ = K·(q_motor − q_load) + B·(q̇_motor − q̇_load)` in joint coordinates.
-pub trait Mechanism<const N: usize>: Clone + Send + 'static {
+pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
     /// Which of several solutions: working mode, assembly mode, elbow, table turn.
-    type Branch: Copy + core::fmt::Debug + Default + PartialEq + Send;
+    type Branch: Branch;
+
+    /// The mechanism at one joint position, everything passive solved: bodies, angles, Jacobian.
+    type Assembly: Copy + core::fmt::Debug + Send + 'static;
 
     /// The name in machine files and summaries.
     const NAME: &'static str;
+
+    /// What of a pose it can choose.
+    fn freedom(&self) -> Freedom;
+
+    /// The branch in which the machine is built and works.
+    fn branch(&self) -> Self::Branch;
+
+    /// Solves the chain with the joints at `q` [m or rad]. `near` is an assembly at a position close
+    /// by, from which an iterative solution starts.
+    ///
+    /// # Errors
+    /// Where the chain cannot close.
+    fn assemble(
+        &self,
+        q: &Joints<N>,
+        branch: Self::Branch,
+        near: Option<&Self::Assembly>,
+    ) -> Result<Self::Assembly, KinematicsError>;
+
+    /// Where the tool is.
+    fn pose(&self, assembly: &Self::Assembly) -> Pose;
+
+    /// The branch that an assembly is in.
+    fn branch_of(&self, assembly: &Self::Assembly) -> Self::Branch;
+
+    /// Tool velocity per joint rate.
+    fn jacobian(&self, assembly: &Self::Assembly) -> Jacobian<N>;
+
+    /// Distances to the mechanism's singularities and collisions, each with what it must keep.
+    fn margins(&self, assembly: &Self::Assembly) -> Vec<Margin>;
 
     /// Where the tool is with the joints at `q` [m or rad].
     ///
     /// # Errors
     /// Where the chain cannot close.
-    fn forward(&self, q: &Joints<N>, branch: Self::Branch) -> Result<Pose, KinematicsError>;
+    fn forward(&self, q: &Joints<N>, branch: Self::Branch) -> Result<Pose, KinematicsError> {
+        Ok(self.pose(&self.assemble(q, branch, None)?))
+    }
 
     /// The joints that bring the tool to `pose` on `branch`, continuous with `previous`.
     ///
@@ -95,13 +283,8 @@ pub trait Mechanism<const N: usize>: Clone + Send + 'static {
         previous: &Joints<N>,
     ) -> Result<Joints<N>, KinematicsError>;
 
-    /// Tool velocity per joint rate.
-    ///
-    /// Here and in the dynamics `branch` says which of several poses `q` stands for, as in
-    /// [`Self::forward`]: the actuated joints alone do not tell how a closed chain is assembled.
-    fn jacobian(&self, q: &Joints<N>, branch: Self::Branch) -> Jacobian<N>;
-
-    /// The joints' motion for a motion of the tool, up to jerk.
+    /// The joints' motion for a motion of the tool, up to jerk, continuous with `previous`. A path
+    /// may pass where [`Self::inverse`] of a pose alone is undefined, if its velocity decides.
     ///
     /// # Errors
     /// Out of reach or singular, with how far.
@@ -114,14 +297,29 @@ pub trait Mechanism<const N: usize>: Clone + Send + 'static {
 
     /// Inertia of the load in joint coordinates, symmetric and positive definite, rotors excluded
     /// [kg or kg·m²].
-    fn mass_matrix(&self, q: &Joints<N>, branch: Self::Branch) -> SMatrix<f64, N, N>;
+    fn mass_matrix(&self, assembly: &Self::Assembly) -> SMatrix<f64, N, N>;
 
-    /// Coriolis, centrifugal and gravity efforts of the load with the joints at `q` [m or rad],
-    /// moving at `velocity` [m/s or rad/s]; in [N or N·m].
-    fn bias(&self, q: &Joints<N>, velocity: &Joints<N>, branch: Self::Branch) -> Joints<N>;
+    /// Coriolis, centrifugal and gravity efforts of the load, moving at `velocity` [m/s or rad/s];
+    /// in [N or N·m].
+    fn bias(&self, assembly: &Self::Assembly, velocity: &Joints<N>) -> Joints<N>;
 
     /// The part of [`Self::bias`] that is there at rest [N or N·m].
-    fn gravity(&self, q: &Joints<N>, branch: Self::Branch) -> Joints<N>;
+    fn gravity(&self, assembly: &Self::Assembly) -> Joints<N>;
+
+    /// Whether [`Self::mass_matrix`] is the same everywhere.
+    fn has_constant_mass(&self) -> bool {
+        false
+    }
+
+    /// Whether straight lines of the tool are straight lines of the joints.
+    fn is_linear(&self) -> bool {
+        false
+    }
+
+    /// Joints that may turn without end, and look alike after every turn.
+    fn turns(&self) -> [bool; N] {
+        [false; N]
+    }
 
     /// Stiffness of the transmission [N/m or N·m/rad], symmetric; `None` when it is rigid.
     fn stiffness(&self) -> Option<SMatrix<f64, N, N>>;
@@ -130,9 +328,13 @@ pub trait Mechanism<const N: usize>: Clone + Send + 'static {
     fn damping(&self) -> SMatrix<f64, N, N>;
 
     /// Efforts on the load side of the transmission for a motion of the joints [N or N·m].
-    fn inverse_dynamics(&self, motion: &JointMotion<N>, branch: Self::Branch) -> Joints<N> {
-        self.mass_matrix(&motion.position, branch) * motion.acceleration
-            + self.bias(&motion.position, &motion.velocity, branch)
+    fn inverse_dynamics(
+        &self,
+        assembly: &Self::Assembly,
+        velocity: &Joints<N>,
+        acceleration: &Joints<N>,
+    ) -> Joints<N> {
+        self.mass_matrix(assembly) * acceleration + self.bias(assembly, velocity)
     }
 }
 

@@ -16,6 +16,7 @@ pub mod machine;
 pub mod mechanisms;
 pub mod process;
 pub mod quantity;
+pub mod taylor;
 
 pub use actuator::{Axis, DcMotor, Encoder, Friction, LoopGains};
 pub use document::{DocumentError, Override};

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use machine::kinematics::{JointMotion, Joints, ToolMotion};
+use machine::kinematics::{Attitude, JointMotion, Joints, ToolMotion};
 use machine::mechanisms::Elasticity;
 use machine::{Cartesian, CoreXy, Mechanism, Pose};
 use nalgebra::Vector3;
@@ -37,6 +37,7 @@ fn conforms<const N: usize, M: Mechanism<N>>(mechanism: &M) {
             velocity: random.vector(0.25, lift),
             acceleration: random.vector(10.0, lift),
             jerk: random.vector(500.0, lift),
+            attitude: Attitude::LEVEL,
         };
         let context = format!("{} case {case}: {tool:?}", M::NAME);
         kinematics(mechanism, &tool, &context);
@@ -52,7 +53,7 @@ fn near(found: f64, expected: f64, tolerance: f64, context: &str) {
 }
 
 fn kinematics<const N: usize, M: Mechanism<N>>(mechanism: &M, tool: &ToolMotion, context: &str) {
-    let branch = M::Branch::default();
+    let branch = mechanism.branch();
     let start = Joints::<N>::zeros();
     let q = mechanism.inverse(&Pose::at(tool.position), branch, &start).unwrap();
     let back = mechanism.forward(&q, branch).unwrap();
@@ -63,7 +64,7 @@ fn kinematics<const N: usize, M: Mechanism<N>>(mechanism: &M, tool: &ToolMotion,
     // Jacobian against central differences; forward is linear or smooth, so h² and rounding/h
     // both stay below 1e-9.
     let step = 1e-6;
-    let jacobian = mechanism.jacobian(&q, branch);
+    let jacobian = mechanism.jacobian(&mechanism.assemble(&q, branch, None).unwrap());
     for column in 0..N {
         let mut offset = Joints::<N>::zeros();
         offset[column] = step;
@@ -91,6 +92,7 @@ fn kinematics<const N: usize, M: Mechanism<N>>(mechanism: &M, tool: &ToolMotion,
             velocity: tool.velocity + tool.acceleration * t + tool.jerk * (t * t / 2.0),
             acceleration: tool.acceleration + tool.jerk * t,
             jerk: tool.jerk,
+            attitude: tool.attitude,
         };
         mechanism.joint_motion(&along, branch, &q).unwrap()
     };
@@ -105,10 +107,12 @@ fn kinematics<const N: usize, M: Mechanism<N>>(mechanism: &M, tool: &ToolMotion,
 }
 
 fn dynamics<const N: usize, M: Mechanism<N>>(mechanism: &M, tool: &ToolMotion, context: &str) {
-    let branch = M::Branch::default();
+    let branch = mechanism.branch();
     let motion = mechanism.joint_motion(tool, branch, &Joints::zeros()).unwrap();
     let q = motion.position;
-    let mass = mechanism.mass_matrix(&q, branch);
+    let at = |q: Joints<N>| mechanism.assemble(&q, branch, None).unwrap();
+    let assembly = at(q);
+    let mass = mechanism.mass_matrix(&assembly);
     near((mass - mass.transpose()).amax(), 0.0, 1e-15, context);
     assert!(mass.cholesky().is_some(), "the mass matrix is not positive: {context}");
 
@@ -119,12 +123,15 @@ fn dynamics<const N: usize, M: Mechanism<N>>(mechanism: &M, tool: &ToolMotion, c
         acceleration,
         jerk: Joints::zeros(),
     };
-    let held = mechanism.inverse_dynamics(&rest(Joints::zeros()), branch);
-    near((held - mechanism.gravity(&q, branch)).norm(), 0.0, 1e-12, context);
+    let effort = |motion: &JointMotion<N>| {
+        mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration)
+    };
+    let held = effort(&rest(Joints::zeros()));
+    near((held - mechanism.gravity(&assembly)).norm(), 0.0, 1e-12, context);
     for column in 0..N {
         let mut unit = Joints::<N>::zeros();
         unit[column] = 1.0;
-        let effort = mechanism.inverse_dynamics(&rest(unit), branch) - held;
+        let effort = effort(&rest(unit)) - held;
         near((effort - mass.column(column)).norm(), 0.0, 1e-12, context);
     }
 
@@ -133,11 +140,11 @@ fn dynamics<const N: usize, M: Mechanism<N>>(mechanism: &M, tool: &ToolMotion, c
     let h = 1e-6;
     let energy = |t: f64| {
         let velocity = motion.velocity + motion.acceleration * t;
-        velocity.dot(&(mechanism.mass_matrix(&(q + motion.velocity * t), branch) * velocity)) / 2.0
+        velocity.dot(&(mechanism.mass_matrix(&at(q + motion.velocity * t)) * velocity)) / 2.0
     };
     let change = (energy(h) - energy(-h)) / (2.0 * h);
-    let power = mechanism.inverse_dynamics(&motion, branch).dot(&motion.velocity);
-    let lifting = mechanism.gravity(&q, branch).dot(&motion.velocity);
+    let power = effort(&motion).dot(&motion.velocity);
+    let lifting = mechanism.gravity(&assembly).dot(&motion.velocity);
     near(power, change + lifting, 1e-7, context);
 }
 
@@ -164,7 +171,7 @@ fn the_cartesian_conforms() {
 fn the_cartesian_with_a_lift_conforms() {
     let mechanism = Cartesian { mass: [1.93, 0.33, 0.2], elasticity: Some([SCREW; 3]) };
     conforms(&mechanism);
-    assert_eq!(mechanism.gravity(&Joints::zeros(), ()), Joints::from([0.0, 0.0, 0.2 * 9.806_65]));
+    assert_eq!(mechanism.gravity(&Joints::zeros()), Joints::from([0.0, 0.0, 0.2 * 9.806_65]));
 }
 
 #[test]
@@ -180,7 +187,7 @@ fn the_belts_are_two_springs_along_x_and_y() {
     let belts = [Elasticity::damped(6e4, 0.33, 0.9), Elasticity::damped(3e4, 1.06, 0.9)];
     let corexy = CoreXy { mass: [0.33, 1.06], elasticity: Some(belts) };
     let inverse = corexy.stiffness().unwrap().try_inverse().unwrap();
-    let jacobian = corexy.jacobian(&Joints::zeros(), ()).fixed_view::<2, 2>(0, 0).into_owned();
+    let jacobian = corexy.jacobian(&Joints::zeros()).fixed_view::<2, 2>(0, 0).into_owned();
     let give = jacobian * inverse * jacobian.transpose();
     near(give[(0, 0)], 1.0 / 6e4, 1e-18, "x");
     near(give[(1, 1)], 1.0 / 3e4, 1e-18, "y");

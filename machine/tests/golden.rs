@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use machine::kinematics::{Jacobian, JointMotion, Joints, ToolMotion};
+use machine::kinematics::{Attitude, Jacobian, JointMotion, Joints, ToolMotion};
 use machine::{Machine, Mechanism, MechanismKind, MechanismVisitor, Pose};
 use nalgebra::{Matrix2, Vector2, Vector3};
 use serde_json::Value;
@@ -59,9 +59,10 @@ impl Compare {
             velocity: in_plane("v"),
             acceleration: in_plane("a"),
             jerk: Vector3::zeros(),
+            attitude: Attitude::LEVEL,
         };
         let q = Joints::<N>::from_fn(|row, _| pair(&pose["q"])[row] * ratio[row]);
-        let branch = M::Branch::default();
+        let branch = mechanism.branch();
 
         let forward = mechanism.forward(&q, branch).unwrap().position;
         check_pair("forward", forward.xy(), pair(&pose["x"]));
@@ -73,12 +74,19 @@ impl Compare {
         check_pair("velocity", motor(&motion.velocity), pair(&pose["qd"]));
         check_pair("acceleration", motor(&motion.acceleration), pair(&pose["qdd"]));
 
-        let effort = mechanism.inverse_dynamics(&motion, branch).component_mul(&ratio);
+        let effort = mechanism
+            .inverse_dynamics(
+                &mechanism.assemble(&q, branch, None).unwrap(),
+                &motion.velocity,
+                &motion.acceleration,
+            )
+            .component_mul(&ratio);
         check_pair("tau", Vector2::new(effort[0], effort[1]), pair(&pose["tau"]));
         let power = effort.dot(&motion.velocity.component_div(&ratio));
         check("power", power, pose["power"].as_f64().unwrap(), 1.0);
 
-        let j = plane(&mechanism.jacobian(&q, branch), &self.ratio);
+        let j =
+            plane(&mechanism.jacobian(&mechanism.assemble(&q, branch, None).unwrap()), &self.ratio);
         for row in 0..2 {
             let expected = pair(&pose["J"][row]);
             check_pair("J", Vector2::new(j[(row, 0)], j[(row, 1)]), expected);

@@ -1,6 +1,6 @@
 //! A point of a curve with its first three derivatives, and the change to arc length.
 
-use machine::kinematics::ToolMotion;
+use machine::kinematics::{Attitude, ToolMotion};
 use nalgebra::Vector3;
 
 /// A point and its derivatives by some parameter of the curve.
@@ -61,6 +61,7 @@ impl Jet {
             jerk: self.third * (velocity * velocity * velocity)
                 + self.second * (3.0 * velocity * acceleration)
                 + self.first * jerk,
+            attitude: Attitude::LEVEL,
         }
     }
 }

@@ -16,7 +16,7 @@
 use core::f64::consts::{FRAC_PI_2, SQRT_2};
 
 use machine::PathLimits;
-use machine::kinematics::ToolMotion;
+use machine::kinematics::{Attitude, ToolMotion};
 use nalgebra::Vector3;
 use signals::math;
 
@@ -207,6 +207,7 @@ impl RunIn {
             velocity: join(along.velocity, across.velocity),
             acceleration: join(along.acceleration, across.acceleration),
             jerk: join(along.jerk, across.jerk),
+            attitude: Attitude::LEVEL,
         }
     }
 }

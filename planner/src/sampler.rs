@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use machine::kinematics::{Joints, KinematicsError, ToolMotion};
+use machine::kinematics::{JointMotion, Joints, KinematicsError, ToolMotion};
 use machine::{Axis, Mechanism};
 use signals::time::CYCLE_TIME;
 use signals::{GateEdge, LaserCycle, Setpoint, axis::axis_array, setpoint::flags};
@@ -38,6 +38,7 @@ pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
     look: i64,
     cursor: usize,
     joints: Joints<N>,
+    assembly: M::Assembly,
     lead: Lead<N>,
     /// Speed of the motor side [joint units/s], and effort on the load side, at the last look.
     motor_velocity: Joints<N>,
@@ -76,9 +77,10 @@ struct Gate {
 }
 
 /// The joints at one look.
-struct Look<const N: usize> {
+struct Look<const N: usize, A> {
     tool: ToolMotion,
-    motion: machine::kinematics::JointMotion<N>,
+    motion: JointMotion<N>,
+    assembly: A,
     effort: Joints<N>,
 }
 
@@ -99,9 +101,12 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         let mut cursor = 0;
         let tool = trajectory.at(0.0, &mut cursor);
         let motion = mechanism
-            .joint_motion(&tool, M::Branch::default(), &Joints::zeros())
+            .joint_motion(&tool, mechanism.branch(), &Joints::zeros())
             .map_err(|cause| Unreachable { time: 0.0, cause })?;
-        let effort = mechanism.inverse_dynamics(&motion, M::Branch::default());
+        let assembly = mechanism
+            .assemble(&motion.position, mechanism.branch(), None)
+            .map_err(|cause| Unreachable { time: 0.0, cause })?;
+        let effort = mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
         let lead = Lead::new(&mechanism, effort, STEP);
         let end = (trajectory.end() / CYCLE_TIME).ceil() as i64;
         Ok(Self {
@@ -116,6 +121,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             look: -(STEPS as i64) / 2,
             cursor,
             joints: motion.position,
+            assembly,
             lead,
             motor_velocity: Joints::zeros(),
             effort,
@@ -139,20 +145,23 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     }
 
     /// Goes on to the next look.
-    fn advance(&mut self) -> Result<Look<N>, KinematicsError> {
+    fn advance(&mut self) -> Result<Look<N, M::Assembly>, KinematicsError> {
         self.look += 1;
         let tool = self.trajectory.at(self.look as f64 * STEP, &mut self.cursor);
-        let branch = M::Branch::default();
+        let branch = self.mechanism.branch();
         let motion = self.mechanism.joint_motion(&tool, branch, &self.joints)?;
-        let effort = self.mechanism.inverse_dynamics(&motion, branch);
+        let assembly = self.mechanism.assemble(&motion.position, branch, Some(&self.assembly))?;
+        let effort =
+            self.mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
         // Inertia changes slowly beside the jerk: its own rate is left out where only a spring
         // without damper asks for it.
-        let effort_rate = self.mechanism.mass_matrix(&motion.position, branch) * motion.jerk;
+        let effort_rate = self.mechanism.mass_matrix(&assembly) * motion.jerk;
         self.lead.advance(&effort, &effort_rate);
         self.joints = motion.position;
+        self.assembly = assembly;
         self.effort = effort;
         self.motor_velocity = motion.velocity + self.lead.rate();
-        Ok(Look { tool, motion, effort })
+        Ok(Look { tool, motion, assembly, effort })
     }
 
     fn setpoint(&mut self) -> Result<Setpoint, KinematicsError> {
@@ -163,7 +172,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             let look = self.advance()?;
             add(&look.effort, 1.0);
         }
-        let Look { tool, motion, effort } = self.advance()?;
+        let Look { tool, motion, assembly, effort } = self.advance()?;
         add(&effort, 1.0);
         let lead = *self.lead.value();
         for _ in 1..STEPS / 2 {
@@ -175,9 +184,8 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         mean /= STEPS as f64;
         let acceleration = (self.motor_velocity - before) / CYCLE_TIME;
 
-        let branch = M::Branch::default();
-        let gravity = self.mechanism.gravity(&motion.position, branch);
-        let impulse = self.mechanism.mass_matrix(&motion.position, branch) * motion.velocity;
+        let gravity = self.mechanism.gravity(&assembly);
+        let impulse = self.mechanism.mass_matrix(&assembly) * motion.velocity;
         let per_axis = |value: &dyn Fn(usize, &Drive) -> f64| {
             let values: [f64; N] = std::array::from_fn(|axis| value(axis, &self.drives[axis]));
             axis_array(&values)

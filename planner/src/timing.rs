@@ -2,6 +2,7 @@
 //! the next begins, and all but strokes begin and end at rest or go into a stroke.
 
 use machine::PathLimits;
+use machine::kinematics::Attitude;
 use nalgebra::Vector3;
 
 use crate::itinerary::{Dot, Feed, Item, Stop};
@@ -64,6 +65,7 @@ impl Straight {
             velocity: self.direction * along.velocity,
             acceleration: self.direction * along.acceleration,
             jerk: self.direction * along.jerk,
+            attitude: Attitude::LEVEL,
         }
     }
 }

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use machine::kinematics::ToolMotion;
-use machine::{LaserSource, PathLimits};
+use machine::{LaserSource, PathLimits, Pose};
 use nalgebra::Vector3;
 use signals::Nanoseconds;
 
@@ -162,8 +162,7 @@ impl Trajectory {
 }
 
 fn rest(position: Vector3<f64>) -> ToolMotion {
-    let zero = Vector3::zeros();
-    ToolMotion { position, velocity: zero, acceleration: zero, jerk: zero }
+    ToolMotion::rest(&Pose::at(position))
 }
 
 impl Course {

@@ -6,7 +6,7 @@ use self::lines::{Branch, Ellipse, ErrorBody, Reply, ReplyPose, Request};
 use crate::arguments::{KinematicsArguments, KinematicsVerb};
 use crate::exit::{Exit, Failure};
 use crate::inputs;
-use machine::kinematics::{JointMotion, Joints, KinematicsError};
+use machine::kinematics::{Joints, KinematicsError};
 use machine::{Machine, Mechanism, MechanismVisitor, Pose};
 use nalgebra::{Matrix2, SMatrix, SymmetricEigen, Vector3};
 use signals::math;
@@ -107,12 +107,18 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         Ok(Joints::<N>::from_fn(|axis, _| values[axis]).component_mul(&self.ratios()))
     }
 
+    fn assemble(&self, q: &Joints<N>) -> Result<M::Assembly, ErrorBody> {
+        self.mechanism
+            .assemble(q, self.mechanism.branch(), None)
+            .map_err(|error| self.kinematics_error(&error))
+    }
+
     fn forward(&self, request: &Request) -> Result<Reply, ErrorBody> {
         let q = self.joints("q", request.q.as_ref())?;
         self.check_limits(&q)?;
         let pose = self
             .mechanism
-            .forward(&q, M::Branch::default())
+            .forward(&q, self.mechanism.branch())
             .map_err(|error| self.kinematics_error(&error))?;
         let pose = ReplyPose { position: self.shown(&pose.position) };
         Ok(Reply::Forward { pose, branch: Branch::new() })
@@ -134,7 +140,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
             Vector3::from_fn(|row, _| pose.position.get(row).copied().unwrap_or_default());
         let q = self
             .mechanism
-            .inverse(&Pose::at(position), M::Branch::default(), previous)
+            .inverse(&Pose::at(position), self.mechanism.branch(), previous)
             .map_err(|error| self.kinematics_error(&error))?;
         self.check_limits(&q)?;
         *previous = q;
@@ -153,8 +159,8 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     }
 
     /// Tool velocity per joint rate, in the directions in which the tool moves.
-    fn tool_jacobian(&self, q: &Joints<N>) -> SMatrix<f64, 6, N> {
-        let mut jacobian = self.mechanism.jacobian(q, M::Branch::default());
+    fn tool_jacobian(&self, assembly: &M::Assembly) -> SMatrix<f64, 6, N> {
+        let mut jacobian = self.mechanism.jacobian(assembly);
         for (axis, ratio) in self.ratios().iter().enumerate() {
             jacobian.column_mut(axis).scale_mut(*ratio);
         }
@@ -163,7 +169,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
 
     fn jacobian(&self, request: &Request) -> Result<Reply, ErrorBody> {
         let q = self.joints("q", request.q.as_ref())?;
-        let jacobian = self.tool_jacobian(&q);
+        let jacobian = self.tool_jacobian(&self.assemble(&q)?);
         let square = SMatrix::<f64, N, N>::from_fn(|row, column| jacobian[(row, column)]);
         let rows: Vec<Vec<f64>> =
             square.row_iter().map(|row| row.iter().copied().collect()).collect();
@@ -178,8 +184,8 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         let position = self.joints("q", request.q.as_ref())?;
         let velocity = self.joints("qd", request.qd.as_ref())?;
         let acceleration = self.joints("qdd", request.qdd.as_ref())?;
-        let motion = JointMotion { position, velocity, acceleration, jerk: Joints::zeros() };
-        let mut effort = self.mechanism.inverse_dynamics(&motion, M::Branch::default());
+        let assembly = self.assemble(&position)?;
+        let mut effort = self.mechanism.inverse_dynamics(&assembly, &velocity, &acceleration);
         if let Some(wrench) = &request.wrench {
             if wrench.len() > 6 {
                 return Err(ErrorBody::bad_request(format!(
@@ -190,7 +196,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
             // The tool pushes on the work with this wrench: virtual work gives Jᵀ·w at the joints.
             let wrench =
                 nalgebra::Vector6::from_fn(|row, _| wrench.get(row).copied().unwrap_or(0.0));
-            effort += self.mechanism.jacobian(&position, M::Branch::default()).transpose() * wrench;
+            effort += self.mechanism.jacobian(&assembly).transpose() * wrench;
         }
         let ratios = self.ratios();
         let mut shown = effort.component_mul(&ratios);
@@ -205,7 +211,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
 
     fn ellipse(&self, request: &Request) -> Result<Reply, ErrorBody> {
         let q = self.joints("q", request.q.as_ref())?;
-        let jacobian = self.tool_jacobian(&q);
+        let jacobian = self.tool_jacobian(&self.assemble(&q)?);
         let plane = jacobian.fixed_view::<2, N>(0, 0);
         let product: Matrix2<f64> = plane * plane.transpose();
         let (axes, angle) = principal_axes(product);

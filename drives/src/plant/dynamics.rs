@@ -15,7 +15,7 @@
 //! Which motors stick, and against which friction the others slide, stands still during a step:
 //! [`friction`](super::friction) sees to that.
 
-use machine::kinematics::Joints;
+use machine::kinematics::{Joints, KinematicsError};
 use machine::{Axis, Mechanism};
 use nalgebra::{SMatrix, SVector};
 
@@ -103,8 +103,10 @@ struct Inertia<const N: usize> {
 
 /// The equations of motion.
 #[derive(Debug, Clone)]
-pub struct Dynamics<const N: usize, M> {
+pub struct Dynamics<const N: usize, M: Mechanism<N>> {
     mechanism: M,
+    /// The chain at the newest position it could be solved at.
+    assembly: M::Assembly,
     motors: Motors<N>,
     transmission: Transmission<N>,
     inertia: Inertia<N>,
@@ -129,12 +131,12 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     ///
     /// # Errors
     /// If the mass matrix at `home` cannot be inverted.
-    pub fn new(mechanism: M, motors: Motors<N>, home: &Joints<N>) -> Result<Self, PlantError> {
+    pub fn new(mechanism: M, motors: Motors<N>, home: M::Assembly) -> Result<Self, PlantError> {
         let transmission = match mechanism.stiffness() {
             Some(stiffness) => Transmission::Elastic { stiffness, damping: mechanism.damping() },
             None => Transmission::Rigid,
         };
-        let mut matrix = mechanism.mass_matrix(home, M::Branch::default());
+        let mut matrix = mechanism.mass_matrix(&home);
         if transmission == Transmission::Rigid {
             matrix += rotors(&motors);
         }
@@ -142,6 +144,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         let mobility = motors.inertia.map(|inertia| 1.0 / inertia);
         Ok(Self {
             mechanism,
+            assembly: home,
             motors,
             transmission,
             inertia: Inertia { matrix, inverse },
@@ -154,6 +157,14 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// The mechanism.
     pub fn mechanism(&self) -> &M {
         &self.mechanism
+    }
+
+    /// Solves the chain at `load` [m or rad], starting from where it was last.
+    ///
+    /// # Errors
+    /// Where it cannot close.
+    pub fn assemble(&self, load: &Joints<N>) -> Result<M::Assembly, KinematicsError> {
+        self.mechanism.assemble(load, self.mechanism.branch(), Some(&self.assembly))
     }
 
     /// The motors.
@@ -225,7 +236,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// Coriolis, centrifugal and gravity efforts of the load [N or N·m].
     #[inline(always)]
     fn bias(&self, state: &State<N>) -> Joints<N> {
-        self.mechanism.bias(&state.load, &state.load_speed, M::Branch::default())
+        self.mechanism.bias(&self.assembly, &state.load_speed)
     }
 
     /// Accelerations of motors [rad/s²] and load [m/s² or rad/s²].
@@ -281,7 +292,10 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// Follows a mass matrix that depends on the position. One that cannot be inverted, at a
     /// singular position, leaves the last good one in force.
     fn refresh(&mut self, load: &Joints<N>) -> Constancy {
-        let mut matrix = self.mechanism.mass_matrix(load, M::Branch::default());
+        if let Ok(assembly) = self.assemble(load) {
+            self.assembly = assembly;
+        }
+        let mut matrix = self.mechanism.mass_matrix(&self.assembly);
         if self.transmission == Transmission::Rigid {
             matrix += rotors(&self.motors);
         }

@@ -2,7 +2,7 @@
 //! the motor's own tests.
 
 use machine::kinematics::{
-    Jacobian, JointMotion, Joints, KinematicsError, Mechanism, Pose, ToolMotion,
+    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
 };
 use machine::{AxisLimits, DcMotor, Encoder, Friction, LoopGains};
 use nalgebra::{SMatrix, Vector1, Vector3};
@@ -18,10 +18,32 @@ pub(crate) struct Shaft {
 
 impl Mechanism<1> for Shaft {
     type Branch = ();
+    type Assembly = Joints<1>;
     const NAME: &'static str = "shaft";
 
-    fn forward(&self, q: &Joints<1>, _branch: ()) -> Result<Pose, KinematicsError> {
-        Ok(Pose::at(Vector3::new(q[0], 0.0, 0.0)))
+    fn freedom(&self) -> Freedom {
+        Freedom::Plane
+    }
+
+    fn branch(&self) {}
+
+    fn branch_of(&self, _q: &Joints<1>) {}
+
+    fn assemble(
+        &self,
+        q: &Joints<1>,
+        _branch: (),
+        _near: Option<&Joints<1>>,
+    ) -> Result<Joints<1>, KinematicsError> {
+        Ok(*q)
+    }
+
+    fn pose(&self, q: &Joints<1>) -> Pose {
+        Pose::at(Vector3::new(q[0], 0.0, 0.0))
+    }
+
+    fn margins(&self, _q: &Joints<1>) -> Vec<Margin> {
+        Vec::new()
     }
 
     fn inverse(
@@ -33,7 +55,7 @@ impl Mechanism<1> for Shaft {
         Ok(Vector1::new(pose.position.x))
     }
 
-    fn jacobian(&self, _q: &Joints<1>, _branch: ()) -> Jacobian<1> {
+    fn jacobian(&self, _q: &Joints<1>) -> Jacobian<1> {
         Jacobian::<1>::from_column_slice(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     }
 
@@ -51,16 +73,16 @@ impl Mechanism<1> for Shaft {
         })
     }
 
-    fn mass_matrix(&self, q: &Joints<1>, _branch: ()) -> SMatrix<f64, 1, 1> {
+    fn mass_matrix(&self, q: &Joints<1>) -> SMatrix<f64, 1, 1> {
         SMatrix::from_element(self.spread * (1.0 + q[0] * q[0]))
     }
 
-    fn bias(&self, q: &Joints<1>, velocity: &Joints<1>, _branch: ()) -> Joints<1> {
+    fn bias(&self, q: &Joints<1>, velocity: &Joints<1>) -> Joints<1> {
         // Lagrange: ½·dM/dq·q̇².
         Vector1::new(self.load + self.spread * q[0] * velocity[0] * velocity[0])
     }
 
-    fn gravity(&self, _q: &Joints<1>, _branch: ()) -> Joints<1> {
+    fn gravity(&self, _q: &Joints<1>) -> Joints<1> {
         Vector1::new(self.load)
     }
 

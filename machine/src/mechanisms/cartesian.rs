@@ -7,7 +7,8 @@ use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::transmission::Elasticity;
 use crate::kinematics::{
-    Jacobian, JointMotion, Joints, KinematicsError, Mechanism, Pose, ToolMotion, in_plane,
+    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
+    in_plane,
 };
 
 /// Gravity at the surface [m/s²], against the z axis.
@@ -35,12 +36,42 @@ impl<const N: usize> Cartesian<N> {
 
 impl<const N: usize> Mechanism<N> for Cartesian<N> {
     type Branch = ();
+    type Assembly = Joints<N>;
 
     const NAME: &'static str = "cartesian";
 
-    fn forward(&self, q: &Joints<N>, _branch: ()) -> Result<Pose, KinematicsError> {
+    fn freedom(&self) -> Freedom {
+        if N < 3 { Freedom::Plane } else { Freedom::Space }
+    }
+
+    fn branch(&self) {}
+
+    fn branch_of(&self, _q: &Joints<N>) {}
+
+    fn assemble(
+        &self,
+        q: &Joints<N>,
+        _branch: (),
+        _near: Option<&Joints<N>>,
+    ) -> Result<Joints<N>, KinematicsError> {
+        Ok(*q)
+    }
+
+    fn pose(&self, q: &Joints<N>) -> Pose {
         // Source 003 eq. 3.1, X = p·θ with p per radian and gear included.
-        Ok(Pose::at(Vector3::from_fn(|row, _| if row < N { q[row] } else { 0.0 })))
+        Pose::at(Vector3::from_fn(|row, _| if row < N { q[row] } else { 0.0 }))
+    }
+
+    fn margins(&self, _q: &Joints<N>) -> Vec<Margin> {
+        Vec::new()
+    }
+
+    fn has_constant_mass(&self) -> bool {
+        true
+    }
+
+    fn is_linear(&self) -> bool {
+        true
     }
 
     fn inverse(
@@ -53,7 +84,7 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
         Ok(Self::joints(&pose.position))
     }
 
-    fn jacobian(&self, _q: &Joints<N>, _branch: ()) -> Jacobian<N> {
+    fn jacobian(&self, _q: &Joints<N>) -> Jacobian<N> {
         Jacobian::from_fn(|row, column| if row == column { 1.0 } else { 0.0 })
     }
 
@@ -72,15 +103,15 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
         })
     }
 
-    fn mass_matrix(&self, _q: &Joints<N>, _branch: ()) -> SMatrix<f64, N, N> {
+    fn mass_matrix(&self, _q: &Joints<N>) -> SMatrix<f64, N, N> {
         SMatrix::from_diagonal(&SVector::from(self.mass))
     }
 
-    fn bias(&self, q: &Joints<N>, _velocity: &Joints<N>, _branch: ()) -> Joints<N> {
-        self.gravity(q, ())
+    fn bias(&self, q: &Joints<N>, _velocity: &Joints<N>) -> Joints<N> {
+        self.gravity(q)
     }
 
-    fn gravity(&self, _q: &Joints<N>, _branch: ()) -> Joints<N> {
+    fn gravity(&self, _q: &Joints<N>) -> Joints<N> {
         SVector::from_fn(|row, _| if row == 2 { self.mass[row] * STANDARD_GRAVITY } else { 0.0 })
     }
 

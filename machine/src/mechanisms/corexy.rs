@@ -7,7 +7,8 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::transmission::Elasticity;
 use crate::kinematics::{
-    Jacobian, JointMotion, Joints, KinematicsError, Mechanism, Pose, ToolMotion, in_plane,
+    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
+    in_plane,
 };
 
 /// The head on its two belts.
@@ -37,11 +38,41 @@ fn seen_from_belts([x, y]: [f64; 2]) -> Matrix2<f64> {
 
 impl Mechanism<2> for CoreXy {
     type Branch = ();
+    type Assembly = Joints<2>;
 
     const NAME: &'static str = "corexy";
 
-    fn forward(&self, q: &Joints<2>, _branch: ()) -> Result<Pose, KinematicsError> {
-        Ok(Pose::at(Vector3::new((q[0] + q[1]) / 2.0, (q[0] - q[1]) / 2.0, 0.0)))
+    fn freedom(&self) -> Freedom {
+        Freedom::Plane
+    }
+
+    fn branch(&self) {}
+
+    fn branch_of(&self, _q: &Joints<2>) {}
+
+    fn assemble(
+        &self,
+        q: &Joints<2>,
+        _branch: (),
+        _near: Option<&Joints<2>>,
+    ) -> Result<Joints<2>, KinematicsError> {
+        Ok(*q)
+    }
+
+    fn pose(&self, q: &Joints<2>) -> Pose {
+        Pose::at(Vector3::new((q[0] + q[1]) / 2.0, (q[0] - q[1]) / 2.0, 0.0))
+    }
+
+    fn margins(&self, _q: &Joints<2>) -> Vec<Margin> {
+        Vec::new()
+    }
+
+    fn has_constant_mass(&self) -> bool {
+        true
+    }
+
+    fn is_linear(&self) -> bool {
+        true
     }
 
     fn inverse(
@@ -54,7 +85,7 @@ impl Mechanism<2> for CoreXy {
         Ok(belts(&pose.position))
     }
 
-    fn jacobian(&self, _q: &Joints<2>, _branch: ()) -> Jacobian<2> {
+    fn jacobian(&self, _q: &Joints<2>) -> Jacobian<2> {
         let mut jacobian = Jacobian::zeros();
         jacobian[(0, 0)] = 0.5;
         jacobian[(0, 1)] = 0.5;
@@ -78,16 +109,16 @@ impl Mechanism<2> for CoreXy {
         })
     }
 
-    fn mass_matrix(&self, _q: &Joints<2>, _branch: ()) -> Matrix2<f64> {
+    fn mass_matrix(&self, _q: &Joints<2>) -> Matrix2<f64> {
         // Source 003 eq. 4.6 and 4.7: τ = Jᵀ·M·a.
         seen_from_belts(self.mass)
     }
 
-    fn bias(&self, q: &Joints<2>, _velocity: &Joints<2>, _branch: ()) -> Joints<2> {
-        self.gravity(q, ())
+    fn bias(&self, q: &Joints<2>, _velocity: &Joints<2>) -> Joints<2> {
+        self.gravity(q)
     }
 
-    fn gravity(&self, _q: &Joints<2>, _branch: ()) -> Joints<2> {
+    fn gravity(&self, _q: &Joints<2>) -> Joints<2> {
         Joints::zeros()
     }
 

@@ -94,7 +94,7 @@ impl MechanismVisitor for Departure<'_> {
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
         let Self { standing, axes, area, wanted } = self;
-        let branch = M::Branch::default();
+        let branch = mechanism.branch();
         let joints = Joints::<N>::from_fn(|axis, _| standing[axis]);
         let is_here = |point: &Vector3<f64>| {
             let there = mechanism.inverse(&Pose::at(*point), branch, &joints);
