@@ -27,6 +27,8 @@ pub struct Machine {
     pub area: WorkArea,
     /// Where the tool rests, machine frame [m].
     pub home: [f64; 3],
+    /// How the joints stand there, load side [m or rad].
+    pub home_joints: Vec<f64>,
     /// Limits of the tool's motion.
     pub path: PathLimits,
     /// The laser source.

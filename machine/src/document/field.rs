@@ -96,6 +96,8 @@ fn finite(number: f64, place: Place, findings: &mut Findings) -> Option<f64> {
 pub struct Quantity<K, R = Any> {
     /// The value, SI units and radians.
     pub value: f64,
+    /// Which of the dimensions of its kind it was given in.
+    pub form: usize,
     /// Where it stands.
     pub place: Place,
     kind: PhantomData<(K, R)>,
@@ -126,10 +128,10 @@ impl<K: Kind, R: Range> Decode for Quantity<K, R> {
                 return None;
             }
         };
-        match quantity::read::<K>(text) {
-            Ok(value) => {
+        match quantity::read_form::<K>(text) {
+            Ok((value, form)) => {
                 let value = check_range::<R>(value, text.trim(), place, findings)?;
-                Some(Self { value, place, kind: PhantomData })
+                Some(Self { value, form, place, kind: PhantomData })
             }
             Err(error) => {
                 let kind = match error.kind {

@@ -4,8 +4,9 @@ use core::f64::consts::TAU;
 
 use super::tables::{AxisTable, LimitsTable};
 use crate::actuator::{Axis, DcMotor, Encoder, Friction, LoopGains};
-use crate::document::{Findings, ProblemKind};
+use crate::document::{Either, Findings, ProblemKind, Quantity, Range};
 use crate::limits::AxisLimits;
+use crate::quantity::Kind;
 
 /// Share of the motor's no-load speed that an axis may use where the file sets no limit: what is
 /// left of the voltage there drives the current that friction takes.
@@ -15,18 +16,75 @@ const SPEED_SHARE: f64 = 0.9;
 pub(super) struct Joint {
     /// The name that the axis must have.
     pub(super) name: &'static str,
-    /// Joint travel per radian of the gear's output [m/rad].
+    /// What it is measured in.
+    pub(super) unit: JointUnit,
+    /// Joint travel per radian of the gear's output [m/rad or rad/rad].
     pub(super) travel: f64,
-    /// Load that the joint moves, the other joints at rest [kg].
+    /// Load that the joint moves, the other joints at rest [kg or kg·m²].
     pub(super) load: f64,
     /// Inertia that turns stiffly with the gear's output [kg·m²].
     pub(super) stiff_inertia: f64,
-    /// Range of the joint over the working area [m].
-    pub(super) range: [f64; 2],
-    /// The joint at home [m].
+    /// Range of the joint over the working area [m or rad], where it follows from the area.
+    pub(super) range: Option<[f64; 2]>,
+    /// The joint at home [m or rad].
     pub(super) home: f64,
     /// Joint speed per tool speed in the tool's least favourable direction.
     pub(super) worst_speed: f64,
+}
+
+/// What a joint is measured in. Its number is the form of a quantity of a joint's travel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum JointUnit {
+    /// [m].
+    Length = 0,
+    /// [rad].
+    Angle = 1,
+}
+
+impl JointUnit {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Length => "m",
+            Self::Angle => "rad",
+        }
+    }
+
+    /// The following error that stops the machine where the file names none.
+    fn following_error(self) -> f64 {
+        match self {
+            Self::Length => 1e-3,
+            Self::Angle => 1e-2,
+        }
+    }
+
+    fn example_range(self) -> &'static str {
+        match self {
+            Self::Length => "[\"0 mm\", \"200 mm\"]",
+            Self::Angle => "[\"-90 deg\", \"90 deg\"]",
+        }
+    }
+
+    /// Refuses a `quantity` of `axis` that is of the other kind.
+    pub(super) fn expect<K: Kind, R: Range>(
+        self,
+        quantity: &Quantity<K, R>,
+        axis: &str,
+        findings: &mut Findings,
+    ) {
+        if quantity.form == self as usize {
+            return;
+        }
+        let (moves, due) = match self {
+            Self::Length => ("moves along a line", "a length, such as \"1 mm\""),
+            Self::Angle => ("turns", "an angle, such as \"1 deg\""),
+        };
+        findings.refuse(
+            ProblemKind::WrongUnit,
+            quantity.place,
+            format!("axis `{axis}` {moves}: this unit does not fit"),
+            Some(format!("write it with {due}")),
+        );
+    }
 }
 
 /// The axis that `table` describes, driving `joint`.
@@ -139,14 +197,48 @@ fn limits(
     ratio: f64,
     findings: &mut Findings,
 ) -> AxisLimits {
-    let margin = table.following_error.value;
-    let position = match table.position {
-        None => [joint.range[0] - margin, joint.range[1] + margin],
-        Some([lower, upper]) => {
+    let unit = joint.unit;
+    let margin = table.following_error.map_or(unit.following_error(), |given| {
+        unit.expect(&given, joint.name, findings);
+        given.value
+    });
+    let position = match &table.position {
+        None => match joint.range {
+            Some([lower, upper]) => [lower - margin, upper + margin],
+            None => {
+                findings.refuse(
+                    ProblemKind::MissingKey,
+                    table.place,
+                    format!("the range of axis `{}` does not follow from the area", joint.name),
+                    Some(format!(
+                        "add `position = {}` to the axis's `limits`",
+                        unit.example_range()
+                    )),
+                );
+                [f64::NEG_INFINITY, f64::INFINITY]
+            }
+        },
+        Some(Either::Word(word)) => {
+            if unit == JointUnit::Length {
+                findings.contradict(
+                    word.place,
+                    format!("axis `{}` moves along a line, which ends somewhere", joint.name),
+                    "write [from, to]",
+                );
+            }
+            [f64::NEG_INFINITY, f64::INFINITY]
+        }
+        Some(Either::Value([lower, upper])) => {
+            unit.expect(lower, joint.name, findings);
+            unit.expect(upper, joint.name, findings);
+            let name = unit.name();
             if lower.value >= upper.value {
                 findings.contradict(
                     lower.place,
-                    format!("the range from {} m to {} m is empty", lower.value, upper.value),
+                    format!(
+                        "the range from {} {name} to {} {name} is empty",
+                        lower.value, upper.value
+                    ),
                     "write [from, to], the smaller first",
                 );
             } else if joint.home < lower.value || joint.home > upper.value {
@@ -154,7 +246,7 @@ fn limits(
                 findings.contradict(
                     place,
                     format!(
-                        "axis `{}` is at {} m at home, outside its limits {} m to {} m",
+                        "axis `{}` is at {} {name} at home, outside its limits {} {name} to {} {name}",
                         joint.name, joint.home, lower.value, upper.value
                     ),
                     "widen the limits, or move `home`",
@@ -169,9 +261,22 @@ fn limits(
     {
         findings.contradict(
             velocity.place,
-            format!("the motor reaches {no_load:.4} m/s without load, not {} m/s", velocity.value),
+            format!(
+                "the motor reaches {no_load:.4} {name}/s without load, not {} {name}/s",
+                velocity.value,
+                name = unit.name()
+            ),
             "lower the limit, or leave it out to use 90 % of what the motor can do",
         );
+    }
+    if let Some(limit) = &table.velocity {
+        unit.expect(limit, joint.name, findings);
+    }
+    if let Some(limit) = &table.acceleration {
+        unit.expect(limit, joint.name, findings);
+    }
+    if let Some(limit) = &table.jerk {
+        unit.expect(limit, joint.name, findings);
     }
     AxisLimits {
         position,

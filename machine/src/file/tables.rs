@@ -4,7 +4,9 @@
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
-use crate::document::{Fraction, Keyword, Located, Named, NonNegative, Number, Point, Positive};
+use crate::document::{
+    Either, Fraction, Keyword, Located, Named, NonNegative, Number, Point, Positive,
+};
 use crate::process::ZMeaning;
 use crate::quantity as unit;
 use crate::table;
@@ -25,13 +27,17 @@ table! {
         pub description: Option<Located<String>>,
         /// Where the tool rests, [x, y] or [x, y, z]; the centre of the area when left out.
         pub home: Option<Point>,
+        /// How the axes stand at rest, one value each, for machines that can hold the tool in one
+        /// place in several ways. Instead of `home`.
+        pub home_axes: Option<Vec<Signed<unit::Travel>>>,
         /// Where the tool may go.
         pub area: AreaTable,
         /// Limits of the tool's motion, as norms of the vectors.
         pub path: PathTable,
         /// How the axes move the tool: one table, named by the kind of mechanism.
         pub mechanism: MechanismTable,
-        /// One table for each axis: `x` and `y` (and `z`) of a cartesian, `a` and `b` of a corexy.
+        /// One table for each axis, named as the mechanism names them: `x` and `y` (and `z`) of a
+        /// cartesian, `a` and `b` of a corexy, `th1`, `th2` and `d` of a polar.
         pub axis: Named<AxisTable>,
         /// The laser source.
         pub laser: LaserTable,
@@ -135,8 +141,11 @@ table! {
 table! {
     /// One axis: what stands between the voltage and the joint.
     pub struct AxisTable {
-        /// Turns of the motor per turn of the screw or pulley.
+        /// Turns of the motor per turn of the screw, pulley or arm.
         pub gear: Number<Positive> = 1.0,
+        /// What stands between gear and joint; of a cartesian and a corexy the mechanism's own
+        /// table says it.
+        pub transmission: TransmissionTable,
         /// Efficiency of gear and screw, for sizing only: losses in motion are `friction`.
         pub efficiency: Fraction<Positive> = 1.0,
         /// The motor: one table, named by its kind.
@@ -203,19 +212,22 @@ table! {
 }
 
 table! {
-    /// Limits of one axis, in the joint's travel: of the carriage, or of the belt.
+    /// Limits of one axis, in the joint's travel: of the carriage, the belt, the arm or the table.
     pub struct LimitsTable {
         /// Soft limits [from, to]; when left out, the range that the area needs and the following
         /// error beyond it.
-        pub position: Option<[Signed<unit::Length>; 2]>,
+        /// Of an arm or a table, angles; "unlimited" for a table that may turn for ever. Machines
+        /// whose axes do not follow from the area must say it.
+        pub position: Option<Either<Unlimited, [Signed<unit::Travel>; 2]>>,
         /// Largest speed; when left out, 90 % of what the motor reaches without load.
-        pub velocity: Option<Above<unit::Speed>>,
+        pub velocity: Option<Above<unit::TravelSpeed>>,
         /// Largest acceleration; none when left out.
-        pub acceleration: Option<Above<unit::Acceleration>>,
+        pub acceleration: Option<Above<unit::TravelAcceleration>>,
         /// Largest jerk; none when left out.
-        pub jerk: Option<Above<unit::Jerk>>,
-        /// Largest difference between setpoint and feedback before the machine stops.
-        pub following_error: Above<unit::Length> = "1 mm",
+        pub jerk: Option<Above<unit::TravelJerk>>,
+        /// Largest difference between setpoint and feedback before the machine stops; 1 mm or
+        /// 10 mrad when left out.
+        pub following_error: Option<Above<unit::Travel>>,
     }
 }
 
@@ -287,6 +299,111 @@ table! {
     pub struct JobTable {
         /// The job that runs when none is named, relative to this file.
         pub sample: Located<String>,
+    }
+}
+
+table! {
+    /// What stands between the gear and a joint: one of these, or nothing for a joint that turns
+    /// with the gear.
+    pub struct TransmissionTable {
+        /// A screw that moves a carriage.
+        pub screw: Option<AxisScrewTable>,
+        /// A belt on a pulley.
+        pub belt: Option<AxisBeltTable>,
+        /// The gear alone, with its elasticity.
+        pub direct: Option<DirectTable>,
+        /// An arm that bends, on the gear.
+        pub link: Option<LinkTable>,
+        /// A planar motor on its stator.
+        pub planar: Option<PlanarTable>,
+    }
+}
+
+table! {
+    /// A screw that moves a carriage.
+    pub struct AxisScrewTable {
+        /// Travel per turn of the screw.
+        pub lead: Above<unit::Lead>,
+        /// Moment of inertia of the screw; it turns with the motor.
+        pub inertia: AtLeastZero<unit::Inertia> = "0 kg m^2",
+        /// Torsional stiffness from gear to nut, the axial one in series; rigid when left out.
+        pub stiffness: Option<Above<unit::TorsionalStiffness>>,
+        /// Damping of that spring, as a share of critical damping.
+        pub damping_ratio: Number<Positive> = 0.9,
+    }
+}
+
+table! {
+    /// A belt on a pulley.
+    pub struct AxisBeltTable {
+        /// Pitch radius of the pulley.
+        pub pulley_radius: Above<unit::Length>,
+        /// Moment of inertia of the pulleys; they turn with the gear.
+        pub inertia: AtLeastZero<unit::Inertia> = "0 kg m^2",
+        /// Stiffness of the belt; rigid when left out.
+        pub stiffness: Option<Above<unit::Stiffness>>,
+        /// Damping of that spring, as a share of critical damping.
+        pub damping_ratio: Number<Positive> = 0.9,
+    }
+}
+
+table! {
+    /// The gear alone.
+    pub struct DirectTable {
+        /// Moment of inertia that turns stiffly with the gear's output.
+        pub inertia: AtLeastZero<unit::Inertia> = "0 kg m^2",
+        /// Torsional stiffness of gear and shaft, seen at the joint; rigid when left out.
+        pub stiffness: Option<Above<unit::TorsionalStiffness>>,
+        /// Damping of that spring, as a share of critical damping.
+        pub damping_ratio: Number<Positive> = 0.9,
+    }
+}
+
+table! {
+    /// An arm that bends like a beam clamped at the gear, its bending lumped in one spring.
+    pub struct LinkTable {
+        /// Length of the beam.
+        pub length: Above<unit::Length>,
+        /// Modulus of elasticity of its material.
+        pub modulus: Above<unit::Modulus>,
+        /// Second moment of area of its cross-section, about the axis it bends around.
+        pub second_moment: Above<unit::SecondMoment>,
+        /// Damping of that spring, as a share of critical damping.
+        pub damping_ratio: Number<Positive> = 0.9,
+    }
+}
+
+table! {
+    /// A planar stepper motor on its stator.
+    pub struct PlanarTable {
+        /// Pitch of the stator's teeth: travel per electrical turn of the motor's field.
+        pub pitch: Above<unit::Length>,
+    }
+}
+
+/// The word for an axis without end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unlimited {
+    /// It may turn for ever.
+    Unlimited,
+}
+
+impl Keyword for Unlimited {
+    const NAME: &'static str = "a range";
+    const WORDS: &'static [(&'static str, Self)] = &[("unlimited", Self::Unlimited)];
+}
+
+impl JsonSchema for Unlimited {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Unlimited".into()
+    }
+
+    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "enum": ["unlimited"] })
     }
 }
 

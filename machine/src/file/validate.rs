@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::axes::{Joint, axis};
+use super::axes::{Joint, JointUnit, axis};
 use super::doubts;
 use super::tables::{
     AreaTable, AxisTable, CartesianTable, CoreXyTable, MachineTable, MechanismTable, OriginsTable,
@@ -69,6 +69,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         axes,
         area,
         home,
+        home_joints: joints.iter().map(|joint| joint.home).collect(),
         path: PathLimits {
             speed: table.path.speed.value,
             rapid: table.path.rapid.value,
@@ -193,7 +194,8 @@ fn cartesian_kind(
             travel: screw.lead.value,
             load: screw.mass.value,
             stiff_inertia: screw.inertia.value,
-            range: [area.lower[index], area.upper[index]],
+            unit: JointUnit::Length,
+            range: Some([area.lower[index], area.upper[index]]),
             home: home[index],
             worst_speed: 1.0,
         })
@@ -244,7 +246,8 @@ fn corexy_kind(
         // Source 003 eq. 4.6: the diagonal of Jᵀ·M·J.
         load: (mass[0] + mass[1]) / 4.0,
         stiff_inertia: 0.0,
-        range,
+        unit: JointUnit::Length,
+        range: Some(range),
         home,
         // Along a diagonal one belt takes the whole motion.
         worst_speed: core::f64::consts::SQRT_2,

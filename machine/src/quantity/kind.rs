@@ -39,6 +39,14 @@ macro_rules! kinds {
 kinds! {
     /// [m].
     Length = "a length", "120" "mm", [1, 0, 0, 0, 0, 0];
+    /// [rad].
+    Angle = "an angle", "90" "deg", [0, 0, 0, 0, 1, 0];
+    /// [N].
+    Force = "a force", "2" "N", [1, 1, -2, 0, 0, 0];
+    /// Of elasticity of a material [Pa].
+    Modulus = "a modulus of elasticity", "70e9" "N/m^2", [-1, 1, -2, 0, 0, 0];
+    /// Of a cross-section [m⁴].
+    SecondMoment = "a second moment of area", "8e-9" "m^4", [4, 0, 0, 0, 0, 0];
     /// [kg].
     Mass = "a mass", "0.33" "kg", [0, 1, 0, 0, 0, 0];
     /// [s].
@@ -80,4 +88,15 @@ kinds! {
     /// [N·m/A] or [V·s/rad], which are the same for a motor.
     TorqueConstant = "a torque constant", "0.021" "N m/A",
         [2, 1, -2, -1, 0, 0] [2, 1, -2, -1, -1, 0];
+    // Last, so that an error names the plain kinds of what was written.
+    /// Of a joint, [m] or [rad].
+    Travel = "a length or an angle", "120" "mm", [1, 0, 0, 0, 0, 0] [0, 0, 0, 0, 1, 0];
+    /// Of a joint, [m/s] or [rad/s].
+    TravelSpeed = "a speed", "0.25" "m/s", [1, 0, -1, 0, 0, 0] [0, 0, -1, 0, 1, 0];
+    /// Of a joint, [m/s²] or [rad/s²].
+    TravelAcceleration = "an acceleration", "10" "m/s^2", [1, 0, -2, 0, 0, 0] [0, 0, -2, 0, 1, 0];
+    /// Of a joint, [m/s³] or [rad/s³].
+    TravelJerk = "a jerk", "500" "m/s^3", [1, 0, -3, 0, 0, 0] [0, 0, -3, 0, 1, 0];
+    /// Of a spring between motor and joint, [N/m] or [N·m/rad].
+    JointStiffness = "a stiffness", "60" "N/mm", [0, 1, -2, 0, 0, 0] [2, 1, -2, 0, -1, 0];
 }

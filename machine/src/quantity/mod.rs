@@ -10,9 +10,10 @@ mod parse;
 mod unit;
 
 pub use kind::{
-    Acceleration, AngularSpeed, Bandwidth, CountsPerTurn, Current, Damping, Duration, Inductance,
-    Inertia, Jerk, Kind, Lead, Length, Mass, Resistance, Speed, Stiffness, Torque, TorqueConstant,
-    TorsionalDamping, TorsionalStiffness, Voltage,
+    Acceleration, Angle, AngularSpeed, Bandwidth, CountsPerTurn, Current, Damping, Duration, Force,
+    Inductance, Inertia, Jerk, JointStiffness, Kind, Lead, Length, Mass, Modulus, Resistance,
+    SecondMoment, Speed, Stiffness, Torque, TorqueConstant, TorsionalDamping, TorsionalStiffness,
+    Travel, TravelAcceleration, TravelJerk, TravelSpeed, Voltage,
 };
 pub use parse::{QuantityError, QuantityErrorKind};
 pub use unit::Dimension;
@@ -40,14 +41,22 @@ pub const SMALLEST: f64 = 1e-15;
 /// );
 /// ```
 pub fn read<K: Kind>(text: &str) -> Result<f64, QuantityError> {
+    read_form::<K>(text).map(|(value, _)| value)
+}
+
+/// Reads `text` as [`read`], and says which of the kind's dimensions it has.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_form<K: Kind>(text: &str) -> Result<(f64, usize), QuantityError> {
     let (value, dimension) = parse::parse(text).map_err(|error| error.due::<K>())?;
-    if !K::DIMENSIONS.contains(&dimension) {
+    let Some(form) = K::DIMENSIONS.iter().position(|known| *known == dimension) else {
         return Err(QuantityError::wrong_dimension::<K>(text, dimension));
-    }
+    };
     if value.abs() > LARGEST {
         return Err(QuantityError::too_large::<K>(text));
     }
-    Ok(value)
+    Ok((value, form))
 }
 
 /// Reads `text` as a share, `"80 %"` or `"0.8"`.
