@@ -16,10 +16,12 @@
 //! - There is no holding brake, no backlash, no measurement noise and no thermal model.
 //!
 //! Integration: fourth order at a fixed substep of 50 µs or finer ([`dynamics`], [`winding`]),
-//! with friction's events located inside it ([`friction`]). A transmission too stiff for the
+//! with friction's events located inside it ([`friction`]), and third order in what a varying mass
+//! matrix adds ([`coupling`]). A transmission too stiff for the
 //! substep asked for gets a finer one.
 
 pub mod brake;
+pub mod coupling;
 pub mod dynamics;
 pub mod friction;
 pub mod source;
@@ -33,6 +35,7 @@ use signals::{AxisArray, CommandMode, Fault, FaultCode, LaserCycle, MAX_AXES, Na
 
 use crate::port::{Actuation, Freshness, Measurement, Port, Power};
 use brake::Brake;
+use coupling::Unsolvable;
 use dynamics::{Dynamics, Motors, Phases, State};
 use source::Source;
 use winding::Weights;
@@ -144,6 +147,8 @@ pub struct Plant<const N: usize, M: Mechanism<N>> {
     /// Where between two counts each encoder stands at the origin, −0.5..0.5 [counts].
     phase: SVector<f64, N>,
     state: State<N>,
+    /// Where it was a substep before.
+    passed: State<N>,
     in_force: Option<Actuation>,
     light: LaserCycle,
     fault: Fault,
@@ -189,6 +194,13 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         if substeps.is_nan() || substeps > MOST_SUBSTEPS {
             return Err(PlantError::TooStiff { rate });
         }
+        let state = State {
+            current: SVector::zeros(),
+            angle,
+            speed: SVector::zeros(),
+            load,
+            load_speed: SVector::zeros(),
+        };
         Ok(Self {
             brake: Brake::of(&axes),
             source: Source::new(laser),
@@ -198,13 +210,8 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             resolution: SVector::from_fn(|row, _| axes[row].encoder.resolution()),
             origin: angle,
             phase: SVector::from_fn(|row, _| encoder_phase(seed, row as u64)),
-            state: State {
-                current: SVector::zeros(),
-                angle,
-                speed: SVector::zeros(),
-                load,
-                load_speed: SVector::zeros(),
-            },
+            state,
+            passed: state,
             dynamics,
             in_force: None,
             light: LaserCycle::OFF,
@@ -221,6 +228,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
     pub fn place(&mut self, state: State<N>) {
         self.state = state;
         self.dynamics.couple(&mut self.state);
+        self.passed = self.state;
     }
 
     /// The equations that it follows.
@@ -248,10 +256,37 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
                     }))
                 }
             };
-            self.state = friction::advance(&mut self.dynamics, &self.state, &phases, &self.weights);
+            match friction::advance(&mut self.dynamics, &self.state, &phases, &self.weights) {
+                Ok(state) => {
+                    self.passed = self.state;
+                    self.state = state;
+                }
+                Err(unsolvable) => {
+                    self.jam(&unsolvable);
+                    return;
+                }
+            }
             for (current, limit) in self.state.current.iter_mut().zip(motors.current.iter()) {
                 *current = saturate(*current, *limit);
             }
+        }
+    }
+
+    /// The mechanism is driven where it cannot go: it stops short of that as at a wall, a fault
+    /// until it is reset.
+    fn jam(&mut self, unsolvable: &Unsolvable) {
+        self.state = State {
+            current: SVector::zeros(),
+            speed: SVector::zeros(),
+            load_speed: Joints::zeros(),
+            ..self.passed
+        };
+        match unsolvable {
+            Unsolvable::Chain(error) => {
+                let axis = error.axis.map_or(0, |axis| axis as u32 + 1);
+                self.fail(axis, error.value, error.limit);
+            }
+            Unsolvable::Mass => self.fail(0, 0.0, 0.0),
         }
     }
 

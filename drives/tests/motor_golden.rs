@@ -59,7 +59,7 @@ fn respond(
         .map(|time| {
             let steps = (time / SUBSTEP).round() as usize;
             for _ in done..steps {
-                state = friction::advance(dynamics, &state, &phases, &weights);
+                state = friction::advance(dynamics, &state, &phases, &weights).unwrap();
             }
             done = steps;
             state

@@ -306,7 +306,8 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
     /// The part of [`Self::bias`] that is there at rest [N or N·m].
     fn gravity(&self, assembly: &Self::Assembly) -> Joints<N>;
 
-    /// Whether [`Self::mass_matrix`] is the same everywhere.
+    /// Whether [`Self::mass_matrix`] and [`Self::gravity`] are the same everywhere, and there is no
+    /// other bias.
     fn has_constant_mass(&self) -> bool {
         false
     }

@@ -13,13 +13,15 @@
 //! losses are the friction at the shaft.
 //!
 //! Which motors stick, and against which friction the others slide, stands still during a step:
-//! [`friction`](super::friction) sees to that.
+//! [`friction`](super::friction) sees to that. How the inertia of the load changes during it says
+//! [`coupling`](super::coupling).
 
 use machine::kinematics::{Joints, KinematicsError};
 use machine::{Axis, Mechanism};
 use nalgebra::{SMatrix, SVector};
 
 use super::PlantError;
+use super::coupling::{Coupling, LoadSide, Unsolvable};
 use super::friction::Contacts;
 use super::winding::{Weights, Windings};
 
@@ -93,37 +95,36 @@ enum Transmission<const N: usize> {
     Elastic { stiffness: SMatrix<f64, N, N>, damping: SMatrix<f64, N, N> },
 }
 
-/// An inertia in joint coordinates with its inverse; inverted again only when it changes, which
-/// for most mechanisms is never.
-#[derive(Debug, Clone, Copy)]
-struct Inertia<const N: usize> {
-    matrix: SMatrix<f64, N, N>,
-    inverse: SMatrix<f64, N, N>,
-}
-
 /// The equations of motion.
 #[derive(Debug, Clone)]
 pub struct Dynamics<const N: usize, M: Mechanism<N>> {
     mechanism: M,
-    /// The chain at the newest position it could be solved at.
-    assembly: M::Assembly,
     motors: Motors<N>,
     transmission: Transmission<N>,
-    inertia: Inertia<N>,
-    constancy: Constancy,
+    coupling: Coupling<N, M>,
     /// 1/J of each rotor.
     mobility: SVector<f64, N>,
     /// ratio/J of each rotor.
     reaction: SVector<f64, N>,
 }
 
-/// Whether the inertia has changed since the step before.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Constancy {
-    /// It has not, so it is taken as it is for the whole step.
-    Steady,
-    /// It has: every stage of the step evaluates it.
-    Varying,
+/// The part of a substep that a step takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    /// Where it starts, as a share of the substep.
+    pub from: f64,
+    /// How much of it it takes, as a share.
+    pub length: f64,
+}
+
+impl Part {
+    /// All of it.
+    pub const WHOLE: Self = Self { from: 0.0, length: 1.0 };
+
+    /// The share at which it ends.
+    pub fn end(&self) -> f64 {
+        self.from + self.length
+    }
 }
 
 impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
@@ -136,19 +137,15 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             Some(stiffness) => Transmission::Elastic { stiffness, damping: mechanism.damping() },
             None => Transmission::Rigid,
         };
-        let mut matrix = mechanism.mass_matrix(&home);
-        if transmission == Transmission::Rigid {
-            matrix += rotors(&motors);
-        }
-        let inverse = matrix.try_inverse().ok_or(PlantError::SingularMass)?;
+        let rigid = (transmission == Transmission::Rigid).then(|| rotors(&motors));
+        let coupling =
+            Coupling::new(&mechanism, home, rigid).map_err(|_| PlantError::SingularMass)?;
         let mobility = motors.inertia.map(|inertia| 1.0 / inertia);
         Ok(Self {
             mechanism,
-            assembly: home,
             motors,
             transmission,
-            inertia: Inertia { matrix, inverse },
-            constancy: Constancy::Steady,
+            coupling,
             mobility,
             reaction: motors.ratio.component_mul(&mobility),
         })
@@ -164,7 +161,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// # Errors
     /// Where it cannot close.
     pub fn assemble(&self, load: &Joints<N>) -> Result<M::Assembly, KinematicsError> {
-        self.mechanism.assemble(load, self.mechanism.branch(), Some(&self.assembly))
+        self.mechanism.assemble(load, self.mechanism.branch(), Some(self.coupling.assembly()))
     }
 
     /// The motors.
@@ -189,7 +186,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         let Transmission::Elastic { stiffness, damping } = &self.transmission else {
             return drag;
         };
-        let admittance = self.inertia.inverse
+        let admittance = self.coupling.middle().mobility
             + SMatrix::from_diagonal(
                 &motors.ratio.component_mul(&motors.ratio).component_div(&motors.inertia),
             );
@@ -201,9 +198,27 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         (linear + (linear * linear + 4.0 * square).sqrt()) / 2.0
     }
 
-    /// Torque that turns each motor, Coulomb friction left out: what its stiction must hold.
-    pub fn net_torque(&mut self, state: &State<N>, contacts: &Contacts<N>) -> SVector<f64, N> {
-        let motors = self.motors;
+    /// Solves the load side for a substep of `step` [s] that begins in `state`.
+    ///
+    /// # Errors
+    /// If the chain cannot close on the way, or is singular there.
+    pub fn begin(&mut self, state: &State<N>, step: f64) -> Result<(), Unsolvable> {
+        self.coupling.begin(&self.mechanism, &state.load, &state.load_speed, step)
+    }
+
+    /// Ends the substep in `state`, which the next one begins in.
+    pub fn end(&mut self, state: &State<N>, contacts: &Contacts<N>) {
+        if self.coupling.is_constant() {
+            return;
+        }
+        let (_, acceleration) = self.accelerations(state, contacts, &self.coupling.at(1.0));
+        self.coupling.end(&state.load, &state.load_speed, &acceleration);
+    }
+
+    /// Torque that turns each motor at the share `at` of the substep begun, Coulomb friction left
+    /// out: what its stiction must hold.
+    pub fn net_torque(&self, state: &State<N>, contacts: &Contacts<N>, at: f64) -> SVector<f64, N> {
+        let motors = &self.motors;
         let shaft = motors.windings.torque_constant.component_mul(&state.current)
             - motors.viscous.component_mul(&state.speed);
         match self.transmission {
@@ -211,10 +226,10 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
                 shaft - motors.ratio.component_mul(&self.transmitted(state))
             }
             Transmission::Rigid => {
-                let (_, load) = self.accelerations(state, contacts);
-                let bias = self.bias(state);
+                let side = self.coupling.at(at);
+                let (_, load) = self.accelerations(state, contacts, &side);
                 // A held motor bears what the others' acceleration puts on its joint.
-                let load_side = self.inertia.matrix * load + bias;
+                let load_side = side.inertia * load + side.bias;
                 shaft - motors.ratio.component_mul(&load_side)
             }
         }
@@ -233,92 +248,52 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         }
     }
 
-    /// Coriolis, centrifugal and gravity efforts of the load [N or N·m].
-    #[inline(always)]
-    fn bias(&self, state: &State<N>) -> Joints<N> {
-        self.mechanism.bias(&self.assembly, &state.load_speed)
-    }
-
     /// Accelerations of motors [rad/s²] and load [m/s² or rad/s²].
     #[inline(always)] // Four calls a step through memory cost as much as the arithmetic.
     fn accelerations(
-        &mut self,
+        &self,
         state: &State<N>,
         contacts: &Contacts<N>,
+        side: &LoadSide<N>,
     ) -> (SVector<f64, N>, Joints<N>) {
         let motors = &self.motors;
         let torque = motors.windings.torque_constant.component_mul(&state.current)
             - motors.viscous.component_mul(&state.speed)
             - contacts.torque();
-        let bias = self.bias(state);
         match self.transmission {
             Transmission::Elastic { .. } => {
                 let effort = self.transmitted(state);
                 let motor = (self.mobility.component_mul(&torque)
                     - self.reaction.component_mul(&effort))
                 .component_mul(contacts.free());
-                if self.constancy == Constancy::Varying {
-                    self.refresh(&state.load);
-                }
-                (motor, self.inertia.inverse * (effort - bias))
+                (motor, side.mobility * (effort - side.bias))
             }
             Transmission::Rigid => {
-                let push =
-                    (torque.component_div(&motors.ratio) - bias).component_mul(contacts.free());
-                let ratio = motors.ratio;
-                if self.constancy == Constancy::Varying {
-                    self.refresh(&state.load);
-                }
+                let push = (torque.component_div(&motors.ratio) - side.bias)
+                    .component_mul(contacts.free());
                 let load = if contacts.any_held() {
-                    self.partly_held(&push, contacts.free())
+                    partly_held(&side.inertia, &push, contacts.free())
                 } else {
-                    self.inertia.inverse * push
+                    side.mobility * push
                 };
-                (load.component_div(&ratio), load)
+                (load.component_div(&motors.ratio), load)
             }
         }
     }
 
-    /// Accelerations of the joints that are free, the others being held.
-    fn partly_held(&self, push: &Joints<N>, free: &SVector<f64, N>) -> Joints<N> {
-        let matrix = SMatrix::<f64, N, N>::from_fn(|row, column| {
-            let held = if row == column { 1.0 - free[row] } else { 0.0 };
-            self.inertia.matrix[(row, column)] * free[row] * free[column] + held
-        });
-        // A principal part of a positive definite matrix is one too.
-        matrix.try_inverse().map_or_else(Joints::zeros, |inverse| inverse * push)
-    }
-
-    /// Follows a mass matrix that depends on the position. One that cannot be inverted, at a
-    /// singular position, leaves the last good one in force.
-    fn refresh(&mut self, load: &Joints<N>) -> Constancy {
-        if let Ok(assembly) = self.assemble(load) {
-            self.assembly = assembly;
-        }
-        let mut matrix = self.mechanism.mass_matrix(&self.assembly);
-        if self.transmission == Transmission::Rigid {
-            matrix += rotors(&self.motors);
-        }
-        if matrix == self.inertia.matrix {
-            return Constancy::Steady;
-        }
-        if let Some(inverse) = matrix.try_inverse() {
-            self.inertia = Inertia { matrix, inverse };
-        }
-        Constancy::Varying
-    }
-
-    /// Where `start` is after one step of the length of `weights`.
+    /// Where `start` is after one step of the length of `weights`, which is `part` of the substep
+    /// begun.
     ///
     /// Classical fourth-order Runge–Kutta for the mechanical part; the winding is solved by its
     /// exponentials at the same stages. Current beyond the power stage's limit is cut at the
     /// end of the step: see [`super::Plant`].
     pub fn step(
-        &mut self,
+        &self,
         start: &State<N>,
         contacts: &Contacts<N>,
         phases: &Phases<N>,
         weights: &Weights<N>,
+        part: Part,
     ) -> State<N> {
         let step = weights.step;
         let half = 0.5 * step;
@@ -333,12 +308,14 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
              speed: &SVector<f64, N>| {
                 course.as_ref().map_or_else(SVector::zeros, |course| value(course, weights, speed))
             };
-        self.constancy = self.refresh(&start.load);
+        let side = self.coupling.at(part.from);
+        let halfway = self.coupling.at(part.from + 0.5 * part.length);
+        let last = self.coupling.at(part.end());
         let mut first = *start;
         if course.is_none() {
             first.current = SVector::zeros();
         }
-        let (motor_1, load_1) = self.accelerations(&first, contacts);
+        let (motor_1, load_1) = self.accelerations(&first, contacts, &side);
 
         let mut second = State {
             current: current(|course, weights, _| course.second(weights), &first.speed),
@@ -348,7 +325,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             load_speed: first.load_speed + load_1 * half,
         };
         self.couple(&mut second);
-        let (motor_2, load_2) = self.accelerations(&second, contacts);
+        let (motor_2, load_2) = self.accelerations(&second, contacts, &halfway);
 
         let mut third = State {
             current: current(super::winding::Course::third, &second.speed),
@@ -358,7 +335,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             load_speed: first.load_speed + load_2 * half,
         };
         self.couple(&mut third);
-        let (motor_3, load_3) = self.accelerations(&third, contacts);
+        let (motor_3, load_3) = self.accelerations(&third, contacts, &halfway);
 
         let mut fourth = State {
             current: current(super::winding::Course::fourth, &third.speed),
@@ -368,7 +345,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             load_speed: first.load_speed + load_3 * step,
         };
         self.couple(&mut fourth);
-        let (motor_4, load_4) = self.accelerations(&fourth, contacts);
+        let (motor_4, load_4) = self.accelerations(&fourth, contacts, &last);
 
         let sixth = step / 6.0;
         let between = second.speed + third.speed;
@@ -388,6 +365,20 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         self.couple(&mut end);
         end
     }
+}
+
+/// Accelerations of the joints that are free, the others being held.
+fn partly_held<const N: usize>(
+    inertia: &SMatrix<f64, N, N>,
+    push: &Joints<N>,
+    free: &SVector<f64, N>,
+) -> Joints<N> {
+    let matrix = SMatrix::<f64, N, N>::from_fn(|row, column| {
+        let held = if row == column { 1.0 - free[row] } else { 0.0 };
+        inertia[(row, column)] * free[row] * free[column] + held
+    });
+    // A principal part of a positive definite matrix is one too.
+    matrix.try_inverse().map_or_else(Joints::zeros, |inverse| inverse * push)
 }
 
 /// The rotors' inertia in joint coordinates.

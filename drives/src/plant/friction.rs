@@ -13,7 +13,8 @@
 use machine::Mechanism;
 use nalgebra::SVector;
 
-use super::dynamics::{Dynamics, Phases, State};
+use super::coupling::Unsolvable;
+use super::dynamics::{Dynamics, Part, Phases, State};
 use super::winding::Weights;
 
 /// Refinements of the instant of an event; the margins are smooth, so that each takes regula
@@ -79,7 +80,7 @@ impl<const N: usize> Contacts<N> {
     }
 
     /// The contacts in which `state` goes on.
-    fn decide<M: Mechanism<N>>(dynamics: &mut Dynamics<N, M>, state: &State<N>) -> Self {
+    fn decide<M: Mechanism<N>>(dynamics: &Dynamics<N, M>, state: &State<N>) -> Self {
         let coulomb = dynamics.motors().coulomb;
         let mut contacts = Self::new();
         for motor in 0..N {
@@ -93,7 +94,7 @@ impl<const N: usize> Contacts<N> {
         // Behind a rigid transmission, one motor that lets go changes what the others must bear:
         // the worst lets go first, and the rest are asked again.
         while contacts.any_held() {
-            let torque = dynamics.net_torque(state, &contacts);
+            let torque = dynamics.net_torque(state, &contacts, 0.0);
             let mut worst = None;
             let mut excess = 0.0;
             for motor in 0..N {
@@ -111,11 +112,12 @@ impl<const N: usize> Contacts<N> {
     /// How far each motor is from the end of its contact; negative once it is past it.
     fn margins<M: Mechanism<N>>(
         &self,
-        dynamics: &mut Dynamics<N, M>,
+        dynamics: &Dynamics<N, M>,
         state: &State<N>,
+        at: f64,
     ) -> [f64; N] {
         let torque =
-            if self.any_held() { dynamics.net_torque(state, self) } else { SVector::zeros() };
+            if self.any_held() { dynamics.net_torque(state, self, at) } else { SVector::zeros() };
         let coulomb = dynamics.motors().coulomb;
         core::array::from_fn(|motor| match self.contact[motor] {
             Contact::Frictionless => f64::INFINITY,
@@ -126,52 +128,63 @@ impl<const N: usize> Contacts<N> {
 }
 
 /// Takes `state` one step on, through all events inside it.
+///
+/// # Errors
+/// If the mechanism cannot go where this step leads.
 pub fn advance<const N: usize, M: Mechanism<N>>(
     dynamics: &mut Dynamics<N, M>,
     state: &State<N>,
     phases: &Phases<N>,
     weights: &Weights<N>,
-) -> State<N> {
+) -> Result<State<N>, Unsolvable> {
+    let whole = weights.step;
+    dynamics.begin(state, whole)?;
     let mut state = *state;
+    let mut part = Part::WHOLE;
     let mut weights = *weights;
     let mut contacts = Contacts::decide(dynamics, &state);
     // Every motor may stop and start again within a step; more than that is chatter.
     for _ in 0..2 * N + 2 {
-        let end = dynamics.step(&state, &contacts, phases, &weights);
-        let after = contacts.margins(dynamics, &end);
+        let end = dynamics.step(&state, &contacts, phases, &weights, part);
+        let after = contacts.margins(dynamics, &end, part.end());
         if after.iter().all(|margin| *margin >= 0.0) {
-            return end;
+            dynamics.end(&end, &contacts);
+            return Ok(end);
         }
-        let before = contacts.margins(dynamics, &state);
+        let before = contacts.margins(dynamics, &state, part.from);
         let first = earliest(&before, &after);
         let (motor, _) = first;
         let margins = (before[motor], after[motor]);
-        let share = locate(dynamics, &state, &contacts, phases, &weights, first, margins);
+        let share = locate(dynamics, &state, &contacts, phases, (&weights, part), first, margins);
         let rest = weights.step * (1.0 - share);
         if share > 0.0 {
             weights = dynamics.motors().windings.weights(weights.step * share);
-            state = dynamics.step(&state, &contacts, phases, &weights);
+            part.length = weights.step / whole;
+            state = dynamics.step(&state, &contacts, phases, &weights, part);
+            part.from = part.end();
         }
         let coulomb = dynamics.motors().coulomb[motor];
         match contacts.contact[motor] {
             Contact::Held => {
-                let sign = dynamics.net_torque(&state, &contacts)[motor].signum();
+                let sign = dynamics.net_torque(&state, &contacts, part.from)[motor].signum();
                 contacts.set(motor, Contact::Sliding(sign), coulomb);
             }
             Contact::Sliding(_) | Contact::Frictionless => {
                 state.speed[motor] = 0.0;
                 dynamics.couple(&mut state);
                 contacts.set(motor, Contact::Held, coulomb);
-                let torque = dynamics.net_torque(&state, &contacts)[motor];
+                let torque = dynamics.net_torque(&state, &contacts, part.from)[motor];
                 if torque.abs() > coulomb {
                     contacts.set(motor, Contact::Sliding(torque.signum()), coulomb);
                 }
             }
         }
         if rest <= weights.step * TIME_RESOLUTION {
-            return state;
+            dynamics.end(&state, &contacts);
+            return Ok(state);
         }
         weights = dynamics.motors().windings.weights(rest);
+        part.length = rest / whole;
     }
     // Chatter: what changes its mind again and again within a step is at rest in it.
     for motor in 0..N {
@@ -179,7 +192,9 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
             contacts.set(motor, Contact::Held, 0.0);
         }
     }
-    dynamics.step(&state, &contacts, phases, &weights)
+    let end = dynamics.step(&state, &contacts, phases, &weights, part);
+    dynamics.end(&end, &contacts);
+    Ok(end)
 }
 
 /// The motor whose contact ends first, with the share of the step at which it does, by the chord.
@@ -203,11 +218,11 @@ fn chord(before: f64, after: f64) -> f64 {
 
 /// The share of the step at which the margin of `motor` vanishes, from the guess `share` on.
 fn locate<const N: usize, M: Mechanism<N>>(
-    dynamics: &mut Dynamics<N, M>,
+    dynamics: &Dynamics<N, M>,
     state: &State<N>,
     contacts: &Contacts<N>,
     phases: &Phases<N>,
-    weights: &Weights<N>,
+    (weights, whole): (&Weights<N>, Part),
     (motor, guess): (usize, f64),
     (before, after): (f64, f64),
 ) -> f64 {
@@ -218,8 +233,9 @@ fn locate<const N: usize, M: Mechanism<N>>(
             break;
         }
         let part = dynamics.motors().windings.weights(weights.step * share);
-        let there = dynamics.step(state, contacts, phases, &part);
-        let margin = contacts.margins(dynamics, &there)[motor];
+        let reached = Part { length: whole.length * share, ..whole };
+        let there = dynamics.step(state, contacts, phases, &part, reached);
+        let margin = contacts.margins(dynamics, &there, reached.end())[motor];
         if margin >= 0.0 {
             low = (share, margin);
         } else {

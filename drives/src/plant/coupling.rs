@@ -1,0 +1,237 @@
+//! The load side of the joints during a substep: inertia, its inverse, and the bias efforts.
+//!
+//! Where the mass matrix is the same everywhere, so is all of this. Elsewhere the mechanism's chain
+//! is solved once in each substep, where the load is expected half-way through it, whatever number
+//! of stages and events the substep has. In between, mass matrix and bias are taken as the parabola
+//! through the middles of this substep and of the two before, so that their slope and curvature
+//! along the motion count too: what is left is of third order in the substep, and where the motion
+//! starts anew or friction changes it suddenly, of second order for two substeps. Mass matrix and
+//! its inverse follow a parabola each; their product is the identity to that same order.
+//!
+//! The place half-way is extrapolated with the acceleration at the end of the substep before and
+//! with its change since the one before that.
+
+use machine::Mechanism;
+use machine::kinematics::{Joints, KinematicsError};
+use nalgebra::{Cholesky, Const, SMatrix};
+
+/// Solutions behind the newest one that the parabola goes through.
+const EARLIER: usize = 2;
+
+/// Why the equations of motion cannot be solved where the load is.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Unsolvable {
+    /// The chain cannot close.
+    #[error("the chain cannot close: {0}")]
+    Chain(#[from] KinematicsError),
+    /// The mass matrix is not positive definite, at a singular position.
+    #[error("the mass matrix of the load is singular")]
+    Mass,
+}
+
+/// The load side at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LoadSide<const N: usize> {
+    /// Inertia in joint coordinates, with the rotors behind a rigid transmission [kg or kg·m²].
+    pub(super) inertia: SMatrix<f64, N, N>,
+    /// Its inverse.
+    pub(super) mobility: SMatrix<f64, N, N>,
+    /// Coriolis, centrifugal and gravity efforts [N or N·m].
+    pub(super) bias: Joints<N>,
+}
+
+/// How the load side depends on where the load is.
+#[derive(Debug, Clone)]
+pub(super) struct Coupling<const N: usize, M: Mechanism<N>> {
+    law: Law,
+    /// The chain at the newest position that it was solved at.
+    assembly: M::Assembly,
+    /// Inertia of the rotors that is the load's own, zero behind an elastic transmission.
+    rotors: SMatrix<f64, N, N>,
+    middle: LoadSide<N>,
+    /// Change of it over one substep, and half the change of that.
+    slope: LoadSide<N>,
+    curvature: LoadSide<N>,
+    /// The middles before, newest first, and how many of them belong to this motion.
+    earlier: [LoadSide<N>; EARLIER],
+    known: usize,
+    /// Where the last substep ended, and its length [s]: a motion that goes on begins there.
+    load: Joints<N>,
+    load_speed: Joints<N>,
+    step: f64,
+    /// Accelerations of the load at the ends of the last two substeps.
+    acceleration: Joints<N>,
+    acceleration_before: Joints<N>,
+}
+
+/// What the load side depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Law {
+    Constant,
+    /// Position and velocity. Only a rigid transmission asks for the inertia besides its inverse.
+    Varying {
+        needs_inertia: bool,
+    },
+}
+
+impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
+    /// At rest at `home`, the inertia of `rotors` added to the load's.
+    ///
+    /// # Errors
+    /// If the mass matrix cannot be inverted there.
+    pub(super) fn new(
+        mechanism: &M,
+        home: M::Assembly,
+        rotors: Option<SMatrix<f64, N, N>>,
+    ) -> Result<Self, Unsolvable> {
+        let law = if mechanism.has_constant_mass() {
+            Law::Constant
+        } else {
+            Law::Varying { needs_inertia: rotors.is_some() }
+        };
+        let mut inertia = mechanism.mass_matrix(&home);
+        if let Some(rotors) = rotors {
+            inertia += rotors;
+        }
+        let middle = LoadSide {
+            inertia,
+            mobility: inertia.try_inverse().ok_or(Unsolvable::Mass)?,
+            bias: mechanism.bias(&home, &Joints::zeros()),
+        };
+        Ok(Self {
+            law,
+            assembly: home,
+            rotors: rotors.unwrap_or_else(SMatrix::zeros),
+            middle,
+            slope: LoadSide::zero(),
+            curvature: LoadSide::zero(),
+            earlier: [middle; EARLIER],
+            known: 0,
+            load: Joints::zeros(),
+            load_speed: Joints::zeros(),
+            step: 0.0,
+            acceleration: Joints::zeros(),
+            acceleration_before: Joints::zeros(),
+        })
+    }
+
+    /// The chain at the newest position that it was solved at.
+    pub(super) fn assembly(&self) -> &M::Assembly {
+        &self.assembly
+    }
+
+    /// Half-way through the newest substep.
+    pub(super) fn middle(&self) -> &LoadSide<N> {
+        &self.middle
+    }
+
+    /// Whether it is the same everywhere.
+    pub(super) fn is_constant(&self) -> bool {
+        self.law == Law::Constant
+    }
+
+    /// Solves for a substep of `step` [s] from `load` on, which moves at `load_speed`.
+    ///
+    /// # Errors
+    /// If the chain cannot close half-way through it, or is singular there.
+    pub(super) fn begin(
+        &mut self,
+        mechanism: &M,
+        load: &Joints<N>,
+        load_speed: &Joints<N>,
+        step: f64,
+    ) -> Result<(), Unsolvable> {
+        if self.law == Law::Constant {
+            return Ok(());
+        }
+        if self.load != *load || self.load_speed != *load_speed || self.step != step {
+            self.known = 0;
+            self.step = step;
+            (self.acceleration, self.acceleration_before) = (Joints::zeros(), Joints::zeros());
+        }
+        let half = 0.5 * step;
+        let growth = match self.known {
+            0 | 1 => Joints::zeros(),
+            _ => (self.acceleration - self.acceleration_before) / step,
+        };
+        let speed = load_speed + (self.acceleration + growth * (half / 2.0)) * half;
+        let place =
+            load + (load_speed + (self.acceleration / 2.0 + growth * (half / 6.0)) * half) * half;
+
+        // The chain of another motion is no place to start from: it may lie on another branch.
+        let near = (self.known > 0).then_some(&self.assembly);
+        let assembly = mechanism.assemble(&place, mechanism.branch(), near)?;
+        let inertia = mechanism.mass_matrix(&assembly) + self.rotors;
+        let mobility = positive_inverse(&inertia).ok_or(Unsolvable::Mass)?;
+        let bias = mechanism.bias(&assembly, &speed);
+
+        let before = self.middle;
+        self.assembly = assembly;
+        self.middle = LoadSide { inertia, mobility, bias };
+        if self.known > 0 {
+            self.earlier = [before, self.earlier[0]];
+        }
+        let [first, second] = &self.earlier;
+        match self.known {
+            0 => (self.slope, self.curvature) = (LoadSide::zero(), LoadSide::zero()),
+            1 => self.slope = self.middle.combine(1.0, first, -1.0, first, 0.0),
+            _ => {
+                self.slope = self.middle.combine(1.5, first, -2.0, second, 0.5);
+                self.curvature = self.middle.combine(0.5, first, -1.0, second, 0.5);
+            }
+        }
+        self.known = (self.known + 1).min(EARLIER);
+        Ok(())
+    }
+
+    /// The load side at the share `at` of the substep begun.
+    #[inline(always)] // Called in every stage.
+    pub(super) fn at(&self, at: f64) -> LoadSide<N> {
+        let Law::Varying { needs_inertia } = self.law else { return self.middle };
+        let from = at - 0.5;
+        let square = from * from;
+        let (middle, slope, curvature) = (&self.middle, &self.slope, &self.curvature);
+        LoadSide {
+            inertia: if needs_inertia {
+                middle.inertia + slope.inertia * from + curvature.inertia * square
+            } else {
+                middle.inertia
+            },
+            mobility: middle.mobility + slope.mobility * from + curvature.mobility * square,
+            bias: middle.bias + slope.bias * from + curvature.bias * square,
+        }
+    }
+
+    /// Ends the substep with the load at `load`, moving at `load_speed`, accelerated by
+    /// `acceleration`.
+    pub(super) fn end(
+        &mut self,
+        load: &Joints<N>,
+        load_speed: &Joints<N>,
+        acceleration: &Joints<N>,
+    ) {
+        (self.load, self.load_speed) = (*load, *load_speed);
+        (self.acceleration_before, self.acceleration) = (self.acceleration, *acceleration);
+    }
+}
+
+impl<const N: usize> LoadSide<N> {
+    fn zero() -> Self {
+        Self { inertia: SMatrix::zeros(), mobility: SMatrix::zeros(), bias: Joints::zeros() }
+    }
+
+    /// A weighted sum of three.
+    fn combine(&self, own: f64, first: &Self, one: f64, second: &Self, two: f64) -> Self {
+        Self {
+            inertia: self.inertia * own + first.inertia * one + second.inertia * two,
+            mobility: self.mobility * own + first.mobility * one + second.mobility * two,
+            bias: self.bias * own + first.bias * one + second.bias * two,
+        }
+    }
+}
+
+/// The inverse of a positive definite matrix; `None` for one that is not, or holds no numbers.
+fn positive_inverse<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
+    let inverse = Cholesky::<f64, Const<N>>::new(*matrix)?.inverse();
+    inverse.iter().all(|entry| entry.is_finite()).then_some(inverse)
+}
