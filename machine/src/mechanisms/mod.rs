@@ -2,10 +2,14 @@
 
 pub mod cartesian;
 pub mod corexy;
+pub mod mcm;
+pub mod polar;
 pub mod transmission;
 
 pub use cartesian::Cartesian;
 pub use corexy::CoreXy;
+pub use mcm::Mcm;
+pub use polar::Polar;
 pub use transmission::Elasticity;
 
 use crate::kinematics::Mechanism;
@@ -19,6 +23,10 @@ pub enum MechanismKind {
     CartesianLift(Cartesian<3>),
     /// Two belts that move the head in x and y together.
     CoreXy(CoreXy),
+    /// Two linear axes, a rotary table, and a head that tilts and turns.
+    Mcm(Mcm),
+    /// A rotary arm over a rotary table, with a vertical axis.
+    Polar(Polar),
 }
 
 /// Work that is generic over the mechanism, such as a sampler or a plant.
@@ -50,6 +58,8 @@ impl MechanismKind {
             Self::Cartesian(mechanism) => visitor.visit(*mechanism),
             Self::CartesianLift(mechanism) => visitor.visit(*mechanism),
             Self::CoreXy(mechanism) => visitor.visit(*mechanism),
+            Self::Mcm(mechanism) => visitor.visit(*mechanism),
+            Self::Polar(mechanism) => visitor.visit(*mechanism),
         }
     }
 
@@ -59,6 +69,8 @@ impl MechanismKind {
             Self::Cartesian(_) => Cartesian::<2>::NAME,
             Self::CartesianLift(_) => Cartesian::<3>::NAME,
             Self::CoreXy(_) => CoreXy::NAME,
+            Self::Mcm(_) => Mcm::NAME,
+            Self::Polar(_) => Polar::NAME,
         }
     }
 
@@ -66,7 +78,8 @@ impl MechanismKind {
     pub fn axes(&self) -> usize {
         match self {
             Self::Cartesian(_) | Self::CoreXy(_) => 2,
-            Self::CartesianLift(_) => 3,
+            Self::CartesianLift(_) | Self::Polar(_) => 3,
+            Self::Mcm(_) => 5,
         }
     }
 }

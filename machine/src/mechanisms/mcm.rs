@@ -1,0 +1,341 @@
+//! Two linear axes, a rotary table, and a head that tilts and turns (source 002).
+//!
+//! Joints: the carriage X [m], the slide Z [m] downwards, the table d [rad], the tilt a [rad] and
+//! the turn r [rad] of the head. Positions and directions of the tool are in the workpiece's frame,
+//! which the table carries; z is the table's axis. With
+//! `w = x₀ + l·sin a·sin r` and `v = X + l·sin a·cos r` (eq. 6 and 7) the tool is at
+//! `(x, y) = Rz(d)·(w, v)`, `z = z₀ − l·cos a − Z` (eq. 1 to 4), and its beam shines along
+//! `t = Rz(d)·(sin a·sin r, sin a·cos r, −cos a)`: the head's rotation is `Rz(d − r)·Rx(a)`.
+//!
+//! Both inverses are closed. The source iterates its eq. 10 with secants, but the residual of that
+//! equation is `cos γ·(ρ − s(X))/cos(γ + δ)`: zero for every X where y = 0.
+
+mod dynamics;
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use signals::math;
+
+use super::transmission::Elasticity;
+use crate::kinematics::{
+    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
+    ToolMotion,
+};
+use crate::taylor::Scalar;
+
+pub use dynamics::McmLoad;
+
+/// Up to this sine of the tilt the tool is upright, and its turn has no effect.
+const UPRIGHT: f64 = 1e-9;
+
+/// How fast an upright tool may seem to tilt and still be taken as staying upright [rad/s and its
+/// derivatives]: rounding of a path's attitude.
+const UPRIGHT_RATE: f64 = 1e-9;
+
+/// X and Z carry the head over the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mcm {
+    /// Length of the tool from the tilting axis to the focus, l [m].
+    pub tool: f64,
+    /// Distance of the head's turning axis from the plane of the table's axis, x₀ [m].
+    pub offset: f64,
+    /// Height of the tilting axis over the table with Z = 0, z₀ [m].
+    pub height: f64,
+    /// Where the carriage may be, lower then upper X [m]: chooses the branch if nothing else does.
+    pub reach: [f64; 2],
+    /// Below this distance of X, or v, from the table's axis the table's angle is not well
+    /// determined, v_sing [m].
+    pub singular_distance: f64,
+    /// The branch in which the machine works.
+    pub branch: McmBranch,
+    /// Masses and inertias.
+    pub load: McmLoad,
+    /// Spring and damper of each joint; `None` when they are taken as rigid.
+    pub elasticity: Option<[Elasticity; 5]>,
+}
+
+/// On which side of the table's axis the head is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct McmBranch {
+    /// Sign of X, or of v where tilt and turn are given: 1 or −1. `None` keeps the side of the
+    /// previous joints.
+    pub side: Option<i32>,
+}
+
+impl Branch for McmBranch {
+    fn choices(&self) -> Vec<(&'static str, Vec<i32>)> {
+        self.side.map(|side| ("side", vec![side])).into_iter().collect()
+    }
+
+    /// No values leave the choice to the previous joints.
+    fn choose(self, name: &str, values: &[i32]) -> Option<Self> {
+        match (name, values) {
+            ("side" | "sign", []) => Some(Self { side: None }),
+            ("side" | "sign", &[side @ (1 | -1)]) => Some(Self { side: Some(side) }),
+            _ => None,
+        }
+    }
+}
+
+/// The angle on the turn nearest to `reference` [rad].
+fn near<S: Scalar>(angle: S, reference: f64) -> S {
+    angle + (math::nearest_turn(angle.value(), reference) - angle.value())
+}
+
+impl Mcm {
+    /// Joints for tilt and turn given in the machine's frame [rad]: `position` [m] is in the
+    /// workpiece's frame. `side` is the sign of v; the table's angle is the nearest to `previous`.
+    ///
+    /// # Errors
+    /// `unreachable_radius` nearer to the table's axis than w, `singular` at v = 0.
+    pub fn inverse_machine_angles(
+        &self,
+        position: &Vector3<f64>,
+        tilt: f64,
+        turn: f64,
+        side: Option<i32>,
+        previous: &Joints<5>,
+    ) -> Result<Joints<5>, KinematicsError> {
+        let lean = self.tool * math::sin(tilt);
+        let (across, along) = (lean * math::sin(turn), lean * math::cos(turn));
+        let w = self.offset + across;
+        let radius = math::hypot(position.x, position.y);
+        let reach = self.leg(radius, w)?;
+        let before = previous[0] + self.tool * math::sin(previous[3]) * math::cos(previous[4]);
+        let v = reach * self.side(side, before, [reach - along, -reach - along]);
+        // Source 002 eq. 5, 8 and 9 with arctan2; eq. 10 needs no iteration.
+        let table = math::atan2(position.y, position.x) - math::atan2(v, w);
+        let slide = self.height - position.z - self.tool * math::cos(tilt);
+        Ok(Joints::from([v - along, slide, near(table, previous[2]), tilt, turn]))
+    }
+
+    /// The length of the leg that `other` and the hypotenuse `radius` leave [m].
+    fn leg<S: Scalar>(&self, radius: S, other: f64) -> Result<S, KinematicsError> {
+        let distance = radius.value();
+        // False for a radius that is not a number too.
+        let reached = distance >= other.abs() && distance.is_finite();
+        if !reached {
+            return Err(KinematicsError {
+                code: "unreachable_radius",
+                axis: Some(0),
+                value: distance,
+                limit: other.abs(),
+                detail: "the head does not come so near to the table's axis",
+            });
+        }
+        let square = (radius - other) * (radius + other);
+        if square.value() <= self.singular_distance * self.singular_distance {
+            return Err(KinematicsError {
+                code: "singular",
+                axis: Some(2),
+                value: square.value().sqrt(),
+                limit: self.singular_distance,
+                detail: "beside the table's axis the table's angle is not determined",
+            });
+        }
+        Ok(square.sqrt())
+    }
+
+    /// The sign of a solution: as asked, else as it was `before` [m], else the one whose `carriage`
+    /// positions [m], for + and for −, is in reach.
+    fn side(&self, asked: Option<i32>, before: f64, carriage: [f64; 2]) -> f64 {
+        let [lower, upper] = self.reach;
+        let reached = carriage.map(|x| lower <= x && x <= upper);
+        match asked {
+            Some(side) => f64::from(side.signum()),
+            None if before.abs() > self.singular_distance => before.signum(),
+            None if reached == [false, true] => -1.0,
+            None => 1.0,
+        }
+    }
+
+    /// Joints that bring the focus to `position` with the beam along the unit vector `axis`, both
+    /// in the workpiece's frame. `upright` says that the tool is, and stays so.
+    fn solve<S: Scalar>(
+        &self,
+        position: [S; 3],
+        axis: [S; 3],
+        upright: bool,
+        branch: McmBranch,
+        previous: &Joints<5>,
+    ) -> Result<[S; 5], KinematicsError> {
+        let axis =
+            if upright { [0.0.into(), 0.0.into(), axis[2].value().signum().into()] } else { axis };
+        // The tilting axis, l behind the focus: W = p − l·t.
+        let wrist: [S; 3] = core::array::from_fn(|row| position[row] - axis[row] * self.tool);
+        let reach = self.leg(planar(wrist), self.offset)?;
+        let value = reach.value();
+        let carriage = reach * self.side(branch.side, previous[0], [value, -value]);
+        let table = wrist[1].atan2(wrist[0]) - carriage.atan2(self.offset.into());
+        let slide = -wrist[2] + self.height;
+        let table = near(table, previous[2]);
+        let (tilt, turn) = if upright {
+            (math::atan2(0.0, -axis[2].value()).into(), previous[4].into())
+        } else {
+            // The beam in the machine's frame, t_m = Rz(−d)·t.
+            let (sine, cosine) = table.sin_cos();
+            let x = axis[0] * cosine + axis[1] * sine;
+            let y = axis[1] * cosine - axis[0] * sine;
+            let lean = (axis[0] * axis[0] + axis[1] * axis[1]).sqrt();
+            (lean.atan2(-axis[2]), near(x.atan2(y), previous[4]))
+        };
+        Ok([carriage, slide, table, tilt, turn])
+    }
+}
+
+/// Distance from the table's axis [m]; in the axis without derivatives, which there do not exist.
+fn planar<S: Scalar>(point: [S; 3]) -> S {
+    let square = point[0] * point[0] + point[1] * point[1];
+    if square.value() == 0.0 { 0.0.into() } else { square.sqrt() }
+}
+
+impl Mechanism<5> for Mcm {
+    type Branch = McmBranch;
+    type Assembly = Joints<5>;
+
+    const NAME: &'static str = "mcm";
+
+    fn freedom(&self) -> Freedom {
+        Freedom::Axis
+    }
+
+    fn branch(&self) -> McmBranch {
+        self.branch
+    }
+
+    fn branch_of(&self, q: &Joints<5>) -> McmBranch {
+        McmBranch { side: Some(if q[0] < 0.0 { -1 } else { 1 }) }
+    }
+
+    fn assemble(
+        &self,
+        q: &Joints<5>,
+        _branch: McmBranch,
+        _near: Option<&Joints<5>>,
+    ) -> Result<Joints<5>, KinematicsError> {
+        Ok(*q)
+    }
+
+    // Source 002 eq. 1 to 4.
+    fn pose(&self, q: &Joints<5>) -> Pose {
+        let (sine, cosine) = math::sin_cos(q[2]);
+        let (tilt_sine, tilt_cosine) = math::sin_cos(q[3]);
+        let (turn_sine, turn_cosine) = math::sin_cos(q[4]);
+        let w = self.offset + self.tool * tilt_sine * turn_sine;
+        let v = q[0] + self.tool * tilt_sine * turn_cosine;
+        let position = Vector3::new(
+            cosine * w - sine * v,
+            sine * w + cosine * v,
+            self.height - self.tool * tilt_cosine - q[1],
+        );
+        let (s, c) = math::sin_cos(q[2] - q[4]);
+        let rotation = Matrix3::new(
+            c,
+            -s * tilt_cosine,
+            s * tilt_sine,
+            s,
+            c * tilt_cosine,
+            -c * tilt_sine,
+            0.0,
+            tilt_sine,
+            tilt_cosine,
+        );
+        Pose { position, rotation }
+    }
+
+    // In the workpiece's frame; the angular rows are those of the head against the workpiece.
+    fn jacobian(&self, q: &Joints<5>) -> Jacobian<5> {
+        let pose = self.pose(q);
+        let (sine, cosine) = math::sin_cos(q[2]);
+        let (s, c) = math::sin_cos(q[2] - q[4]);
+        let up = Vector3::z();
+        let tilting = Vector3::new(c, s, 0.0);
+        let reach = -pose.rotation.column(2) * self.tool;
+        let columns = [
+            (Vector3::new(-sine, cosine, 0.0), Vector3::zeros()),
+            (-up, Vector3::zeros()),
+            (up.cross(&pose.position), up),
+            (tilting.cross(&reach), tilting),
+            (-up.cross(&reach), -up),
+        ];
+        Jacobian::from_fn(|row, column| {
+            let (linear, angular) = columns[column];
+            if row < 3 { linear[row] } else { angular[row - 3] }
+        })
+    }
+
+    /// `distance` is |X| [m], which singles out the table's angle. `lean` is |sin a|, and with it
+    /// the effect of r; upright, r is held.
+    fn margins(&self, q: &Joints<5>) -> Vec<Margin> {
+        vec![
+            Margin { name: "distance", value: q[0].abs(), limit: self.singular_distance },
+            Margin { name: "lean", value: math::sin(q[3]).abs(), limit: 0.0 },
+        ]
+    }
+
+    /// Takes from `pose.rotation` the tool's axis. Upright, r stays the previous one.
+    ///
+    /// # Errors
+    /// `unreachable_radius` nearer to the table's axis than x₀, `singular` at X = 0.
+    fn inverse(
+        &self,
+        pose: &Pose,
+        branch: McmBranch,
+        previous: &Joints<5>,
+    ) -> Result<Joints<5>, KinematicsError> {
+        let axis: [f64; 3] = (-pose.rotation.column(2)).into();
+        let upright = math::hypot(axis[0], axis[1]) <= UPRIGHT;
+        let joints = self.solve(pose.position.into(), axis, upright, branch, previous)?;
+        Ok(Joints::from(joints))
+    }
+
+    /// # Errors
+    /// As for [`Self::inverse`], and `singular_axis` where an upright tool begins to lean: the turn
+    /// r then has to be right beforehand.
+    fn joint_motion(
+        &self,
+        tool: &ToolMotion,
+        branch: McmBranch,
+        previous: &Joints<5>,
+    ) -> Result<JointMotion<5>, KinematicsError> {
+        let axis = tool.attitude.series().map(|row| -row[2]);
+        let lean = math::hypot(axis[0].value, axis[1].value);
+        let upright = lean <= UPRIGHT;
+        let rates = [axis[0], axis[1]].map(|row| row.first.abs().max(row.second.abs()));
+        let rate = rates[0].max(rates[1]);
+        if upright && rate > UPRIGHT_RATE {
+            return Err(KinematicsError {
+                code: "singular_axis",
+                axis: Some(4),
+                value: rate,
+                limit: UPRIGHT_RATE,
+                detail: "an upright tool begins to lean, where the turn of the head has no rate",
+            });
+        }
+        let joints = self.solve(tool.series(), axis, upright, branch, previous)?;
+        Ok(JointMotion::of_series(&joints))
+    }
+
+    fn mass_matrix(&self, q: &Joints<5>) -> SMatrix<f64, 5, 5> {
+        self.load.mass_matrix(q)
+    }
+
+    fn bias(&self, q: &Joints<5>, velocity: &Joints<5>) -> Joints<5> {
+        self.load.centrifugal(q, velocity) + self.load.weight(q)
+    }
+
+    fn gravity(&self, q: &Joints<5>) -> Joints<5> {
+        self.load.weight(q)
+    }
+
+    fn stiffness(&self) -> Option<SMatrix<f64, 5, 5>> {
+        self.elasticity.map(|springs| {
+            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.stiffness)))
+        })
+    }
+
+    fn damping(&self) -> SMatrix<f64, 5, 5> {
+        self.elasticity.map_or_else(SMatrix::zeros, |springs| {
+            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.damping)))
+        })
+    }
+}

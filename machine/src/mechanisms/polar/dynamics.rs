@@ -1,0 +1,87 @@
+//! What the polar machine's motors must move, and hold (source 000 sec. 5 and 7).
+
+use nalgebra::Vector3;
+
+use super::Polar;
+use crate::kinematics::Joints;
+
+/// Masses, inertias and friction, in the source's frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PolarLoad {
+    /// Mass of the arm, m₁ [kg].
+    pub arm_mass: f64,
+    /// Distance of the arm's centre of mass from its pivot, a_c [m].
+    pub arm_center: f64,
+    /// Inertia of the arm about the vertical through its centre of mass, Izz₁ [kg·m²].
+    pub arm_inertia: f64,
+    /// Mass of the head, m₂ [kg].
+    pub head_mass: f64,
+    /// Distance of the head's centre of mass from the arm's pivot, r_c2 [m]; by source 000 eq. 3.3
+    /// near a₁, where eq. 7.6 prints 2·a₁.
+    pub head_center: f64,
+    /// Inertia of the head about the vertical through its centre of mass, Izz₂ [kg·m²].
+    pub head_inertia: f64,
+    /// Inertia of the table about its axis, I_t [kg·m²].
+    pub table_inertia: f64,
+    /// Mass of the workpiece, m_w [kg].
+    pub workpiece_mass: f64,
+    /// Distance of the workpiece's centre of mass from the table's axis, r_w [m].
+    pub workpiece_center: f64,
+    /// Inertia of the workpiece about the vertical through its centre of mass, I_w [kg·m²].
+    pub workpiece_inertia: f64,
+    /// Force of the counterbalance on the head, upwards, F_cb [N].
+    pub counterbalance: f64,
+    /// Acceleration of gravity [m/s²].
+    pub gravity: f64,
+    /// Viscous friction of each joint, b [N·m·s/rad or N·s/m].
+    pub viscous: [f64; 3],
+    /// Coulomb friction of each joint, T_c [N·m or N].
+    pub coulomb: [f64; 3],
+}
+
+impl PolarLoad {
+    /// Inertia that each joint moves [kg·m² or kg].
+    // Source 000 eq. 7.12, with r_c2 for 2·a₁ and without cos + sin: J_vᵀ·J_v is 1.
+    pub(super) fn inertia(&self) -> [f64; 3] {
+        let about = |mass: f64, radius: f64, inertia: f64| mass * radius * radius + inertia;
+        [
+            about(self.arm_mass, self.arm_center, self.arm_inertia)
+                + about(self.head_mass, self.head_center, self.head_inertia),
+            self.table_inertia
+                + about(self.workpiece_mass, self.workpiece_center, self.workpiece_inertia),
+            self.head_mass,
+        ]
+    }
+
+    /// What the vertical axis holds at rest [N].
+    // Source 000 eq. 7.25.
+    pub(super) fn weight(&self) -> f64 {
+        self.head_mass * self.gravity - self.counterbalance
+    }
+}
+
+impl Polar {
+    /// Efforts that the joints' friction takes at `velocity` [N·m or N]; at rest none.
+    pub fn friction(&self, velocity: &Joints<3>) -> Joints<3> {
+        Joints::from_fn(|row, _| {
+            let speed = velocity[row];
+            let direction = if speed == 0.0 { 0.0 } else { speed.signum() };
+            self.load.viscous[row] * speed + self.load.coulomb[row] * direction
+        })
+    }
+
+    /// Torque of the arm's motor [N·m] and force of the vertical axis [N] while the tool exerts
+    /// `force` [N] and `moment` [N·m], both in the arm's frame: x along the arm, z up.
+    // Source 000 eq. 5.8 and 5.9; by virtual work eq. 5.4 loses m_z.
+    pub fn statics(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> [f64; 2] {
+        [self.arm * force.y + moment.z, force.z]
+    }
+}
+
+/// The share of its speed, at most 1, at which a motion keeps every joint's `velocity` within its
+/// `limit` [both m/s or rad/s].
+pub fn feed_scale<const N: usize>(velocity: &Joints<N>, limit: &Joints<N>) -> f64 {
+    velocity.iter().zip(limit.iter()).fold(1.0, |share, (speed, most)| {
+        if speed.abs() * share > *most { most / speed.abs() } else { share }
+    })
+}

@@ -1,0 +1,287 @@
+//! The mcm against its golden vectors, its attitudes and its dynamics.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use machine::kinematics::{Attitude, Branch, Freedom, Joints, ToolMotion};
+use machine::mechanisms::mcm::{McmBranch, McmLoad};
+use machine::{Mcm, Mechanism, Pose};
+use nalgebra::{Matrix3, Vector3};
+use serde_json::Value;
+use signals::math;
+use support::{array, code_of, conforms, golden, near, number, vector};
+
+fn mcm(parameters: &Value) -> Mcm {
+    let of = |key: &str| number(&parameters[key]);
+    Mcm {
+        tool: of("l"),
+        offset: of("x0"),
+        height: of("z0"),
+        reach: array(&parameters["limits"]["X"]),
+        singular_distance: of("v_sing"),
+        branch: McmBranch::default(),
+        load: McmLoad {
+            carriage_mass: 9.0,
+            slide_mass: 5.5,
+            table_inertia: 0.031,
+            yoke_inertia: 0.012,
+            head_mass: 2.3,
+            head_center: 0.045,
+            head_inertia: [0.0081, 0.0077, 0.0019],
+            counterbalance: 60.0,
+            gravity: 9.80665,
+        },
+        elasticity: None,
+    }
+}
+
+fn reference() -> Mcm {
+    mcm(&golden("mcm")["params"])
+}
+
+fn branch(sign: &Value) -> McmBranch {
+    McmBranch { side: Some(sign.as_i64().unwrap() as i32) }
+}
+
+/// A rotation whose −z is `axis`, turned about it by `roll` [rad].
+fn looking(axis: &Vector3<f64>, roll: f64) -> Matrix3<f64> {
+    let up = -axis.normalize();
+    let side = up.cross(&Vector3::new(0.3, -0.8, 0.52)).normalize();
+    let (s, c) = math::sin_cos(roll);
+    let x = side * c + up.cross(&side) * s;
+    Matrix3::from_columns(&[x, up.cross(&x), up])
+}
+
+/// The golden Jacobian's lower rows are the rates of the tool's axis, ω × t.
+fn check_jacobian(machine: &Mcm, q: &Joints<5>, expected: &Value, context: &str) {
+    let jacobian = machine.jacobian(q);
+    let axis = -machine.pose(q).rotation.column(2).into_owned();
+    for column in 0..5 {
+        let angular: Vector3<f64> = jacobian.fixed_view::<3, 1>(3, column).into_owned();
+        let leaning = angular.cross(&axis);
+        for row in 0..3 {
+            let entry = number(&expected[row][column]);
+            near(jacobian[(row, column)], entry, 1e-9, context);
+            near(leaning[row], number(&expected[row + 3][column]), 1e-9, context);
+        }
+    }
+}
+
+#[test]
+fn machine_angles_agree_with_the_golden_vectors() {
+    let file = golden("mcm");
+    let machine = reference();
+    let limits: [f64; 2] = array(&file["params"]["limits"]["X"]);
+    let cases = file["cases_ik_ar"].as_array().unwrap();
+    assert_eq!(cases.len(), 15);
+    for case in cases {
+        let (input, output) = (&case["input"], &case["output"]);
+        let context = input.to_string();
+        let previous = Joints::from([0.0, 0.0, number(&input["prev_d"]), 0.0, 0.0]);
+        let (a, r) = (number(&input["a"]), number(&input["r"]));
+        let position = vector(&input["p"]);
+        let solve =
+            |side| machine.inverse_machine_angles(&position, a, r, side, &previous).unwrap();
+        for solution in output["branches"].as_array().unwrap() {
+            let q = solve(branch(&solution["sign"]).side);
+            let expected = Joints::from(array::<5>(&solution["q"]));
+            near((q - expected).amax(), 0.0, 1e-9, &context);
+            let back = machine.forward(&q, machine.branch).unwrap();
+            near((back.position - position).norm(), 0.0, 1e-14, &context);
+            // Continuity keeps the side, wherever the limits are.
+            let again = machine.inverse_machine_angles(&position, a, r, None, &q).unwrap();
+            near((again - q).amax(), 0.0, 1e-12, &context);
+        }
+        let q = solve(branch(&input["sign"]).side);
+        near((q - Joints::from(array::<5>(&output["q"]))).amax(), 0.0, 1e-9, &context);
+        let axis = -machine.pose(&q).rotation.column(2).into_owned();
+        near((axis - vector(&output["tool_axis_workpiece"])).amax(), 0.0, 1e-9, &context);
+        check_jacobian(&machine, &q, &output["jacobian"], &context);
+        let minor = machine.jacobian(&q);
+        let determinant = minor[(0, 0)] * minor[(1, 2)] - minor[(0, 2)] * minor[(1, 0)];
+        near(determinant.abs(), number(&output["det_xy_Xd"]).abs(), 1e-9, &context);
+        // Without a previous joint position the carriage's travel chooses, if it can.
+        let free = solve(None);
+        assert!(limits[0] <= free[0] && free[0] <= limits[1], "{free} {context}");
+    }
+}
+
+#[test]
+fn tool_axes_agree_with_the_golden_vectors() {
+    let file = golden("mcm");
+    let machine = reference();
+    let cases = file["cases_ik_dir"].as_array().unwrap();
+    assert_eq!(cases.len(), 15);
+    for case in cases {
+        let (input, output) = (&case["input"], &case["output"]);
+        let context = input.to_string();
+        let previous = Joints::from(array::<5>(&input["prev_q"]));
+        let axis = vector(&input["tool_axis"]);
+        for roll in [0.0, 2.0] {
+            let pose = Pose { position: vector(&input["p"]), rotation: looking(&axis, roll) };
+            let q = machine.inverse(&pose, branch(&input["sign_X"]), &previous).unwrap();
+            near((q - Joints::from(array::<5>(&output["q"]))).amax(), 0.0, 1e-9, &context);
+            let kept = machine.inverse(&pose, machine.branch, &q).unwrap();
+            near((kept - q).amax(), 0.0, 1e-12, &context);
+            let back = machine.forward(&q, machine.branch).unwrap();
+            near((back.position - vector(&output["fk_p"])).amax(), 0.0, 1e-9, &context);
+            let along = -back.rotation.column(2);
+            near((along - vector(&output["fk_t"])).amax(), 0.0, 1e-9, &context);
+            check_jacobian(&machine, &q, &output["jacobian"], &context);
+            let margins = machine.margins(&q);
+            let singularity = margins[0].value * margins[1].value;
+            near(singularity, number(&output["singularity"]), 1e-9, &context);
+        }
+    }
+}
+
+/// The code of a pose: what the inverse says, and else which of the limits its joints break.
+fn verdict(machine: &Mcm, limits: &Value, case: &Value) -> String {
+    let input = &case["input"];
+    let position = vector(&input["p"]);
+    let turned = input["prev_d"].as_f64().unwrap_or(0.0);
+    let previous = Joints::from([0.3, 0.0, turned, 0.0, 0.0]);
+    let side = input["sign"].as_i64().map(|sign| sign as i32).or(Some(1));
+    let solution = if case["kind"] == "ar" {
+        let (a, r) = (number(&input["a"]), number(&input["r"]));
+        machine.inverse_machine_angles(&position, a, r, side, &previous)
+    } else {
+        let rotation = looking(&vector(&input["tool_axis"]), 0.0);
+        machine.inverse(&Pose { position, rotation }, McmBranch { side }, &previous)
+    };
+    match solution {
+        Err(error) => error.code.to_owned(),
+        Ok(q) => {
+            let names = ["X", "Z", "d", "a", "r"];
+            let broken = (0..5).find(|axis| {
+                let [low, high]: [f64; 2] = array(&limits[names[*axis]]);
+                q[*axis] < low || q[*axis] > high
+            });
+            broken.map_or("none".to_owned(), |axis| format!("limit_{}", names[axis]))
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_reached_fails_with_the_golden_code() {
+    let file = golden("mcm");
+    let machine = reference();
+    let mut kinematic = 0;
+    for case in file["failing"].as_array().unwrap() {
+        if case["kind"] != "cone" {
+            let code = verdict(&machine, &file["params"]["limits"], case);
+            assert_eq!(code, case["expect"].as_str().unwrap(), "{case}");
+            kinematic += 1;
+        }
+    }
+    assert_eq!(kinematic, 6);
+    let level = |x: f64| Pose::at(Vector3::new(x, 0.0, 0.2));
+    let at = |x| code_of(machine.inverse(&level(x), machine.branch, &Joints::zeros()));
+    assert_eq!(at(0.020_000_1), "singular");
+    assert_eq!(at(0.0), "unreachable_radius");
+    assert_eq!(at(f64::NAN), "unreachable_radius");
+}
+
+/// Source 002 eq. 10, as its secant sees it.
+fn secant_residual(
+    x: f64,
+    position: [f64; 2],
+    offset: f64,
+    arctangent: fn(f64, f64) -> f64,
+) -> f64 {
+    let gamma = arctangent(-position[0], position[1]);
+    let d = gamma + arctangent(offset, x);
+    let (sine, cosine) = math::sin_cos(d);
+    -x + (position[1] - sine * offset) / cosine
+}
+
+#[test]
+fn the_sources_secant_stops_at_once_where_y_is_0_and_the_closed_form_does_not() {
+    let machine = reference();
+    let trap = &golden("mcm")["secant_trap"][0];
+    let place: [f64; 2] = array(&trap["p_xy"]);
+    for (x, residual) in trap["residual_at"].as_object().unwrap() {
+        let x: f64 = x.parse().unwrap();
+        assert!(number(residual).abs() < 1e-12);
+        near(secant_residual(x, place, machine.offset, math::atan2), 0.0, 1e-12, "any X solves it");
+    }
+    let position = Vector3::new(place[0], place[1], 0.2);
+    let q = machine.inverse_machine_angles(&position, 0.0, 0.0, Some(1), &Joints::zeros()).unwrap();
+    near(q[0], number(&trap["true_X"]), 1e-15, "X");
+    // With the printed arctan a point with y < 0 is even away from its own solution.
+    let below = Vector3::new(0.1, -0.25, 0.2);
+    let q = machine.inverse_machine_angles(&below, 0.0, 0.0, Some(1), &Joints::zeros()).unwrap();
+    let printed = |y, x| math::atan(y / x);
+    near(secant_residual(q[0], [0.1, -0.25], machine.offset, math::atan2), 0.0, 1e-12, "atan2");
+    assert!(secant_residual(q[0], [0.1, -0.25], machine.offset, printed).abs() > 0.1);
+}
+
+fn still(position: Vector3<f64>, rotation: Matrix3<f64>) -> ToolMotion {
+    ToolMotion::rest(&Pose { position, rotation })
+}
+
+/// Upright, the turn stays; a tool that begins to lean from there has none.
+#[test]
+fn an_upright_tool_keeps_its_turn() {
+    let machine = reference();
+    let previous = Joints::from([0.3, 0.1, 0.2, 0.4, 1.7]);
+    let mut tool = still(Vector3::new(-0.1, 0.28, 0.05), Matrix3::identity());
+    tool.velocity = Vector3::new(0.1, -0.2, 0.03);
+    let motion = machine.joint_motion(&tool, machine.branch, &previous).unwrap();
+    assert_eq!((motion.position[3], motion.position[4]), (0.0, 1.7));
+    for rates in [motion.velocity, motion.acceleration, motion.jerk] {
+        assert_eq!((rates[3], rates[4]), (0.0, 0.0));
+        assert!(rates.iter().all(|rate| rate.is_finite()));
+    }
+    let linear = machine.jacobian(&motion.position) * motion.velocity;
+    near((linear.fixed_rows::<3>(0) - tool.velocity).norm(), 0.0, 1e-15, "velocity");
+    tool.attitude.velocity = Vector3::new(0.01, 0.0, 0.0);
+    let error = machine.joint_motion(&tool, machine.branch, &previous).unwrap_err();
+    assert_eq!((error.code, error.value), ("singular_axis", 0.01));
+    // Turning about itself is not leaning.
+    tool.attitude.velocity = Vector3::new(0.0, 0.0, 3.0);
+    assert!(machine.joint_motion(&tool, machine.branch, &previous).is_ok());
+}
+
+#[test]
+fn it_conforms() {
+    let machine = reference();
+    assert_eq!(machine.freedom(), Freedom::Axis);
+    for side in [1, -1] {
+        conforms(&machine, McmBranch { side: Some(side) }, |random| {
+            let (s, c) = math::sin_cos(3.0 * random.next());
+            let radius = 0.3 + 0.1 * random.next();
+            let mut tool = still(
+                Vector3::new(radius * c, radius * s, 0.2 + 0.1 * random.next()),
+                Matrix3::identity(),
+            );
+            let (s, c) = math::sin_cos(3.0 * random.next());
+            let (lean, level) = math::sin_cos(0.9 + 0.6 * random.next());
+            let axis = Vector3::new(lean * c, lean * s, -level);
+            tool.velocity = random.vector(0.2);
+            tool.acceleration = random.vector(2.0);
+            tool.jerk = random.vector(50.0);
+            tool.attitude = Attitude {
+                rotation: looking(&axis, random.next()),
+                velocity: random.vector(0.5),
+                acceleration: random.vector(3.0),
+                jerk: random.vector(40.0),
+            };
+            tool
+        });
+    }
+}
+
+#[test]
+fn branches_have_names_and_values() {
+    let free = McmBranch::default();
+    assert!(free.choices().is_empty());
+    let chosen = free.choose("sign", &[-1]).unwrap();
+    assert_eq!(chosen.choices(), [("side", vec![-1])]);
+    assert_eq!(chosen.choose("side", &[]), Some(free));
+    assert_eq!(free.choose("side", &[0]), None);
+    assert_eq!(free.choose("elbow", &[1]), None);
+    let machine = reference();
+    assert_eq!(machine.branch_of(&Joints::from([-0.2, 0.0, 0.0, 0.0, 0.0])), chosen);
+}
