@@ -5,12 +5,14 @@ pub mod corexy;
 pub mod mcm;
 pub mod polar;
 pub mod transmission;
+pub mod tri_planar;
 
 pub use cartesian::Cartesian;
 pub use corexy::CoreXy;
 pub use mcm::Mcm;
 pub use polar::Polar;
 pub use transmission::Elasticity;
+pub use tri_planar::TriPlanar;
 
 use crate::kinematics::Mechanism;
 
@@ -27,6 +29,8 @@ pub enum MechanismKind {
     Mcm(Mcm),
     /// A rotary arm over a rotary table, with a vertical axis.
     Polar(Polar),
+    /// A platform on three legs with planar motors as feet.
+    TriPlanar(TriPlanar),
 }
 
 /// Work that is generic over the mechanism, such as a sampler or a plant.
@@ -60,6 +64,7 @@ impl MechanismKind {
             Self::CoreXy(mechanism) => visitor.visit(*mechanism),
             Self::Mcm(mechanism) => visitor.visit(*mechanism),
             Self::Polar(mechanism) => visitor.visit(*mechanism),
+            Self::TriPlanar(mechanism) => visitor.visit(*mechanism),
         }
     }
 
@@ -71,6 +76,7 @@ impl MechanismKind {
             Self::CoreXy(_) => CoreXy::NAME,
             Self::Mcm(_) => Mcm::NAME,
             Self::Polar(_) => Polar::NAME,
+            Self::TriPlanar(_) => TriPlanar::NAME,
         }
     }
 
@@ -80,6 +86,7 @@ impl MechanismKind {
             Self::Cartesian(_) | Self::CoreXy(_) => 2,
             Self::CartesianLift(_) | Self::Polar(_) => 3,
             Self::Mcm(_) => 5,
+            Self::TriPlanar(_) => 6,
         }
     }
 }

@@ -1,0 +1,396 @@
+//! From the feet to the platform's pose: six struts of equal length, solved by Newton's method.
+
+use nalgebra::{Matrix3, Quaternion, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
+use signals::math;
+
+use super::limits::struts;
+use super::{CORNERS, Fold, HINGES, Legs, OUTWARD, TriPlanar, dynamics};
+use crate::kinematics::{Jacobian, Joints, KinematicsError};
+
+/// A leg in an assembly; vectors in the machine frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Leg {
+    /// From the platform's centroid to the hinge's middle [m].
+    pub(super) middle: Vector3<f64>,
+    /// Unit vector along the hinge.
+    pub(super) hinge: Vector3<f64>,
+    /// Unit vector from the hinge's middle to the foot.
+    pub(super) shank: Vector3<f64>,
+    /// Unit normal, `hinge × shank`; upwards where the leg leans outward.
+    pub(super) normal: Vector3<f64>,
+    /// Rate of the turn about the hinge per twist of the platform, such that the foot stays in
+    /// the stator plane.
+    pub(super) turn: SVector<f64, 6>,
+}
+
+/// The mechanism with its six struts closed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TriPlanarAssembly {
+    pub(super) position: Vector3<f64>,
+    pub(super) rotation: Matrix3<f64>,
+    pub(super) feet: Joints<6>,
+    pub(super) legs: [Leg; 3],
+    /// Twist of the platform per rate of the feet.
+    pub(super) jacobian: Jacobian<6>,
+    pub(super) mass: SMatrix<f64, 6, 6>,
+    pub(super) gravity: Joints<6>,
+    state: State,
+    /// Inverse of the matrix of the struts, for the next solution near by.
+    loosened: SMatrix<f64, 6, 6>,
+}
+
+impl TriPlanarAssembly {
+    pub(super) fn folds(&self) -> Legs {
+        Legs(self.legs.map(|leg| if leg.normal.z > 0.0 { Fold::Outward } else { Fold::Inward }))
+    }
+
+    /// Rates of the feet per twist of the platform, the inverse of the Jacobian in closed form.
+    pub fn inverse_jacobian(&self) -> SMatrix<f64, 6, 6> {
+        let mut matrix = SMatrix::<f64, 6, 6>::zeros();
+        for (index, leg) in self.legs.iter().enumerate() {
+            let arm = self.foot(index) - self.position;
+            let swing = self.swing(index);
+            let rigid = [
+                SVector::<f64, 6>::from([1.0, 0.0, 0.0, 0.0, arm.z, -arm.y]),
+                SVector::<f64, 6>::from([0.0, 1.0, 0.0, -arm.z, 0.0, arm.x]),
+            ];
+            for (axis, rigid) in rigid.into_iter().enumerate() {
+                let row = rigid + leg.turn * swing[axis];
+                matrix.set_row(2 * index + axis, &row.transpose());
+            }
+        }
+        matrix
+    }
+
+    /// How fast each leg folds down against the platform for a twist of it [rad/s].
+    pub fn fold_rates(&self, twist: &SVector<f64, 6>) -> [f64; 3] {
+        // The fold's angle counts against the turn about the hinge.
+        self.legs.map(|leg| -leg.turn.dot(twist))
+    }
+
+    /// How far each leg is folded down from the platform's plane [rad].
+    pub fn fold_angles(&self) -> [f64; 3] {
+        self.legs.map(|leg| {
+            let platform = self.rotation.column(2);
+            let outward = leg.middle.normalize();
+            math::atan2(-leg.shank.dot(&platform), leg.shank.dot(&outward))
+        })
+    }
+
+    pub(super) fn foot(&self, index: usize) -> Vector3<f64> {
+        Vector3::new(self.feet[2 * index], self.feet[2 * index + 1], 0.0)
+    }
+
+    /// Displacement of a foot per turn about its hinge [m/rad].
+    pub(super) fn swing(&self, index: usize) -> Vector3<f64> {
+        let leg = &self.legs[index];
+        let shank = self.foot(index) - self.position - leg.middle;
+        leg.hinge.cross(&shank)
+    }
+}
+
+/// A pose in the iteration, its position counted from the centroid of the feet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct State {
+    position: Vector3<f64>,
+    attitude: UnitQuaternion<f64>,
+}
+
+/// Largest residual of a closed strut, as a share of its length: forty units in the last place.
+/// One more step then brings it down to rounding.
+const CLOSED: f64 = 1e-14;
+
+/// Steps before a start is given up; from ±0.1 a and 0.15 rad Newton's method takes five.
+const STEPS: usize = 12;
+
+/// Largest step, in sides and radians: further, the linear equations say nothing.
+const STRIDE: f64 = 0.6;
+
+/// Heights of level starts, in heights of the triangle.
+const LEVELS: [f64; 8] = [0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 0.97];
+
+/// Tangent of half the tilt of further starts, about 25°.
+const TILT: f64 = 0.22;
+
+impl TriPlanar {
+    /// From the centroid to the corners, in the machine frame [m].
+    pub(super) fn arms(&self, rotation: &Matrix3<f64>) -> [Vector3<f64>; 3] {
+        CORNERS.map(|[x, y]| (rotation.column(0) * x + rotation.column(1) * y) * self.side)
+    }
+}
+
+/// The equations of one set of feet, which are counted from their centroid.
+struct Struts<'a> {
+    mechanism: &'a TriPlanar,
+    feet: Joints<6>,
+}
+
+impl Struts<'_> {
+    /// How much each strut is too long, `(l² − a²)/2a²`.
+    fn residual(&self, state: &State) -> SVector<f64, 6> {
+        let arms = self.mechanism.arms(state.attitude.to_rotation_matrix().matrix());
+        let square = self.mechanism.side * self.mechanism.side;
+        let mut residual = SVector::zeros();
+        for (leg, hinges) in HINGES.iter().enumerate() {
+            let foot = Vector3::new(self.feet[2 * leg], self.feet[2 * leg + 1], 0.0);
+            let from_foot = state.position - foot;
+            for (end, &corner) in hinges.iter().enumerate() {
+                let length = (from_foot + arms[corner]).norm_squared();
+                residual[2 * leg + end] = (length / square - 1.0) / 2.0;
+            }
+        }
+        residual
+    }
+
+    fn loosened(&self, state: &State) -> Option<SMatrix<f64, 6, 6>> {
+        let arms = self.mechanism.arms(state.attitude.to_rotation_matrix().matrix());
+        invert(struts(self.mechanism, &arms, &state.position, &self.feet))
+    }
+
+    fn step(
+        &self,
+        state: &State,
+        loosened: &SMatrix<f64, 6, 6>,
+        residual: &SVector<f64, 6>,
+    ) -> State {
+        let step = loosened * residual;
+        let length = step.amax();
+        let step = if length > STRIDE { step * (STRIDE / length) } else { step };
+        let linear = step.fixed_rows::<3>(0) * self.mechanism.side;
+        let angular = step.fixed_rows::<3>(3) * 0.5;
+        // A quaternion, made a unit again in every step, cannot drift from a rotation.
+        let turn = Quaternion::from_parts(1.0, -angular);
+        State {
+            position: state.position - linear,
+            attitude: UnitQuaternion::new_normalize(turn * state.attitude.into_inner()),
+        }
+    }
+
+    /// With the matrix of an assembly near by, which saves solving anew: the error falls by the
+    /// distance, in sides, with every step.
+    fn follow(&self, mut state: State, loosened: &SMatrix<f64, 6, 6>) -> Option<State> {
+        let mut before = f64::INFINITY;
+        for _ in 0..STEPS {
+            let residual = self.residual(&state);
+            let size = residual.amax();
+            if size <= CLOSED {
+                return Some(self.step(&state, loosened, &residual));
+            }
+            let contracts = size < before * 0.1;
+            if !contracts {
+                return None;
+            }
+            before = size;
+            state = self.step(&state, loosened, &residual);
+        }
+        None
+    }
+
+    fn solve(&self, mut state: State) -> Option<State> {
+        for _ in 0..STEPS {
+            let residual = self.residual(&state);
+            let loosened = self.loosened(&state)?;
+            state = self.step(&state, &loosened, &residual);
+            let size = residual.amax();
+            if size <= CLOSED {
+                return Some(state);
+            }
+        }
+        None
+    }
+
+    /// The level platform at `level` heights of the triangle whose feet fit best.
+    fn level(&self, level: f64, branch: Legs) -> State {
+        let height = self.mechanism.height();
+        let reach = (1.0 - level * level).sqrt();
+        let mut radii = [0.0; 3];
+        for (radius, fold) in radii.iter_mut().zip(branch.0) {
+            *radius = height * (fold.sign() * reach + 1.0 / 3.0);
+        }
+        let place = |leg: usize| Vector2::from(OUTWARD[leg]) * radii[leg];
+        let center = (place(0) + place(1) + place(2)) / 3.0;
+        let (mut along, mut across) = (0.0, 0.0);
+        for leg in 0..3 {
+            let from = place(leg) - center;
+            let to = Vector2::new(self.feet[2 * leg], self.feet[2 * leg + 1]);
+            along += from.dot(&to);
+            across += from.perp(&to);
+        }
+        let (sine, cosine) = math::sin_cos(math::atan2(across, along) / 2.0);
+        let attitude = Quaternion::new(cosine, 0.0, 0.0, sine);
+        let attitude = UnitQuaternion::new_normalize(attitude);
+        let offset = attitude * Vector3::new(center.x, center.y, 0.0);
+        State { position: Vector3::new(-offset.x, -offset.y, level * height), attitude }
+    }
+}
+
+/// Closes the chain at `q`.
+///
+/// Of the poses that close it, one at most has all corners above the stator (source 001); it is
+/// accepted if its legs lean as `branch` says, and nothing else is.
+///
+/// # Errors
+/// `no_assembly` where no start leads to such a pose.
+pub(super) fn assemble(
+    mechanism: &TriPlanar,
+    q: &Joints<6>,
+    branch: Legs,
+    near: Option<&TriPlanarAssembly>,
+) -> Result<TriPlanarAssembly, KinematicsError> {
+    let centroid = Vector2::new(q[0] + q[2] + q[4], q[1] + q[3] + q[5]) / 3.0;
+    // Counted from there, rounding does not grow with the size of the stator.
+    let feet = Joints::from_fn(|row, _| q[row] - centroid[row % 2]);
+    let equations = Struts { mechanism, feet };
+    let accept = |state: &State| {
+        complete(&equations, state, q, &centroid).filter(|found| {
+            let arms = mechanism.arms(&found.rotation);
+            arms.iter().all(|arm| arm.z + found.position.z > 0.0)
+                && found.legs.iter().all(|leg| leg.normal.z.abs() > 0.0)
+                && found.folds() == branch
+        })
+    };
+    if let Some(near) = near {
+        let start = State {
+            position: near.position - Vector3::new(centroid.x, centroid.y, 0.0),
+            ..near.state
+        };
+        let found = equations.follow(start, &near.loosened).or_else(|| equations.solve(start));
+        if let Some(found) = found.as_ref().and_then(accept) {
+            return Ok(found);
+        }
+    }
+
+    let mut starts = LEVELS.map(|level| {
+        let start = equations.level(level, branch);
+        (equations.residual(&start).norm(), start)
+    });
+    starts.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
+    for (_, start) in &starts {
+        if let Some(found) = equations.solve(*start).as_ref().and_then(accept) {
+            return Ok(found);
+        }
+    }
+    for (_, start) in &starts {
+        for [x, y] in OUTWARD {
+            for tilt in [TILT, -TILT] {
+                let turn = Quaternion::new(1.0, x * tilt, y * tilt, 0.0);
+                let attitude = UnitQuaternion::new_normalize(turn * start.attitude.into_inner());
+                let start = State { attitude, ..*start };
+                if let Some(found) = equations.solve(start).as_ref().and_then(accept) {
+                    return Ok(found);
+                }
+            }
+        }
+    }
+    Err(KinematicsError {
+        code: "no_assembly",
+        axis: None,
+        value: starts[0].0,
+        limit: CLOSED,
+        detail: "no pose above the stator closes the legs on these feet in this branch; \
+                 the value is the best start's residual",
+    })
+}
+
+/// Everything else that follows from a solved pose.
+fn complete(
+    equations: &Struts<'_>,
+    state: &State,
+    q: &Joints<6>,
+    centroid: &Vector2<f64>,
+) -> Option<TriPlanarAssembly> {
+    let mechanism = equations.mechanism;
+    let height = mechanism.height();
+    let rotation = state.attitude.to_rotation_matrix().into_inner();
+    let normal = rotation.column(2).into_owned();
+    let mut index = 0;
+    let legs = OUTWARD.map(|[x, y]| {
+        let outward: Vector3<f64> = rotation.column(0) * x + rotation.column(1) * y;
+        let middle = outward * (height / 3.0);
+        let hinge = outward.cross(&normal);
+        let (foot_x, foot_y) = (equations.feet[2 * index], equations.feet[2 * index + 1]);
+        index += 1;
+        let arm = Vector3::new(foot_x, foot_y, 0.0) - state.position;
+        let shank = (arm - middle) / height;
+        let normal = hinge.cross(&shank);
+        // The foot's velocity along z, v_z + (Ω×arm)_z + h·turn·normal_z, is none.
+        let turn = SVector::from([0.0, 0.0, 1.0, arm.y, -arm.x, 0.0]) / (-height * normal.z);
+        Leg { middle, hinge, shank, normal, turn }
+    });
+
+    let arms = mechanism.arms(&rotation);
+    let struts = struts(mechanism, &arms, &state.position, &equations.feet);
+    let loosened = invert(struts)?;
+    // l·v + (r×l)·Ω = l·ḟ for each strut, in the units of the matrix.
+    let mut jacobian = Jacobian::zeros();
+    for column in 0..6 {
+        let first = column - column % 2;
+        let axis = column % 2;
+        let rates = loosened.column(first) * struts[(first, axis)]
+            + loosened.column(first + 1) * struts[(first + 1, axis)];
+        for row in 0..6 {
+            jacobian[(row, column)] =
+                if row < 3 { rates[row] } else { rates[row] / mechanism.side };
+        }
+    }
+    let position = state.position + Vector3::new(centroid.x, centroid.y, 0.0);
+    let mut assembly = TriPlanarAssembly {
+        position,
+        rotation,
+        feet: *q,
+        legs,
+        jacobian,
+        mass: SMatrix::zeros(),
+        gravity: SVector::zeros(),
+        state: *state,
+        loosened,
+    };
+    let (mass, gravity) = dynamics::inertia_and_gravity(mechanism, &assembly);
+    assembly.mass = mass;
+    assembly.gravity = gravity;
+    Some(assembly)
+}
+
+/// Inverse by elimination in place with row pivots; `None` where a pivot vanishes.
+fn invert(mut matrix: SMatrix<f64, 6, 6>) -> Option<SMatrix<f64, 6, 6>> {
+    let mut order = [0; 6];
+    for pivot in 0..6 {
+        let mut best = pivot;
+        for row in pivot + 1..6 {
+            if matrix[(row, pivot)].abs() > matrix[(best, pivot)].abs() {
+                best = row;
+            }
+        }
+        order[pivot] = best;
+        if best != pivot {
+            matrix.swap_rows(best, pivot);
+        }
+        let head = matrix[(pivot, pivot)];
+        if !head.is_finite() || head == 0.0 {
+            return None;
+        }
+        let scale = 1.0 / head;
+        matrix[(pivot, pivot)] = 1.0;
+        let mut factors = [0.0; 6];
+        for row in 0..6 {
+            if row != pivot {
+                factors[row] = matrix[(row, pivot)];
+                matrix[(row, pivot)] = 0.0;
+            }
+        }
+        for column in 0..6 {
+            let value = matrix[(pivot, column)] * scale;
+            for row in 0..6 {
+                matrix[(row, column)] -= factors[row] * value;
+            }
+            matrix[(pivot, column)] = value;
+        }
+    }
+    // Rows exchanged on the way are columns of the inverse, exchanged back in reverse.
+    for pivot in (0..6).rev() {
+        if order[pivot] != pivot {
+            matrix.swap_columns(order[pivot], pivot);
+        }
+    }
+    Some(matrix)
+}

@@ -1,0 +1,542 @@
+//! The platform on three planar motors: against its golden vectors, and by independent routes.
+
+#![allow(clippy::unwrap_used)]
+
+use machine::Mechanism;
+use machine::kinematics::{
+    Attitude, Branch, JointMotion, Joints, KinematicsError, Pose, ToolMotion,
+};
+use machine::mechanisms::tri_planar::{Fold, Legs, TriPlanar};
+use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
+use serde_json::Value;
+
+fn golden() -> Value {
+    let path = format!("{}/../tests/golden/tri_planar.json", env!("CARGO_MANIFEST_DIR"));
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+fn list<const N: usize>(value: &Value) -> [f64; N] {
+    core::array::from_fn(|index| number(&value[index]))
+}
+
+fn matrix(value: &Value) -> Matrix3<f64> {
+    Matrix3::from_fn(|row, column| number(&value[row][column]))
+}
+
+fn mechanism(params: &Value) -> TriPlanar {
+    TriPlanar {
+        side: number(&params["a"]),
+        stator: [list(&params["stator"][0]), list(&params["stator"][1])],
+        inductor: number(&params["inductor"]),
+        gap: number(&params["gap"]),
+        clearance: number(&params["z_clear"]),
+        type_1_limit: number(&params["margin1_min"]),
+        type_2_limit: number(&params["sigma2_min"]),
+        platform_mass: 0.8,
+        platform_inertia: [2.1e-3, 2.3e-3, 4.0e-3],
+        leg_mass: 0.15,
+        inductor_mass: 0.35,
+        legs: Legs::default(),
+        elasticity: None,
+    }
+}
+
+fn legs(modes: &Value) -> Legs {
+    Legs(list::<3>(modes).map(|mode| if mode > 0.0 { Fold::Outward } else { Fold::Inward }))
+}
+
+/// Roll, pitch and yaw about the fixed axes.
+fn rotation(rpy: &Value) -> Matrix3<f64> {
+    let [roll, pitch, yaw] = list(rpy);
+    Rotation3::from_euler_angles(roll, pitch, yaw).into_inner()
+}
+
+/// The feet without the limits, which some golden poses break.
+fn unlimited(mechanism: &TriPlanar) -> TriPlanar {
+    let far = [-1e3, 1e3];
+    TriPlanar {
+        stator: [far; 2],
+        gap: -1.0,
+        clearance: 0.0,
+        type_1_limit: 0.0,
+        type_2_limit: 0.0,
+        ..*mechanism
+    }
+}
+
+fn at_rest() -> Joints<6> {
+    Joints::zeros()
+}
+
+#[track_caller]
+fn near(found: f64, expected: f64, tolerance: f64, context: &str) {
+    let error = (found - expected).abs();
+    assert!(error <= tolerance, "{found} against {expected} (off by {error:e}), {context}");
+}
+
+#[track_caller]
+fn same_pose(found: &Pose, expected: &Pose, tolerance: f64, context: &str) {
+    near((found.position - expected.position).amax(), 0.0, tolerance, context);
+    near((found.rotation - expected.rotation).amax(), 0.0, tolerance, context);
+}
+
+fn golden_case(mechanism: &TriPlanar, case: &Value, tolerance: f64, fk_tolerance: f64) {
+    let (input, output) = (&case["input"], &case["output"]);
+    let context = &input.to_string();
+    let branch = legs(&input["modes"]);
+    let pose = Pose { position: list(&input["t"]).into(), rotation: matrix(&input["R"]) };
+    let q = mechanism.inverse(&pose, branch, &at_rest()).unwrap();
+    near((q - Joints::from(list::<6>(&output["motors"]))).amax(), 0.0, tolerance, context);
+
+    let cold = mechanism.assemble(&q, branch, None).unwrap();
+    same_pose(&mechanism.pose(&cold), &pose, fk_tolerance, context);
+    assert_eq!(mechanism.branch_of(&cold), branch, "{context}");
+    let guess = Pose {
+        position: list(&input["fk_guess_t"]).into(),
+        rotation: matrix(&input["fk_guess_R"]),
+    };
+    // The guesses lie outside the limits now and then.
+    if let Ok(guessed) = unlimited(mechanism).inverse(&guess, branch, &at_rest())
+        && let Ok(start) = mechanism.assemble(&guessed, branch, None)
+    {
+        let warm = mechanism.assemble(&q, branch, Some(&start)).unwrap();
+        same_pose(&mechanism.pose(&warm), &pose, fk_tolerance, context);
+    }
+
+    let inverse_jacobian = cold.inverse_jacobian();
+    let expected =
+        SMatrix::<f64, 6, 6>::from_fn(|row, column| number(&output["jinv"][row][column]));
+    near((inverse_jacobian - expected).amax(), 0.0, tolerance, context);
+    let jacobian = mechanism.jacobian(&cold);
+    let identity = SMatrix::<f64, 6, 6>::identity();
+    near((jacobian * expected - identity).amax(), 0.0, tolerance, context);
+    let twist = SVector::<f64, 6>::from(list::<6>(&input["twist"]));
+    let rates = Joints::from(list::<6>(&output["feet_vel"]));
+    near((jacobian * rates - twist).amax(), 0.0, tolerance, context);
+    let folding: [f64; 3] = list(&output["omega_dot"]);
+    let attitude = Attitude {
+        velocity: twist.fixed_rows::<3>(3).into_owned(),
+        ..Attitude::fixed(pose.rotation)
+    };
+    let tool = ToolMotion {
+        velocity: twist.fixed_rows::<3>(0).into_owned(),
+        attitude,
+        ..ToolMotion::rest(&pose)
+    };
+    let motion = mechanism.joint_motion(&tool, branch, &q).unwrap();
+    near((motion.position - q).amax(), 0.0, 1e-15, context);
+    near((motion.velocity - rates).amax(), 0.0, tolerance, context);
+
+    let margins = mechanism.margins(&cold);
+    let margin = |name: &str| margins.iter().find(|margin| margin.name == name).unwrap().value;
+    near(margin("type_2"), number(&output["sigma2"]), tolerance, context);
+    let corners = ["A", "B", "C"].map(|corner| number(&output["vertices"][corner][2]));
+    let lowest = corners.into_iter().fold(f64::INFINITY, f64::min);
+    near(margin("clearance"), lowest, tolerance, context);
+    for (index, leg) in ["D", "E", "F"].into_iter().enumerate() {
+        let expected = &output["legs"][leg];
+        let type_1 = margin(&format!("type_1_{leg}"));
+        near(type_1, number(&expected["type1_margin"]), tolerance, context);
+        near(cold.fold_angles()[index], number(&expected["omega"]), tolerance, context);
+        near(cold.fold_rates(&twist)[index], folding[index], tolerance, context);
+    }
+}
+
+#[test]
+fn it_agrees_with_the_golden_vectors() {
+    let golden = golden();
+    let mechanism = mechanism(&golden["params"]);
+    let tolerance = number(&golden["tolerance"]);
+    let fk_tolerance = number(&golden["fk_tolerance"]);
+    let mut count = 0;
+    for cases in ["cases", "cases_inward"] {
+        for case in golden[cases].as_array().unwrap() {
+            golden_case(&mechanism, case, tolerance, fk_tolerance);
+            count += 1;
+        }
+    }
+    assert_eq!(count, 19);
+
+    let mut assembly = None;
+    for point in golden["trajectory"].as_array().unwrap() {
+        let context = &point.to_string();
+        let pose = Pose { position: list(&point["t"]).into(), rotation: rotation(&point["rpy"]) };
+        let q = mechanism.inverse(&pose, Legs::default(), &at_rest()).unwrap();
+        near((q - Joints::from(list::<6>(&point["motors"]))).amax(), 0.0, tolerance, context);
+        let found = mechanism.assemble(&q, Legs::default(), assembly.as_ref()).unwrap();
+        same_pose(&mechanism.pose(&found), &pose, fk_tolerance, context);
+        assembly = Some(found);
+    }
+
+    for level in golden["level"].as_array().unwrap() {
+        let context = &level.to_string();
+        let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
+        let z = number(&level["z_over_h"]) * height;
+        let mut tool = ToolMotion::rest(&Pose::at(Vector3::new(0.0, 0.0, z)));
+        tool.velocity.z = 1.0;
+        let motion = mechanism.joint_motion(&tool, Legs::default(), &at_rest()).unwrap();
+        let assembly = mechanism.assemble(&motion.position, Legs::default(), None).unwrap();
+        for foot in 0..3 {
+            let place = motion.position.fixed_rows::<2>(2 * foot).into_owned();
+            let speed = motion.velocity.fixed_rows::<2>(2 * foot).into_owned();
+            near(place.norm(), number(&level["R_feet"]), tolerance, context);
+            let outward = speed.dot(&place) / place.norm();
+            near(outward, number(&level["dR_dz"]), tolerance, context);
+            near(assembly.fold_angles()[foot], number(&level["omega"]), tolerance, context);
+        }
+    }
+}
+
+#[test]
+fn it_refuses_what_the_golden_vectors_refuse() {
+    let golden = golden();
+    let mut count = 0;
+    for failing in golden["failing"].as_array().unwrap() {
+        let mut params = golden["params"].clone();
+        for (key, value) in failing["override"].as_object().unwrap() {
+            params[key] = value.clone();
+        }
+        let mechanism = mechanism(&params);
+        let input = &failing["input"];
+        let pose = Pose { position: list(&input["t"]).into(), rotation: rotation(&input["rpy"]) };
+        let branch = legs(&input["modes"]);
+        let alone = mechanism.inverse(&pose, branch, &at_rest()).unwrap_err();
+        assert_eq!(alone.code, failing["expect"].as_str().unwrap());
+        let moving = mechanism.joint_motion(&ToolMotion::rest(&pose), branch, &at_rest());
+        assert_eq!(moving.unwrap_err(), alone);
+        count += 1;
+    }
+    assert_eq!(count, 4);
+}
+
+fn refusal(mechanism: &TriPlanar, pose: &Pose, branch: Legs) -> KinematicsError {
+    mechanism.inverse(pose, branch, &at_rest()).unwrap_err()
+}
+
+#[test]
+fn it_says_which_limit_and_by_how_much() {
+    let mechanism = mechanism(&golden()["params"]);
+    let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
+    let outward = Legs::default();
+    let level = |x, y, z| Pose::at(Vector3::new(x, y, z * height));
+
+    let error = refusal(&mechanism, &level(0.0, 0.0, 1.05), outward);
+    assert_eq!((error.code, error.limit), ("unreachable_D", 1.0));
+    near(error.value, 1.05, 1e-12, "reach");
+    // At 0.6 h, cos ω = 0.8: D stands h·(0.8 + 1/3) away, 30° above the x axis.
+    let radius = height * (0.8 + 1.0 / 3.0);
+    let x = 0.4;
+    let error = refusal(&mechanism, &level(x, 0.0, 0.6), outward);
+    assert_eq!((error.code, error.axis), ("off_stator_D", Some(0)));
+    near(error.value, x + radius * 3.0_f64.sqrt() / 2.0, 1e-12, "off stator");
+    near(error.limit, 0.46, 1e-15, "off stator");
+    let error = refusal(&mechanism, &level(0.0, -0.3, 0.6), outward);
+    assert_eq!((error.code, error.axis), ("off_stator_F", Some(5)));
+    near(error.value, -0.3 - radius, 1e-12, "off stator");
+    near(error.limit, -0.36, 1e-15, "off stator");
+    // Nearly flat, the struts cannot hold the platform's height.
+    let error =
+        refusal(&TriPlanar { clearance: 0.0, ..mechanism }, &level(0.0, 0.0, 0.05), outward);
+    assert_eq!(error.code, "singular_platform");
+    assert!(error.value > 0.0 && error.value < error.limit, "{error}");
+    for bad in [f64::NAN, f64::INFINITY] {
+        assert_eq!(refusal(&mechanism, &level(0.0, 0.0, bad), outward).code, "unreachable_D");
+        let error = refusal(&mechanism, &level(bad, 0.0, 0.6), outward);
+        assert_eq!(error.code, "off_stator_D");
+    }
+
+    let scattered = Joints::from([0.4, 0.3, -0.4, 0.3, 0.0, -0.3]);
+    assert_eq!(mechanism.assemble(&scattered, outward, None).unwrap_err().code, "no_assembly");
+    let nowhere = Joints::from([f64::NAN; 6]);
+    assert_eq!(mechanism.assemble(&nowhere, outward, None).unwrap_err().code, "no_assembly");
+    // The feet of one branch are not an assembly of another.
+    let q = mechanism.inverse(&level(0.0, 0.0, 0.6), outward, &at_rest()).unwrap();
+    let mixed = outward.choose("legs", &[-1, 1, 1]).unwrap();
+    assert_eq!(mechanism.assemble(&q, mixed, None).unwrap_err().code, "no_assembly");
+    assert_eq!(mixed.choices(), [("legs", vec![-1, 1, 1])]);
+    assert_eq!(outward.choose("legs", &[0, 1, 1]), None);
+    assert_eq!(outward.choose("elbow", &[1, 1, 1]), None);
+}
+
+/// Repeatable numbers from -1 to 1 (xorshift64*).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        let bits = self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11;
+        bits as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    fn vector(&mut self, scale: f64) -> Vector3<f64> {
+        Vector3::new(self.next(), self.next(), self.next()) * scale
+    }
+
+    /// Anywhere over the stator, at any yaw, tilted by up to `tilt` [rad].
+    fn pose(&mut self, height: f64, tilt: f64) -> Pose {
+        let position = Vector3::new(
+            self.next() * 0.25,
+            self.next() * 0.15,
+            (0.6 + 0.35 * self.next()) * height,
+        );
+        let yaw =
+            Rotation3::from_axis_angle(&Vector3::z_axis(), self.next() * core::f64::consts::PI);
+        let lean = Rotation3::new(Vector3::new(self.next() * tilt, self.next() * tilt, 0.0));
+        Pose { position, rotation: (yaw * lean).into_inner() }
+    }
+}
+
+#[test]
+fn feet_and_pose_lead_to_each_other_over_the_working_range() {
+    let mechanism = mechanism(&golden()["params"]);
+    let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut counts = [0; 2];
+    let mut last: [Option<_>; 2] = [None; 2];
+    for case in 0..4000 {
+        let pose = random.pose(height, 0.6);
+        let mixed = Legs([Fold::Inward, Fold::Outward, Fold::Outward]);
+        for (which, branch) in [Legs::default(), mixed].into_iter().enumerate() {
+            let Ok(q) = mechanism.inverse(&pose, branch, &at_rest()) else { continue };
+            let context = &format!("case {case} {branch:?}: {pose:?}");
+            let cold = mechanism.assemble(&q, branch, None).expect(context);
+            // The least singular value is 0.05, so rounding of 1e-16 may grow twentyfold and more.
+            same_pose(&mechanism.pose(&cold), &pose, 1e-13, context);
+            let back = mechanism.inverse(&mechanism.pose(&cold), branch, &q).expect(context);
+            near((back - q).amax(), 0.0, 1e-13, context);
+            // From the last pose, anywhere else on the stator, and from close by.
+            let warm = mechanism.assemble(&q, branch, last[which].as_ref()).expect(context);
+            same_pose(&mechanism.pose(&warm), &pose, 1e-13, context);
+            let moved = q + Joints::from_fn(|_, _| random.next() * 1e-4);
+            if let Ok(start) = mechanism.assemble(&moved, branch, Some(&cold)) {
+                let warm = mechanism.assemble(&q, branch, Some(&start)).expect(context);
+                same_pose(&mechanism.pose(&warm), &pose, 1e-13, context);
+            }
+            last[which] = Some(cold);
+            counts[which] += 1;
+        }
+    }
+    assert!(counts[0] > 1500 && counts[1] > 100, "{counts:?}");
+}
+
+/// A motion of the tool, and the same `time` later if its third derivatives last.
+#[derive(Clone, Copy)]
+struct Course {
+    tool: ToolMotion,
+}
+
+impl Course {
+    fn random(random: &mut Random, height: f64) -> Self {
+        let pose = random.pose(height, 0.3);
+        Self {
+            tool: ToolMotion {
+                velocity: random.vector(0.5),
+                acceleration: random.vector(10.0),
+                jerk: random.vector(500.0),
+                attitude: Attitude {
+                    velocity: random.vector(1.0),
+                    acceleration: random.vector(20.0),
+                    jerk: random.vector(1000.0),
+                    ..Attitude::fixed(pose.rotation)
+                },
+                ..ToolMotion::rest(&pose)
+            },
+        }
+    }
+
+    /// The rotation follows Ω(t) by the Magnus expansion, exact to the fourth order in `time`.
+    fn later(&self, time: f64) -> ToolMotion {
+        let Self { tool } = *self;
+        let Attitude { rotation, velocity, acceleration, jerk } = tool.attitude;
+        let angle = velocity * time
+            + acceleration * (time * time / 2.0)
+            + jerk * (time * time * time / 6.0)
+            - velocity.cross(&acceleration) * (time * time * time / 12.0);
+        ToolMotion {
+            position: tool.position
+                + tool.velocity * time
+                + tool.acceleration * (time * time / 2.0)
+                + tool.jerk * (time * time * time / 6.0),
+            velocity: tool.velocity + tool.acceleration * time + tool.jerk * (time * time / 2.0),
+            acceleration: tool.acceleration + tool.jerk * time,
+            jerk: tool.jerk,
+            attitude: Attitude {
+                rotation: Rotation3::new(angle).into_inner() * rotation,
+                velocity: velocity + acceleration * time + jerk * (time * time / 2.0),
+                acceleration: acceleration + jerk * time,
+                jerk,
+            },
+        }
+    }
+}
+
+/// Courses over the stator that every limit allows.
+fn courses(mechanism: &TriPlanar, branch: Legs, count: usize) -> Vec<Course> {
+    let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
+    let mut random = Random(0x5851_f42d_4c95_7f2d);
+    let mut courses = Vec::new();
+    while courses.len() < count {
+        let course = Course::random(&mut random, height);
+        let pose = course.tool.pose();
+        if mechanism.inverse(&pose, branch, &at_rest()).is_ok() {
+            courses.push(course);
+        }
+    }
+    courses
+}
+
+#[test]
+fn every_derivative_of_the_joints_is_that_of_the_one_below() {
+    let mechanism = mechanism(&golden()["params"]);
+    let mixed = Legs([Fold::Outward, Fold::Inward, Fold::Outward]);
+    for branch in [Legs::default(), mixed] {
+        for course in courses(&mechanism, branch, 200) {
+            let context = &format!("{branch:?} {:?}", course.tool);
+            let free = unlimited(&mechanism);
+            let at = |time: f64| {
+                free.joint_motion(&course.later(time), branch, &at_rest()).expect(context)
+            };
+            let h = 1e-5;
+            let (behind, motion, ahead) = (at(-h), at(0.0), at(h));
+            for (found, low, high) in [
+                (motion.velocity, behind.position, ahead.position),
+                (motion.acceleration, behind.velocity, ahead.velocity),
+                (motion.jerk, behind.acceleration, ahead.acceleration),
+            ] {
+                let difference = (high - low) / (2.0 * h);
+                // The truncation h²/6 of the derivative two orders up grows near the limits.
+                let scale = 1.0 + found.amax();
+                near((found - difference).amax() / scale, 0.0, 1e-5, context);
+            }
+            // What moves the feet moves the platform.
+            let assembly = mechanism.assemble(&motion.position, branch, None).expect(context);
+            let twist = mechanism.jacobian(&assembly) * motion.velocity;
+            near((twist.fixed_rows::<3>(0) - course.tool.velocity).amax(), 0.0, 1e-12, context);
+            let spin = course.tool.attitude.velocity;
+            near((twist.fixed_rows::<3>(3) - spin).amax(), 0.0, 1e-12, context);
+        }
+    }
+}
+
+/// Kinetic and potential energy from the bodies alone: speeds of their points by differences of
+/// their places. A thin uniform triangle has the inertia of a third of its mass in the middle of
+/// each side.
+fn energy(mechanism: &TriPlanar, branch: Legs, course: &Course, time: f64) -> (f64, f64) {
+    let h = 1e-5;
+    let points = |time: f64| {
+        let tool = course.later(time);
+        let q = unlimited(mechanism).inverse(&tool.pose(), branch, &at_rest()).unwrap();
+        let (a, rotation) = (mechanism.side, tool.attitude.rotation);
+        let corner = |x: f64, y: f64| tool.position + rotation * Vector3::new(x * a, y * a, 0.0);
+        let root = 3.0_f64.sqrt();
+        let corners =
+            [corner(0.5, -0.5 / root), corner(-0.5, -0.5 / root), corner(0.0, 1.0 / root)];
+        let mut points = Vec::new();
+        for (leg, [one, other]) in [[0, 2], [2, 1], [0, 1]].into_iter().enumerate() {
+            let foot = Vector3::new(q[2 * leg], q[2 * leg + 1], 0.0);
+            let third = mechanism.leg_mass / 3.0;
+            points.push((third, (corners[one] + corners[other]) / 2.0));
+            points.push((third, (corners[one] + foot) / 2.0));
+            points.push((third, (foot + corners[other]) / 2.0));
+            points.push((mechanism.inductor_mass, foot));
+        }
+        points.push((mechanism.platform_mass, tool.position));
+        points
+    };
+    let (behind, here, ahead) = (points(time - h), points(time), points(time + h));
+    let (mut kinetic, mut potential) = (0.0, 0.0);
+    for ((low, high), (mass, place)) in behind.iter().zip(&ahead).zip(&here) {
+        kinetic += mass * ((high.1 - low.1) / (2.0 * h)).norm_squared() / 2.0;
+        potential += mass * 9.806_65 * place.z;
+    }
+    let attitude = course.later(time).attitude;
+    let spin = attitude.rotation.tr_mul(&attitude.velocity);
+    let inertia = Vector3::from(mechanism.platform_inertia);
+    (kinetic + spin.dot(&inertia.component_mul(&spin)) / 2.0, potential)
+}
+
+#[test]
+fn power_into_the_feet_is_the_change_of_energy() {
+    let mechanism = mechanism(&golden()["params"]);
+    let mixed = Legs([Fold::Outward, Fold::Outward, Fold::Inward]);
+    for branch in [Legs::default(), mixed] {
+        for course in courses(&mechanism, branch, 200) {
+            let context = &format!("{branch:?} {:?}", course.tool);
+            let motion: JointMotion<6> =
+                mechanism.joint_motion(&course.tool, branch, &at_rest()).unwrap();
+            let assembly = mechanism.assemble(&motion.position, branch, None).unwrap();
+            let mass = mechanism.mass_matrix(&assembly);
+            assert_eq!(mass, mass.transpose());
+            assert!(mass.cholesky().is_some(), "{context}");
+            let kinetic = motion.velocity.dot(&(mass * motion.velocity)) / 2.0;
+            let (expected, _) = energy(&mechanism, branch, &course, 0.0);
+            near(kinetic / expected, 1.0, 1e-6, context);
+
+            let h = 1e-4;
+            let total = |time: f64| {
+                let (kinetic, potential) = energy(&mechanism, branch, &course, time);
+                kinetic + potential
+            };
+            let change = (total(h) - total(-h)) / (2.0 * h);
+            let effort =
+                mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
+            let power = effort.dot(&motion.velocity);
+            near((power - change) / (1.0 + power.abs()), 0.0, 2e-4, context);
+            let still = mechanism.bias(&assembly, &at_rest());
+            near((still - mechanism.gravity(&assembly)).amax(), 0.0, 1e-12, context);
+        }
+    }
+}
+
+/// Power tells only the part of the bias along the velocity; the Lagrangian's derivatives tell all
+/// of it: `Ṁ·q̇ − ∂T/∂q + ∂V/∂q`.
+#[test]
+fn the_bias_is_that_of_lagrange() {
+    let mechanism = mechanism(&golden()["params"]);
+    let branch = Legs::default();
+    for course in courses(&mechanism, branch, 100) {
+        let context = &format!("{:?}", course.tool);
+        let motion = mechanism.joint_motion(&course.tool, branch, &at_rest()).unwrap();
+        let (q, velocity) = (motion.position, motion.velocity);
+        let assembly = mechanism.assemble(&q, branch, None).unwrap();
+        let mass = |q: Joints<6>| {
+            mechanism.mass_matrix(&mechanism.assemble(&q, branch, Some(&assembly)).unwrap())
+        };
+        let h = 1e-6;
+        let change = (mass(q + velocity * h) - mass(q - velocity * h)) / (2.0 * h);
+        let mut expected = change * velocity + mechanism.gravity(&assembly);
+        for joint in 0..6 {
+            let mut offset = at_rest();
+            offset[joint] = h;
+            let kinetic = |q| velocity.dot(&(mass(q) * velocity)) / 2.0;
+            expected[joint] -= (kinetic(q + offset) - kinetic(q - offset)) / (2.0 * h);
+        }
+        let found = mechanism.bias(&assembly, &velocity);
+        near((found - expected).amax() / (1.0 + found.amax()), 0.0, 1e-6, context);
+    }
+}
+
+#[test]
+fn a_level_load_spreads_the_feet_by_a_third_of_it_over_tan_omega() {
+    let massless = TriPlanar { leg_mass: 0.0, ..mechanism(&golden()["params"]) };
+    let height = massless.side * 3.0_f64.sqrt() / 2.0;
+    for share in [0.3, 0.5, 0.7, 0.9] {
+        let pose = Pose::at(Vector3::new(0.1, -0.05, share * height));
+        let q = massless.inverse(&pose, massless.legs, &at_rest()).unwrap();
+        let held = massless.gravity(&massless.assemble(&q, massless.legs, None).unwrap());
+        let slope = share / (1.0_f64 - share * share).sqrt();
+        let thrust = 0.8 * 9.806_65 / (3.0 * slope);
+        for leg in 0..3 {
+            let out = Vector3::new(q[2 * leg] - 0.1, q[2 * leg + 1] + 0.05, 0.0).normalize();
+            let force = Vector3::new(held[2 * leg], held[2 * leg + 1], 0.0);
+            // The feet hold against spreading, inwards.
+            near((force + out * thrust).amax(), 0.0, 1e-12, &format!("{share} {leg}"));
+        }
+    }
+}
