@@ -12,7 +12,7 @@ use crate::kinematics::{
 };
 
 /// Gravity at the surface [m/s²], against the z axis.
-const STANDARD_GRAVITY: f64 = 9.806_65;
+pub(super) const STANDARD_GRAVITY: f64 = 9.806_65;
 
 /// Carriages in x, y and, with `N` = 3, z.
 #[derive(Debug, Clone, Copy, PartialEq)]

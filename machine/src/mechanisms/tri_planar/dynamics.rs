@@ -5,11 +5,9 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
+use super::super::cartesian::STANDARD_GRAVITY;
 use super::{TriPlanar, TriPlanarAssembly};
 use crate::kinematics::Joints;
-
-/// Gravity at the surface [m/s²], against the z axis.
-const STANDARD_GRAVITY: f64 = 9.806_65;
 
 type Twist = SVector<f64, 6>;
 
