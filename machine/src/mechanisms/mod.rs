@@ -2,17 +2,24 @@
 
 pub mod cartesian;
 pub mod corexy;
+pub mod five_bar;
 pub mod mcm;
+mod plane;
 pub mod polar;
+pub mod prrrp;
 pub mod transmission;
 pub mod tri_planar;
+pub mod twin_actuator;
 
 pub use cartesian::Cartesian;
 pub use corexy::CoreXy;
+pub use five_bar::{FiveBar, FiveBarBranch};
 pub use mcm::Mcm;
 pub use polar::Polar;
+pub use prrrp::{Prrrp, PrrrpBranch};
 pub use transmission::Elasticity;
 pub use tri_planar::TriPlanar;
+pub use twin_actuator::{ActuatorBodies, TwinActuator, TwinBranch};
 
 use crate::kinematics::Mechanism;
 
@@ -31,6 +38,12 @@ pub enum MechanismKind {
     Polar(Polar),
     /// A platform on three legs with planar motors as feet.
     TriPlanar(TriPlanar),
+    /// Two arms whose forearms meet in the tool.
+    FiveBar(FiveBar),
+    /// Two carts on one rail, with a link each to the tool.
+    Prrrp(Prrrp),
+    /// Two actuators of variable length that meet in one joint.
+    TwinActuator(TwinActuator),
 }
 
 /// Work that is generic over the mechanism, such as a sampler or a plant.
@@ -65,6 +78,9 @@ impl MechanismKind {
             Self::Mcm(mechanism) => visitor.visit(*mechanism),
             Self::Polar(mechanism) => visitor.visit(*mechanism),
             Self::TriPlanar(mechanism) => visitor.visit(*mechanism),
+            Self::FiveBar(mechanism) => visitor.visit(*mechanism),
+            Self::Prrrp(mechanism) => visitor.visit(*mechanism),
+            Self::TwinActuator(mechanism) => visitor.visit(*mechanism),
         }
     }
 
@@ -77,13 +93,20 @@ impl MechanismKind {
             Self::Mcm(_) => Mcm::NAME,
             Self::Polar(_) => Polar::NAME,
             Self::TriPlanar(_) => TriPlanar::NAME,
+            Self::FiveBar(_) => FiveBar::NAME,
+            Self::Prrrp(_) => Prrrp::NAME,
+            Self::TwinActuator(_) => TwinActuator::NAME,
         }
     }
 
     /// The number of actuated axes.
     pub fn axes(&self) -> usize {
         match self {
-            Self::Cartesian(_) | Self::CoreXy(_) => 2,
+            Self::Cartesian(_)
+            | Self::CoreXy(_)
+            | Self::FiveBar(_)
+            | Self::Prrrp(_)
+            | Self::TwinActuator(_) => 2,
             Self::CartesianLift(_) | Self::Polar(_) => 3,
             Self::Mcm(_) => 5,
             Self::TriPlanar(_) => 6,

@@ -1,0 +1,425 @@
+//! Two arms on a common base whose forearms meet in the tool (source 003 ch. 5).
+//!
+//! ```text
+//!            P
+//!      a  ／   ＼  a
+//!       A         B          elbows, outwards for working mode (+1, −1)
+//!      b ＼     ／ b
+//!        (−e,0) (+e,0)       motors
+//! ```
+//!
+//! The joints are the absolute angles of the proximal links [rad]. All of it lies flat: gravity
+//! does no work.
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use super::plane::{self, Body, cross, turned};
+use super::transmission::Elasticity;
+use crate::kinematics::{
+    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
+    ToolMotion, in_plane,
+};
+use crate::taylor::Scalar;
+use signals::math;
+
+/// How far an angle may be from the previous one before a turn is counted [rad]. Anything from
+/// the longest step of a path to a full turn less that keeps a path continuous; above half a turn,
+/// an angle from a standing start is that of the equations, not folded into ±π.
+const TURN_HYSTERESIS: f64 = 0.75 * math::TURN;
+
+/// The dimensions and masses. Centres of mass are at mid-link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FiveBar {
+    /// Half the distance between the motors [m]. // e
+    pub half_base: f64,
+    /// Length of the links at the motors [m]. // b
+    pub proximal: f64,
+    /// Length of the links at the tool [m]. // a
+    pub distal: f64,
+    /// Mass of a proximal link [kg]. // m_b
+    pub proximal_mass: f64,
+    /// Inertia of a proximal link about its centre of mass [kg·m²]. // J_b
+    pub proximal_inertia: f64,
+    /// Mass of a distal link [kg]. // m_a
+    pub distal_mass: f64,
+    /// Inertia of a distal link about its centre of mass [kg·m²]. // J_a
+    pub distal_inertia: f64,
+    /// Mass of the tool [kg]. // m_e
+    pub tool_mass: f64,
+    /// Mass of the bar that guides the tool; it moves in y only [kg].
+    pub bar_mass: f64,
+    /// What |sin(Φi − θi)| must keep: below it an arm is all but stretched or folded.
+    pub type_1_limit: f64,
+    /// What |sin(Φ1 − Φ2)| must keep: below it the forearms are all but in line.
+    pub type_2_limit: f64,
+    /// The solution in which the machine is built.
+    pub branch: FiveBarBranch,
+    /// Torsion spring and damper of each arm, bending included [N·m/rad, N·m·s/rad]; `None` when
+    /// they are taken as rigid.
+    pub elasticity: Option<[Elasticity; 2]>,
+}
+
+/// On which side the elbows are, and on which the tool.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FiveBarBranch {
+    /// For each arm: +1 with the elbow left of the way from motor to tool, −1 right of it.
+    pub working_mode: [i32; 2],
+    /// +1 with the tool left of the way from the first elbow to the second, −1 right of it.
+    pub assembly_mode: i32,
+}
+
+impl Branch for FiveBarBranch {
+    fn choices(&self) -> Vec<(&'static str, Vec<i32>)> {
+        vec![
+            ("working_mode", self.working_mode.to_vec()),
+            ("assembly_mode", vec![self.assembly_mode]),
+        ]
+    }
+
+    fn choose(self, name: &str, values: &[i32]) -> Option<Self> {
+        match (name, values) {
+            ("working_mode", &[first, second]) => {
+                let working_mode = [plane::sign(first)?, plane::sign(second)?];
+                Some(Self { working_mode, ..self })
+            }
+            ("assembly_mode", &[mode]) => Some(Self { assembly_mode: plane::sign(mode)?, ..self }),
+            _ => None,
+        }
+    }
+}
+
+/// The linkage at one joint position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FiveBarAssembly {
+    /// From each motor to its elbow [m].
+    pub proximal: [Vector2<f64>; 2],
+    /// From each elbow to the tool [m].
+    pub distal: [Vector2<f64>; 2],
+    /// The tool [m].
+    pub tool: Vector2<f64>,
+    /// Tool velocity per joint rate [m].
+    pub jacobian: Matrix2<f64>,
+    /// For each distal link, its rate of turning per joint rate.
+    pub distal_rates: [Vector2<f64>; 2],
+    branch: FiveBarBranch,
+}
+
+impl FiveBarAssembly {
+    /// Accelerations that joints moving evenly at `velocity` [rad/s] cause: of the tool [m/s²] and
+    /// of the distal links' angles [rad/s²].
+    pub fn even_accelerations(&self, velocity: &Joints<2>) -> (Vector2<f64>, [f64; 2]) {
+        let [d1, d2] = self.distal;
+        let pulls = self.pulls(velocity);
+        // With θ̈ = 0, a distal link gives dᵢ·P̈ = −θ̇ᵢ²·dᵢ·pᵢ − ωᵢ²·a².
+        let along = [0, 1].map(|arm| {
+            let rate = self.distal_rates[arm].dot(velocity);
+            let distal = self.distal[arm];
+            -distal.dot(&pulls[arm]) - rate * rate * distal.norm_squared()
+        });
+        let tool =
+            Vector2::new(d2.y * along[0] - d1.y * along[1], d1.x * along[1] - d2.x * along[0])
+                / cross(d1, d2);
+        let turning = [0, 1].map(|arm| {
+            let distal = self.distal[arm];
+            cross(distal, tool + pulls[arm]) / distal.norm_squared()
+        });
+        (tool, turning)
+    }
+
+    /// What pulls the elbows towards their motors, `θ̇²·p` [m/s²].
+    fn pulls(&self, velocity: &Joints<2>) -> [Vector2<f64>; 2] {
+        [0, 1].map(|arm| self.proximal[arm] * (velocity[arm] * velocity[arm]))
+    }
+
+    /// Velocity of a distal link's centre per joint rate.
+    fn centre(&self, arm: usize) -> Matrix2<f64> {
+        let mut velocity = self.jacobian;
+        let mut own = velocity.column_mut(arm);
+        own += turned(self.proximal[arm]);
+        velocity / 2.0
+    }
+}
+
+/// Which of the two codes belongs to `arm`.
+fn unreachable(arm: usize) -> &'static str {
+    ["unreachable_leg_1", "unreachable_leg_2"][arm]
+}
+
+impl FiveBar {
+    /// The motor of `arm`, on the x axis [m].
+    fn base(&self, arm: usize) -> f64 {
+        [-self.half_base, self.half_base][arm]
+    }
+
+    fn forearm(&self) -> Body {
+        Body::new(self.distal_mass, self.distal_inertia)
+    }
+
+    fn tool_and_bar(&self) -> Body {
+        let mass = Vector2::new(self.tool_mass, self.tool_mass + self.bar_mass);
+        Body { mass, inertia: 0.0 }
+    }
+
+    /// Inertia of a proximal link about its motor [kg·m²].
+    fn arm_inertia(&self) -> f64 {
+        let centre = self.proximal / 2.0;
+        self.proximal_inertia + self.proximal_mass * centre * centre
+    }
+
+    /// The joint angles for the tool at (`x`, `y`).
+    ///
+    /// Source 003 eq. 5.1 with atan2, `θi = atan2(y, x ± e) + sᵢ·acos((b² + r² − a²)/(2·b·r))`,
+    /// with the sum of the two angles taken as one rotation of vectors.
+    fn angles<S: Scalar>(
+        &self,
+        x: S,
+        y: S,
+        branch: FiveBarBranch,
+        previous: &Joints<2>,
+    ) -> Result<[S; 2], KinematicsError> {
+        let first = self.arm(0, x, y, branch)?;
+        let second = self.arm(1, x, y, branch)?;
+        self.check_forearms([first, second].map(|(_, elbow)| elbow), x, y, branch)?;
+        Ok([(0, first.0), (1, second.0)].map(|(arm, angle)| {
+            let off = angle.value() - previous[arm];
+            if off.abs() < TURN_HYSTERESIS {
+                angle
+            } else {
+                angle + (math::nearest_turn(angle.value(), previous[arm]) - angle.value())
+            }
+        }))
+    }
+
+    /// The angle of one arm, and where its elbow is [m].
+    fn arm<S: Scalar>(
+        &self,
+        arm: usize,
+        x: S,
+        y: S,
+        branch: FiveBarBranch,
+    ) -> Result<(S, Vector2<f64>), KinematicsError> {
+        let (a, b) = (self.distal, self.proximal);
+        let x = x - self.base(arm);
+        let square = x * x + y * y;
+        // r times how far along r the elbow lies; twice the area of motor, elbow and tool.
+        let along = (square + (b * b - a * a)) * 0.5;
+        let twice_area = square * (b * b) - along * along;
+        // Written so that a position that is not a number fails too.
+        let area_value = twice_area.value();
+        if !(area_value >= 0.0 && area_value.is_finite()) {
+            let radius = square.value().sqrt();
+            let limit = if radius < a + b { (a - b).abs() } else { a + b };
+            return Err(KinematicsError {
+                code: unreachable(arm),
+                axis: Some(arm),
+                value: radius,
+                limit,
+                detail: "the tool is farther from the motor than the stretched arm reaches, or \
+                         nearer than the folded one",
+            });
+        }
+        // Twice the area over a·b is the sine between the two links.
+        let sine = area_value.sqrt() / (a * b);
+        if sine == 0.0 || sine < self.type_1_limit {
+            return Err(KinematicsError {
+                code: "singular_type_1",
+                axis: Some(arm),
+                value: sine,
+                limit: self.type_1_limit,
+                detail: "the arm is all but stretched or folded",
+            });
+        }
+        let side = f64::from(branch.working_mode[arm]);
+        let across = twice_area.sqrt() * side;
+        let elbow = [x * along - y * across, y * along + x * across];
+        let value = Vector2::new(elbow[0].value(), elbow[1].value());
+        let angle = elbow[1].atan2(elbow[0]);
+        // The rotation from the tool's direction to the elbow's is below half a turn, so it
+        // crossed the cut of atan2 exactly if the two lie on either side of it this way round.
+        let above = y.value() >= 0.0;
+        let turn = match (side > 0.0, above, value.y < 0.0) {
+            (true, true, true) => math::TURN,
+            (false, false, false) => -math::TURN,
+            _ => 0.0,
+        };
+        let elbow = value / square.value() + Vector2::new(self.base(arm), 0.0);
+        Ok((angle + turn, elbow))
+    }
+
+    /// Refuses elbows from which the tool lies on the other side, or whose forearms are in line.
+    fn check_forearms<S: Scalar>(
+        &self,
+        elbows: [Vector2<f64>; 2],
+        x: S,
+        y: S,
+        branch: FiveBarBranch,
+    ) -> Result<(), KinematicsError> {
+        let tool = Vector2::new(x.value(), y.value());
+        let [d1, d2] = elbows.map(|elbow| tool - elbow);
+        let sine = f64::from(branch.assembly_mode) * cross(d1, d2) / (self.distal * self.distal);
+        let refusal = |code, detail| KinematicsError {
+            code,
+            axis: None,
+            value: sine,
+            limit: self.type_2_limit,
+            detail,
+        };
+        if sine == 0.0 || sine.abs() < self.type_2_limit {
+            return Err(refusal("singular_type_2", "the forearms are all but in line"));
+        }
+        if sine > 0.0 {
+            return Ok(());
+        }
+        Err(refusal("wrong_assembly_mode", "with these elbows the tool is on the other side"))
+    }
+}
+
+impl Mechanism<2> for FiveBar {
+    type Branch = FiveBarBranch;
+    type Assembly = FiveBarAssembly;
+
+    const NAME: &'static str = "five_bar";
+
+    fn freedom(&self) -> Freedom {
+        Freedom::Plane
+    }
+
+    fn branch(&self) -> FiveBarBranch {
+        self.branch
+    }
+
+    fn branch_of(&self, assembly: &FiveBarAssembly) -> FiveBarBranch {
+        assembly.branch
+    }
+
+    /// The assembly mode of `branch` decides; the working mode is then what the joints make it.
+    fn assemble(
+        &self,
+        q: &Joints<2>,
+        branch: FiveBarBranch,
+        _near: Option<&FiveBarAssembly>,
+    ) -> Result<FiveBarAssembly, KinematicsError> {
+        let proximal = [0, 1].map(|arm| {
+            let (sine, cosine) = math::sin_cos(q[arm]);
+            Vector2::new(cosine, sine) * self.proximal
+        });
+        let elbows = [0, 1].map(|arm| Vector2::new(self.base(arm), 0.0) + proximal[arm]);
+        let between = elbows[1] - elbows[0];
+        let square = between.norm_squared();
+        // Source 003 eq. 5.1: the tool stands on the middle between the elbows.
+        let height = self.distal * self.distal - square / 4.0;
+        // Written so that joints that are not numbers fail too.
+        if !(height > 0.0 && square > 0.0) {
+            return Err(KinematicsError {
+                code: "unreachable_elbows",
+                axis: None,
+                value: square.sqrt(),
+                limit: 2.0 * self.distal,
+                detail: "the forearms do not meet from these elbows",
+            });
+        }
+        let up = turned(between) * (f64::from(branch.assembly_mode) * (height / square).sqrt());
+        let tool = elbows[0] + between / 2.0 + up;
+        let distal = elbows.map(|elbow| tool - elbow);
+        let [d1, d2] = distal;
+        // Source 003 eq. 5.2: dᵢ·Ṗ = (pᵢ × dᵢ)·θ̇ᵢ; eq. 5.3 lacks b, and (X − e) in its second row.
+        let drive = [cross(proximal[0], d1), cross(proximal[1], d2)];
+        let det = cross(d1, d2);
+        let (g1, g2) = (drive[0] / det, drive[1] / det);
+        let jacobian = Matrix2::new(d2.y * g1, -d1.y * g2, -d2.x * g1, d1.x * g2);
+        let lengths = self.distal * self.distal;
+        let distal_rates = [0, 1].map(|arm| {
+            let d = distal[arm];
+            let mut rate = Vector2::new(
+                d.x * jacobian[(1, 0)] - d.y * jacobian[(0, 0)],
+                d.x * jacobian[(1, 1)] - d.y * jacobian[(0, 1)],
+            );
+            rate[arm] -= d.dot(&proximal[arm]);
+            rate / lengths
+        });
+        let working_mode = drive.map(|drive| if drive <= 0.0 { 1 } else { -1 });
+        let branch = FiveBarBranch { working_mode, assembly_mode: branch.assembly_mode };
+        Ok(FiveBarAssembly { proximal, distal, tool, jacobian, distal_rates, branch })
+    }
+
+    fn pose(&self, assembly: &FiveBarAssembly) -> Pose {
+        Pose::at(Vector3::new(assembly.tool.x, assembly.tool.y, 0.0))
+    }
+
+    fn jacobian(&self, assembly: &FiveBarAssembly) -> Jacobian<2> {
+        plane::jacobian(&assembly.jacobian)
+    }
+
+    fn margins(&self, assembly: &FiveBarAssembly) -> Vec<Margin> {
+        let sine = |arm: usize| {
+            cross(assembly.proximal[arm], assembly.distal[arm]).abs()
+                / (self.proximal * self.distal)
+        };
+        let [d1, d2] = assembly.distal;
+        let type_2 = cross(d1, d2).abs() / (self.distal * self.distal);
+        vec![
+            Margin { name: "type_1", value: sine(0).min(sine(1)), limit: self.type_1_limit },
+            Margin { name: "type_2", value: type_2, limit: self.type_2_limit },
+        ]
+    }
+
+    fn inverse(
+        &self,
+        pose: &Pose,
+        branch: FiveBarBranch,
+        previous: &Joints<2>,
+    ) -> Result<Joints<2>, KinematicsError> {
+        in_plane(&pose.position)?;
+        self.angles(pose.position.x, pose.position.y, branch, previous).map(Joints::from)
+    }
+
+    fn joint_motion(
+        &self,
+        tool: &ToolMotion,
+        branch: FiveBarBranch,
+        previous: &Joints<2>,
+    ) -> Result<JointMotion<2>, KinematicsError> {
+        in_plane(&tool.position)?;
+        let [x, y, _] = tool.series();
+        Ok(JointMotion::of_series(&self.angles(x, y, branch, previous)?))
+    }
+
+    // Source 003 eq. 5.7, 5.10 and 5.11 (where 2/m_e is m_e/2), in independent coordinates: the
+    // loop is closed in the velocities, so that no multiplier is left.
+    fn mass_matrix(&self, assembly: &FiveBarAssembly) -> Matrix2<f64> {
+        let forearm = self.forearm();
+        let still = Vector2::zeros();
+        let mut mass = self.tool_and_bar().joint_mass(&assembly.jacobian, &still);
+        for arm in 0..2 {
+            mass += forearm.joint_mass(&assembly.centre(arm), &assembly.distal_rates[arm]);
+            mass[(arm, arm)] += self.arm_inertia();
+        }
+        mass
+    }
+
+    fn bias(&self, assembly: &FiveBarAssembly, velocity: &Joints<2>) -> Joints<2> {
+        let (tool, turning) = assembly.even_accelerations(velocity);
+        let pulls = assembly.pulls(velocity);
+        let forearm = self.forearm();
+        let still = Vector2::zeros();
+        let mut effort = self.tool_and_bar().joint_effort(&assembly.jacobian, &still, tool, 0.0);
+        for arm in 0..2 {
+            let centre = (tool - pulls[arm]) / 2.0;
+            let rate = &assembly.distal_rates[arm];
+            effort += forearm.joint_effort(&assembly.centre(arm), rate, centre, turning[arm]);
+        }
+        effort
+    }
+
+    fn gravity(&self, _assembly: &FiveBarAssembly) -> Joints<2> {
+        Joints::zeros()
+    }
+
+    fn stiffness(&self) -> Option<Matrix2<f64>> {
+        plane::stiffness(self.elasticity)
+    }
+
+    fn damping(&self) -> Matrix2<f64> {
+        plane::damping(self.elasticity)
+    }
+}
