@@ -8,14 +8,17 @@
 #![allow(rustdoc::broken_intra_doc_links)]
 
 pub mod actuator;
+pub mod deviation;
 pub mod document;
 pub mod file;
+pub mod focus;
 pub mod kinematics;
 pub mod limits;
 pub mod machine;
 pub mod mechanisms;
 pub mod process;
 pub mod quantity;
+pub mod surface;
 pub mod taylor;
 
 pub use actuator::{Axis, DcMotor, Encoder, Friction, LoopGains};

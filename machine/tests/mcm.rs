@@ -285,3 +285,58 @@ fn branches_have_names_and_values() {
     let machine = reference();
     assert_eq!(machine.branch_of(&Joints::from([-0.2, 0.0, 0.0, 0.0, 0.0])), chosen);
 }
+
+/// A tree of rigid bodies, by an engine that knows nothing of this mechanism's equations: efforts by
+/// recursive Newton and Euler, inertias by composite bodies.
+#[test]
+fn pose_and_dynamics_agree_with_a_tree_of_rigid_bodies() {
+    let file = golden("independent_mcm");
+    let parameters = &file["params"];
+    let of = |key: &str| number(&parameters[key]);
+    let machine = Mcm {
+        tool: of("l"),
+        offset: of("x0"),
+        height: of("z0"),
+        load: McmLoad {
+            carriage_mass: of("carriage_mass"),
+            slide_mass: of("slide_mass"),
+            table_inertia: of("table_inertia"),
+            yoke_inertia: of("yoke_inertia"),
+            head_mass: of("head_mass"),
+            head_center: of("head_center"),
+            head_inertia: array(&parameters["head_inertia"]),
+            counterbalance: of("counterbalance"),
+            gravity: of("gravity"),
+        },
+        ..reference()
+    };
+    let tolerance = number(&file["tolerance"]);
+    let cases = file["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 12);
+    for case in cases {
+        let context = case["q"].to_string();
+        let joints = |key: &str| Joints::from(array::<5>(&case[key]));
+        let (q, velocity, acceleration) = (joints("q"), joints("velocity"), joints("acceleration"));
+        let pose = machine.pose(&q);
+        near((pose.position - vector(&case["position"])).amax(), 0.0, tolerance, &context);
+        let mass = machine.mass_matrix(&q);
+        for row in 0..5 {
+            let expected: [f64; 5] = array(&case["mass"][row]);
+            for column in 0..5 {
+                near(mass[(row, column)], expected[column], tolerance, &context);
+            }
+            if row < 3 {
+                let expected = vector(&case["rotation"][row]).transpose();
+                near((pose.rotation.row(row) - expected).amax(), 0.0, tolerance, &context);
+            }
+        }
+        let effort = machine.inverse_dynamics(&q, &velocity, &acceleration);
+        for (found, key) in [
+            (machine.bias(&q, &velocity), "bias"),
+            (machine.gravity(&q), "gravity"),
+            (effort, "effort"),
+        ] {
+            near((found - joints(key)).amax(), 0.0, tolerance, &format!("{key} {context}"));
+        }
+    }
+}
