@@ -17,6 +17,7 @@ pub mod limits;
 pub mod machine;
 pub mod mechanisms;
 pub mod process;
+pub mod pulses;
 pub mod quantity;
 pub mod surface;
 pub mod taylor;
