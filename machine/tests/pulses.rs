@@ -225,6 +225,7 @@ fn the_paths_are_followed_within_the_bound_of_rounding() {
                     // The exact course at that instant is at the half-integer that was passed, but
                     // for the steps in which the acceleration jumps: a·dt²/8 there, and a length
                     // changes by less than twice what the tool does.
+                    let exact = at(begin + pulse.share * cycle)[axis].0;
                     let jump = scales[axis].per_length * course.acceleration * dt * dt / 8.0;
                     let half = (pulse.count + passed) as f64 / 2.0;
                     near("instant", exact, half, 2.0 * jump);
