@@ -11,7 +11,11 @@ use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 use serde_json::Value;
 
 fn golden() -> Value {
-    let path = format!("{}/../tests/golden/tri_planar.json", env!("CARGO_MANIFEST_DIR"));
+    read("tri_planar")
+}
+
+fn read(name: &str) -> Value {
+    let path = format!("{}/../tests/golden/{name}.json", env!("CARGO_MANIFEST_DIR"));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
@@ -539,4 +543,53 @@ fn a_level_load_spreads_the_feet_by_a_third_of_it_over_tan_omega() {
             near((force + out * thrust).amax(), 0.0, 1e-12, &format!("{share} {leg}"));
         }
     }
+}
+
+/// Against a rigid-body library that knows nothing of these equations; the file says how.
+#[test]
+fn its_dynamics_are_those_of_an_independent_library() {
+    let vectors = read("independent_tri_planar");
+    let tolerance = number(&vectors["tolerance"]);
+    let template = unlimited(&mechanism(&golden()["params"]));
+    let mut count = 0;
+    for machine in vectors["machines"].as_array().unwrap() {
+        let params = &machine["params"];
+        let mechanism = TriPlanar {
+            side: number(&params["side"]),
+            platform_mass: number(&params["platform_mass"]),
+            platform_inertia: list(&params["platform_inertia"]),
+            leg_mass: number(&params["leg_mass"]),
+            inductor_mass: number(&params["inductor_mass"]),
+            ..template
+        };
+        for case in machine["cases"].as_array().unwrap() {
+            let context = &case["position"].to_string();
+            let joints = |key: &str| Joints::from(list::<6>(&case[key]));
+            let branch = legs(&case["modes"]);
+            let pose = Pose {
+                position: list(&case["position"]).into(),
+                rotation: matrix(&case["rotation"]),
+            };
+            let q = mechanism.inverse(&pose, branch, &at_rest()).unwrap();
+            near((q - joints("feet")).amax(), 0.0, tolerance, context);
+            let assembly = mechanism.assemble(&q, branch, None).unwrap();
+            same_pose(&mechanism.pose(&assembly), &pose, tolerance, context);
+
+            let velocity = joints("velocity");
+            let twist = mechanism.jacobian(&assembly) * velocity;
+            near((twist - joints("twist")).amax() / twist.amax(), 0.0, tolerance, context);
+            let expected =
+                SMatrix::<f64, 6, 6>::from_fn(|row, column| number(&case["mass"][row][column]));
+            let mass = mechanism.mass_matrix(&assembly);
+            near((mass - expected).amax() / mass.amax(), 0.0, tolerance, context);
+            let gravity = mechanism.gravity(&assembly);
+            near((gravity - joints("gravity")).amax() / gravity.amax(), 0.0, tolerance, context);
+            let bias = mechanism.bias(&assembly, &velocity);
+            near((bias - joints("bias")).amax() / bias.amax(), 0.0, tolerance, context);
+            let effort = mechanism.inverse_dynamics(&assembly, &velocity, &joints("acceleration"));
+            near((effort - joints("effort")).amax() / effort.amax(), 0.0, tolerance, context);
+            count += 1;
+        }
+    }
+    assert_eq!(count, 14);
 }
