@@ -106,6 +106,10 @@ const STEPS: usize = 12;
 /// Largest step, in sides and radians: further, the linear equations say nothing.
 const STRIDE: f64 = 0.6;
 
+/// Cosine of half the largest turn from an assembly near by, 0.5 rad. What lies further off may be
+/// another solution, and a start from it is no better than a cold one.
+const NEARBY: f64 = 0.968_912_421_710_644_8;
+
 /// Heights of level starts, in heights of the triangle.
 const LEVELS: [f64; 8] = [0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 0.97];
 
@@ -226,8 +230,10 @@ impl Struts<'_> {
 
 /// Closes the chain at `q`.
 ///
-/// Of the poses that close it, one at most has all corners above the stator (source 001); it is
-/// accepted if its legs lean as `branch` says, and nothing else is.
+/// Of the poses that close it, one has all corners above the stator (source 001), the platform not
+/// turned upside down; it is accepted if its legs lean as `branch` says, and nothing else is. Past
+/// 45° of tilt, and where legs of both kinds are mixed, there may be a second one: a cold start
+/// takes what Newton's method reaches from level, and an assembly near by goes on as it is.
 ///
 /// # Errors
 /// `no_assembly` where no start leads to such a pose.
@@ -244,7 +250,8 @@ pub(super) fn assemble(
     let accept = |state: &State| {
         complete(&equations, state, q, &centroid).filter(|found| {
             let arms = mechanism.arms(&found.rotation);
-            arms.iter().all(|arm| arm.z + found.position.z > 0.0)
+            found.rotation[(2, 2)] > 0.0
+                && arms.iter().all(|arm| arm.z + found.position.z > 0.0)
                 && found.legs.iter().all(|leg| leg.normal.z.abs() > 0.0)
                 && found.folds() == branch
         })
@@ -254,7 +261,10 @@ pub(super) fn assemble(
             position: near.position - Vector3::new(centroid.x, centroid.y, 0.0),
             ..near.state
         };
-        let found = equations.follow(start, &near.loosened).or_else(|| equations.solve(start));
+        let found = equations
+            .follow(start, &near.loosened)
+            .or_else(|| equations.solve(start))
+            .filter(|found| found.attitude.coords.dot(&start.attitude.coords).abs() > NEARBY);
         if let Some(found) = found.as_ref().and_then(accept) {
             return Ok(found);
         }
