@@ -6,7 +6,7 @@ mod interpolation;
 use nalgebra::Vector3;
 
 use crate::kinematics::{Joints, KinematicsError, Mechanism, Pose};
-use crate::surface::Surface;
+use crate::surface::{Surface, facing};
 
 pub use interpolation::{Interpolated, Interpolation};
 
@@ -86,11 +86,7 @@ impl<const N: usize, M: Mechanism<N>, F: Fn(f64) -> [f64; 2]> SurfaceCurve<'_, N
         previous: &Joints<N>,
     ) -> Result<Joints<N>, KinematicsError> {
         let [position, beam] = self.wanted(parameter)?;
-        // Any turn about the beam will do: z is against it, x level or, on an upright beam, along x.
-        let level = Vector3::new(-beam.y, beam.x, 0.0);
-        let up = -beam;
-        let across = if level.norm() > 0.0 { level.normalize() } else { Vector3::x() };
-        let rotation = nalgebra::Matrix3::from_columns(&[across, up.cross(&across), up]);
+        let rotation = facing(&-beam);
         self.mechanism.inverse(&Pose { position, rotation }, self.branch, previous)
     }
 

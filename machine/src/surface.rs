@@ -10,8 +10,8 @@ mod sphere;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::kinematics::KinematicsError;
-use crate::taylor::Scalar;
+use crate::kinematics::{Attitude, KinematicsError, ToolMotion};
+use crate::taylor::{Scalar, Taylor};
 
 pub use cone::{Cone, Projection};
 pub use sphere::{Sphere, SphereProjection};
@@ -62,6 +62,49 @@ pub struct Spot<S> {
     pub point: [S; 3],
     /// Outward unit vector across the surface.
     pub normal: [S; 3],
+}
+
+impl Spot<Taylor> {
+    /// The motion of a tool whose focus is here and whose beam is against the normal.
+    ///
+    /// For mechanisms that choose the tool's axis only: the rates do not turn it about its beam,
+    /// but the rotation is [`facing`] the normal anew at each instant.
+    pub fn tool(&self) -> ToolMotion {
+        let parts = |[x, y, z]: &[Taylor; 3]| {
+            [
+                Vector3::new(x.value, y.value, z.value),
+                Vector3::new(x.first, y.first, z.first),
+                Vector3::new(x.second, y.second, z.second),
+                Vector3::new(x.third, y.third, z.third),
+            ]
+        };
+        let [position, velocity, acceleration, jerk] = parts(&self.point);
+        let [normal, first, second, third] = parts(&self.normal);
+        ToolMotion {
+            position,
+            velocity,
+            acceleration,
+            jerk,
+            // A unit vector turns at n × n′, and at any rate about itself.
+            attitude: Attitude {
+                rotation: facing(&normal),
+                velocity: normal.cross(&first),
+                acceleration: normal.cross(&second),
+                jerk: first.cross(&second) + normal.cross(&third),
+            },
+        }
+    }
+}
+
+/// A rotation of the tool whose z is the unit vector `normal`: the least one from upright, and for a
+/// normal that points down the least one from upside down.
+pub fn facing(normal: &Vector3<f64>) -> Matrix3<f64> {
+    let below = normal.z < 0.0;
+    let from = if below { -Vector3::z() } else { Vector3::z() };
+    // Rodrigues, with sin = |v|, cos = c: I + [v] + [v]²/(1 + c).
+    let lean = from.cross(normal).cross_matrix();
+    let turn = Matrix3::identity() + lean + lean * lean / (1.0 + normal.z.abs());
+    if below { turn * Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0)) } else { turn }
 }
 
 /// The shape of a surface, in its own frame.

@@ -9,7 +9,7 @@ use machine::focus::{marginal_travel, paraxial_travel};
 use machine::kinematics::Joints;
 use machine::mechanisms::mcm::{McmBranch, McmLoad};
 use machine::surface::{
-    Cone, Placement, Projection, Shape, Sphere, SphereProjection, Spot, Surface,
+    Cone, Placement, Projection, Shape, Sphere, SphereProjection, Spot, Surface, facing,
 };
 use machine::taylor::Taylor;
 use machine::{Mcm, Mechanism};
@@ -218,6 +218,69 @@ fn surface_of(input: &Value) -> Surface {
             rotation: Matrix3::from_fn(|row, column| rows[row][column]),
             translation: vector(&description["tr"]),
         },
+    }
+}
+
+#[test]
+fn a_tool_faces_every_normal() {
+    let mut random = Random(11);
+    let fixed = [Vector3::x(), -Vector3::x(), Vector3::y(), Vector3::z(), -Vector3::z()];
+    for normal in fixed.into_iter().chain((0..50).map(|_| random.vector(1.0).normalize())) {
+        let rotation = facing(&normal);
+        near((rotation.column(2) - normal).amax(), 0.0, 1e-15, "z is the normal");
+        let off = rotation * rotation.transpose() - Matrix3::identity();
+        near(off.amax(), 0.0, 1e-15, "orthogonal");
+        near(rotation.determinant(), 1.0, 1e-15, "right-handed");
+    }
+    assert_eq!(facing(&Vector3::z()), Matrix3::identity());
+}
+
+/// The drawing moves; the joints' derivatives come out of one pass over series, and agree with
+/// differences of joints that were solved one by one.
+#[test]
+fn a_moving_drawing_gives_the_rates_of_the_joints() {
+    let file = golden("mcm");
+    let machine = mcm();
+    for path in file["paths"].as_array().unwrap() {
+        let surface = surface_of(&path["input"]);
+        let near_by = Joints::from(array::<5>(&path["knots_q"][0]));
+        let moving = |time: f64| {
+            let at = |value: f64, first: f64, second: f64, third: f64| {
+                Taylor::new(
+                    value + time * (first + time * (second / 2.0 + time * third / 6.0)),
+                    first + time * (second + time * third / 2.0),
+                    second + time * third,
+                    third,
+                )
+            };
+            [at(-0.012, 0.05, 0.4, -3.0), at(0.045, 0.03, -0.2, 5.0)]
+        };
+        let joints = |time: f64| {
+            let [x, y] = moving(time);
+            let tool = surface.spot(x, y).unwrap().tool();
+            machine.joint_motion(&tool, machine.branch, &near_by).unwrap()
+        };
+        let drawing = |time: f64| moving(time).map(|series| series.value);
+        let followed = SurfaceCurve {
+            mechanism: &machine,
+            branch: machine.branch,
+            surface: &surface,
+            drawing,
+        };
+        let here = joints(0.0);
+        let solved = |time: f64| followed.joints(time, &near_by).unwrap();
+        near((solved(0.0) - here.position).amax(), 0.0, 1e-12, "position");
+        let h = 1e-5;
+        let (ahead, behind) = (joints(h), joints(-h));
+        let scale = 1.0 + here.jerk.amax();
+        for (found, low, high) in [
+            (here.velocity, solved(-h), solved(h)),
+            (here.acceleration, behind.velocity, ahead.velocity),
+            (here.jerk, behind.acceleration, ahead.acceleration),
+        ] {
+            let difference = (high - low) / (2.0 * h);
+            near((found - difference).amax(), 0.0, 1e-7 * scale, &path["input"].to_string());
+        }
     }
 }
 
