@@ -2,39 +2,14 @@
 
 use nalgebra::{SMatrix, Vector3};
 
-use super::{HINGES, TriPlanar, TriPlanarAssembly};
+use super::struts::struts;
+use super::{TriPlanar, TriPlanarAssembly};
 use crate::kinematics::{Joints, KinematicsError, Margin, Pose};
 
 const OFF_STATOR: [&str; 3] = ["off_stator_D", "off_stator_E", "off_stator_F"];
 
 /// The feet that can meet, with the name of the margin between them.
 const PAIRS: [(usize, usize, &str); 3] = [(0, 1, "gap_DE"), (1, 2, "gap_EF"), (0, 2, "gap_DF")];
-
-/// The six struts as forces on the platform, row by row `[l/a, (r×l)/a²]`: l from the foot to the
-/// corner, r from the centroid to the corner.
-pub(super) fn struts(
-    mechanism: &TriPlanar,
-    arms: &[Vector3<f64>; 3],
-    position: &Vector3<f64>,
-    feet: &Joints<6>,
-) -> SMatrix<f64, 6, 6> {
-    let scale = 1.0 / mechanism.side;
-    let mut matrix = SMatrix::zeros();
-    for (leg, hinges) in HINGES.iter().enumerate() {
-        let foot = Vector3::new(feet[2 * leg], feet[2 * leg + 1], 0.0);
-        let from_foot = position - foot;
-        for (end, &corner) in hinges.iter().enumerate() {
-            let arm = arms[corner] * scale;
-            let strut = from_foot * scale + arm;
-            let moment = arm.cross(&strut);
-            for axis in 0..3 {
-                matrix[(2 * leg + end, axis)] = strut[axis];
-                matrix[(2 * leg + end, 3 + axis)] = moment[axis];
-            }
-        }
-    }
-    matrix
-}
 
 /// How far inside the stator a foot is at its nearest edge, with the joint along which it is.
 fn inside(mechanism: &TriPlanar, feet: &Joints<6>, leg: usize) -> (usize, f64) {

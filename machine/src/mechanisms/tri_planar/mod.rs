@@ -12,6 +12,7 @@ mod assembly;
 mod dynamics;
 mod inverse;
 mod limits;
+mod struts;
 
 use nalgebra::{SMatrix, SVector};
 
