@@ -27,5 +27,5 @@ pub use document::{DocumentError, Override};
 pub use kinematics::{Mechanism, Pose};
 pub use limits::{AxisLimits, PathLimits, WorkArea};
 pub use machine::{Machine, Warning};
-pub use mechanisms::{Cartesian, CoreXy, Mcm, MechanismKind, MechanismVisitor, Polar};
+pub use mechanisms::{Cartesian, CoreXy, Mcm, MechanismKind, MechanismVisitor, Polar, Serial};
 pub use process::{GcodeSettings, LaserSource, ZMeaning};

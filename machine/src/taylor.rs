@@ -83,7 +83,7 @@ impl Taylor {
     }
 
     /// What changes with `rate`, `rate_first` and `rate_second` as its own three derivatives.
-    fn integral(value: f64, rate: Self) -> Self {
+    pub(crate) fn integral(value: f64, rate: Self) -> Self {
         Self { value, first: rate.value, second: rate.first, third: rate.second }
     }
 

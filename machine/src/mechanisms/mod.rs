@@ -7,6 +7,7 @@ pub mod mcm;
 mod plane;
 pub mod polar;
 pub mod prrrp;
+pub mod serial;
 pub mod transmission;
 pub mod tri_planar;
 pub mod twin_actuator;
@@ -17,6 +18,7 @@ pub use five_bar::{FiveBar, FiveBarBranch};
 pub use mcm::Mcm;
 pub use polar::Polar;
 pub use prrrp::{Prrrp, PrrrpBranch};
+pub use serial::Serial;
 pub use transmission::Elasticity;
 pub use tri_planar::TriPlanar;
 pub use twin_actuator::{ActuatorBodies, TwinActuator, TwinBranch};
@@ -44,6 +46,16 @@ pub enum MechanismKind {
     Prrrp(Prrrp),
     /// Two actuators of variable length that meet in one joint.
     TwinActuator(TwinActuator),
+    /// An open chain of two joints.
+    Serial2(Box<Serial<2>>),
+    /// An open chain of three joints.
+    Serial3(Box<Serial<3>>),
+    /// An open chain of four joints.
+    Serial4(Box<Serial<4>>),
+    /// An open chain of five joints.
+    Serial5(Box<Serial<5>>),
+    /// An open chain of six joints.
+    Serial6(Box<Serial<6>>),
 }
 
 /// Work that is generic over the mechanism, such as a sampler or a plant.
@@ -81,6 +93,11 @@ impl MechanismKind {
             Self::FiveBar(mechanism) => visitor.visit(*mechanism),
             Self::Prrrp(mechanism) => visitor.visit(*mechanism),
             Self::TwinActuator(mechanism) => visitor.visit(*mechanism),
+            Self::Serial2(mechanism) => visitor.visit(**mechanism),
+            Self::Serial3(mechanism) => visitor.visit(**mechanism),
+            Self::Serial4(mechanism) => visitor.visit(**mechanism),
+            Self::Serial5(mechanism) => visitor.visit(**mechanism),
+            Self::Serial6(mechanism) => visitor.visit(**mechanism),
         }
     }
 
@@ -96,6 +113,11 @@ impl MechanismKind {
             Self::FiveBar(_) => FiveBar::NAME,
             Self::Prrrp(_) => Prrrp::NAME,
             Self::TwinActuator(_) => TwinActuator::NAME,
+            Self::Serial2(_)
+            | Self::Serial3(_)
+            | Self::Serial4(_)
+            | Self::Serial5(_)
+            | Self::Serial6(_) => Serial::<2>::NAME,
         }
     }
 
@@ -106,10 +128,12 @@ impl MechanismKind {
             | Self::CoreXy(_)
             | Self::FiveBar(_)
             | Self::Prrrp(_)
-            | Self::TwinActuator(_) => 2,
-            Self::CartesianLift(_) | Self::Polar(_) => 3,
-            Self::Mcm(_) => 5,
-            Self::TriPlanar(_) => 6,
+            | Self::TwinActuator(_)
+            | Self::Serial2(_) => 2,
+            Self::CartesianLift(_) | Self::Polar(_) | Self::Serial3(_) => 3,
+            Self::Serial4(_) => 4,
+            Self::Mcm(_) | Self::Serial5(_) => 5,
+            Self::TriPlanar(_) | Self::Serial6(_) => 6,
         }
     }
 }
