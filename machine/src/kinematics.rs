@@ -347,7 +347,7 @@ const PLANE_TOLERANCE: f64 = 1e-9;
 pub(crate) fn in_plane(position: &Vector3<f64>) -> Result<(), KinematicsError> {
     // Written so that a z that is not a number fails too.
     if position.z.abs() <= PLANE_TOLERANCE {
-        return Ok(());
+        return finite(position);
     }
     Err(KinematicsError {
         code: "out_of_plane",
@@ -355,5 +355,17 @@ pub(crate) fn in_plane(position: &Vector3<f64>) -> Result<(), KinematicsError> {
         value: position.z,
         limit: PLANE_TOLERANCE,
         detail: "the mechanism moves in x and y only",
+    })
+}
+
+/// Refuses a position that is nowhere, which equations would hand on as joints that are nowhere.
+pub(crate) fn finite(position: &Vector3<f64>) -> Result<(), KinematicsError> {
+    let Some(number) = position.iter().find(|number| !number.is_finite()) else { return Ok(()) };
+    Err(KinematicsError {
+        code: "not_a_number",
+        axis: None,
+        value: *number,
+        limit: f64::MAX,
+        detail: "the position has a coordinate that is not a finite number",
     })
 }

@@ -8,7 +8,7 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use super::transmission::Elasticity;
 use crate::kinematics::{
     Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
-    in_plane,
+    finite, in_plane,
 };
 
 /// Gravity at the surface [m/s²], against the z axis.
@@ -29,8 +29,8 @@ impl<const N: usize> Cartesian<N> {
         SVector::from_fn(|row, _| vector[row])
     }
 
-    fn check_plane(position: &Vector3<f64>) -> Result<(), KinematicsError> {
-        if N < 3 { in_plane(position) } else { Ok(()) }
+    fn check(position: &Vector3<f64>) -> Result<(), KinematicsError> {
+        if N < 3 { in_plane(position) } else { finite(position) }
     }
 }
 
@@ -80,7 +80,7 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
         _branch: (),
         _previous: &Joints<N>,
     ) -> Result<Joints<N>, KinematicsError> {
-        Self::check_plane(&pose.position)?;
+        Self::check(&pose.position)?;
         Ok(Self::joints(&pose.position))
     }
 
@@ -94,7 +94,7 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
         _branch: (),
         _previous: &Joints<N>,
     ) -> Result<JointMotion<N>, KinematicsError> {
-        Self::check_plane(&tool.position)?;
+        Self::check(&tool.position)?;
         Ok(JointMotion {
             position: Self::joints(&tool.position),
             velocity: Self::joints(&tool.velocity),

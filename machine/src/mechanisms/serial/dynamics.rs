@@ -24,7 +24,7 @@ pub(super) struct Placed {
 pub struct SerialAssembly<const N: usize> {
     pub(super) links: [Placed; N],
     pub(super) tool: Pose,
-    pub(super) singular_value: f64,
+    pub(super) joints: Joints<N>,
 }
 
 impl<const N: usize> Serial<N> {

@@ -11,9 +11,9 @@ use crate::taylor::Scalar;
 pub(super) type Vector<S> = [S; 3];
 
 /// `a·x + b·y` for vectors `x`, `y`.
-fn blend<S: Scalar, F: Copy>(a: F, x: &Vector<S>, b: F, y: &Vector<S>) -> Vector<S>
+fn blend<S, F: Copy>(a: F, x: &Vector<S>, b: F, y: &Vector<S>) -> Vector<S>
 where
-    S: core::ops::Mul<F, Output = S>,
+    S: Scalar + core::ops::Mul<F, Output = S>,
 {
     core::array::from_fn(|row| x[row] * a + y[row] * b)
 }

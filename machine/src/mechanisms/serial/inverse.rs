@@ -122,8 +122,7 @@ impl<const N: usize> Serial<N> {
     ) -> Result<Joints<N>, KinematicsError> {
         let Descent { mut q, distance } = self.descend(pose, start, reach);
         let limit = dimensionless_tolerance(reach);
-        // Written so that a distance that is not a number fails too.
-        if !(distance <= limit) {
+        if distance > limit || distance.is_nan() {
             return Err(KinematicsError {
                 code: "unreachable",
                 axis: None,
@@ -232,7 +231,7 @@ impl<const N: usize> Serial<N> {
                 q[joint] + share * step[joint] * self.unit(joint, reach)
             });
             let (next_chain, next_distance, next_missing) = look(&ahead);
-            let done = distance <= tolerance && !(next_distance < distance / 2.0);
+            let done = distance <= tolerance && next_distance >= distance / 2.0;
             if next_distance < distance {
                 (q, chain, distance, missing) = (ahead, next_chain, next_distance, next_missing);
                 weight = (weight / 4.0).max(1e-6);

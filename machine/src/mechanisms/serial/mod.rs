@@ -92,11 +92,7 @@ impl<const N: usize> Mechanism<N> for Serial<N> {
         _near: Option<&SerialAssembly<N>>,
     ) -> Result<SerialAssembly<N>, KinematicsError> {
         let chain = self.chain(&(*q).into());
-        Ok(SerialAssembly {
-            links: self.placed(&chain),
-            tool: chain.tool.pose(),
-            singular_value: self.rows(&chain, self.reach()).smallest_singular_value(),
-        })
+        Ok(SerialAssembly { links: self.placed(&chain), tool: chain.tool.pose(), joints: *q })
     }
 
     fn pose(&self, assembly: &SerialAssembly<N>) -> Pose {
@@ -115,9 +111,10 @@ impl<const N: usize> Mechanism<N> for Serial<N> {
 
     fn margins(&self, assembly: &SerialAssembly<N>) -> Vec<Margin> {
         // Smallest singular value of what the freedom asks for, lengths divided by the reach.
+        let rows = self.rows(&self.chain(&assembly.joints.into()), self.reach());
         vec![Margin {
             name: "singular_value",
-            value: assembly.singular_value,
+            value: rows.smallest_singular_value(),
             limit: inverse::SINGULAR,
         }]
     }

@@ -116,8 +116,9 @@ impl<const N: usize> Serial<N> {
     pub(super) fn missing(&self, chain: &Chain<f64, N>, reach: f64, target: &Pose) -> [f64; ROWS] {
         let (positions, _) = rows_of(self.freedom);
         let mut missing = [0.0; ROWS];
-        for row in 0..positions {
-            missing[row] = (target.position[row] - chain.tool.origin[row]) / reach;
+        let away = target.position - Vector3::from(chain.tool.origin);
+        for (value, part) in missing.iter_mut().zip(away.iter()).take(positions) {
+            *value = part / reach;
         }
         let turn = chain.tool.rotation().transpose() * target.rotation;
         let rotation = match self.freedom {
@@ -235,8 +236,9 @@ fn eliminate<S: Scalar>(
         right.swap(column, pivot);
         for row in column + 1..size {
             let factor = matrix[row][column] / matrix[column][column];
-            for across in column + 1..size {
-                matrix[row][across] = matrix[row][across] - factor * matrix[column][across];
+            let upper = matrix[column];
+            for (entry, above) in matrix[row].iter_mut().zip(upper).skip(column + 1) {
+                *entry = *entry - factor * above;
             }
             right[row] = right[row] - factor * right[column];
         }
@@ -276,10 +278,10 @@ fn rotation_vector(rotation: &Matrix3<f64>) -> Vector3<f64> {
     if cosine > 0.0 && sine < 1e-9 {
         return twice / 2.0;
     }
-    if sine > 1e-6 {
+    if cosine > 0.0 || sine > 1e-6 {
         return twice * (angle / (2.0 * sine));
     }
-    // Near half a turn the sine has no digits left: a·aᵀ = (R + Rᵀ + 2·I)/4 has the axis.
+    // Near half a turn the sine has few digits left, but a·aᵀ = (R + Rᵀ + 2·I)/4 there.
     let outer = (rotation + rotation.transpose()) / 4.0 + Matrix3::identity() / 2.0;
     let largest = outer.diagonal().imax();
     let axis = outer.column(largest).into_owned();
@@ -297,7 +299,7 @@ mod tests {
     #[test]
     fn a_rotation_vector_turns_as_its_matrix_does() {
         let axis = Vector3::new(0.6, -0.48, 0.64);
-        for angle in [0.0, 1e-12, 1e-9, 1e-5, 0.3, 1.7, 3.0, 3.141_592, 3.141_592_653] {
+        for angle in [0.0, 1e-12, 1e-9, 3e-8, 1e-5, 0.3, 1.7, 3.0, 3.141_592, 3.141_592_653] {
             let rotation = Rotation3::new(axis * angle).into_inner();
             let back = Rotation3::new(rotation_vector(&rotation)).into_inner();
             assert!((back - rotation).amax() < 1e-12, "{angle}: {back} {rotation}");

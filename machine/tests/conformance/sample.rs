@@ -1,0 +1,142 @@
+//! Repeatable states and motions, and the differences that check derivatives.
+
+use machine::kinematics::{Attitude, Freedom, Joints, ToolMotion};
+use machine::{Mechanism, Pose};
+use nalgebra::{SVector, Vector3};
+
+/// Repeatable numbers from -1 to 1 (xorshift64*).
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        let bits = self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11;
+        bits as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    pub(crate) fn vector(&mut self, scale: f64) -> Vector3<f64> {
+        Vector3::new(self.next(), self.next(), self.next()) * scale
+    }
+
+    /// Joints evenly within `ranges`, each lower then upper.
+    pub(crate) fn joints<const N: usize>(&mut self, ranges: [[f64; 2]; N]) -> Joints<N> {
+        Joints::from_fn(|joint, _| {
+            let [lower, upper] = ranges[joint];
+            lower + (upper - lower) * (self.next() + 1.0) / 2.0
+        })
+    }
+
+    /// A lively motion through `pose`, as far as `freedom` lets the tool move.
+    pub(crate) fn motion(&mut self, pose: &Pose, freedom: Freedom) -> ToolMotion {
+        let flat = |vector: Vector3<f64>| match freedom {
+            Freedom::Plane => Vector3::new(vector.x, vector.y, 0.0),
+            _ => vector,
+        };
+        let turning = match freedom {
+            Freedom::Plane | Freedom::Space => 0.0,
+            Freedom::Axis | Freedom::Pose => 1.0,
+        };
+        ToolMotion {
+            position: pose.position,
+            velocity: flat(self.vector(0.25)),
+            acceleration: flat(self.vector(10.0)),
+            jerk: flat(self.vector(500.0)),
+            attitude: Attitude {
+                rotation: pose.rotation,
+                velocity: self.vector(turning),
+                acceleration: self.vector(20.0 * turning),
+                jerk: self.vector(500.0 * turning),
+            },
+        }
+    }
+}
+
+/// `tool` a time `t` later, its jerks constant.
+pub(crate) fn later(tool: &ToolMotion, t: f64) -> ToolMotion {
+    let turn = &tool.attitude;
+    let spin = |t: f64| turn.velocity + turn.acceleration * t + turn.jerk * (t * t / 2.0);
+    // R′ = ω×R by one step of Runge and Kutta, for times so short that its fifth-order error is
+    // far below rounding.
+    let rate = |t: f64, rotation| spin(t).cross_matrix() * rotation;
+    let first = rate(0.0, turn.rotation);
+    let second = rate(t / 2.0, turn.rotation + first * (t / 2.0));
+    let third = rate(t / 2.0, turn.rotation + second * (t / 2.0));
+    let fourth = rate(t, turn.rotation + third * t);
+    let rotation = turn.rotation + (first + (second + third) * 2.0 + fourth) * (t / 6.0);
+    ToolMotion {
+        position: tool.position
+            + tool.velocity * t
+            + tool.acceleration * (t * t / 2.0)
+            + tool.jerk * (t * t * t / 6.0),
+        velocity: tool.velocity + tool.acceleration * t + tool.jerk * (t * t / 2.0),
+        acceleration: tool.acceleration + tool.jerk * t,
+        jerk: tool.jerk,
+        attitude: Attitude {
+            rotation,
+            velocity: spin(t),
+            acceleration: turn.acceleration + turn.jerk * t,
+            jerk: turn.jerk,
+        },
+    }
+}
+
+/// Derivative at 0 by a central difference of fourth order.
+pub(crate) fn slope<const D: usize>(
+    step: f64,
+    function: impl Fn(f64) -> SVector<f64, D>,
+) -> SVector<f64, D> {
+    let pair = |times: f64| function(times * step) - function(-times * step);
+    (pair(1.0) * 8.0 - pair(2.0)) / (12.0 * step)
+}
+
+/// The part of a vector that turns the tool as `freedom` counts it.
+pub(crate) fn counted(freedom: Freedom, pose: &Pose, turning: &Vector3<f64>) -> Vector3<f64> {
+    let axis = pose.rotation.column(2).into_owned();
+    match freedom {
+        Freedom::Plane | Freedom::Space => Vector3::zeros(),
+        Freedom::Axis => turning - axis * axis.dot(turning),
+        Freedom::Pose => *turning,
+    }
+}
+
+/// How far `found` is from `wanted` in what the freedom counts [m or rad].
+pub(crate) fn distance(freedom: Freedom, found: &Pose, wanted: &Pose) -> f64 {
+    let turned = found.rotation - wanted.rotation;
+    let turned = match freedom {
+        Freedom::Plane | Freedom::Space => 0.0,
+        Freedom::Axis => turned.column(2).amax(),
+        Freedom::Pose => turned.amax(),
+    };
+    (found.position - wanted.position).norm().max(turned)
+}
+
+/// The numbers of a pose that a mechanism can choose.
+pub(crate) fn rows(freedom: Freedom) -> usize {
+    match freedom {
+        Freedom::Plane => 2,
+        Freedom::Space => 3,
+        Freedom::Axis => 5,
+        Freedom::Pose => 6,
+    }
+}
+
+/// Whether every margin at `assembly` is at least `times` what it must keep.
+pub(crate) fn clear<const N: usize, M: Mechanism<N>>(
+    mechanism: &M,
+    assembly: &M::Assembly,
+    times: f64,
+) -> bool {
+    mechanism.margins(assembly).iter().all(|margin| margin.value > times * margin.limit)
+}
+
+/// `found` against `expected`, as a share of the larger of `scale` and 1.
+#[track_caller]
+pub(crate) fn near(found: f64, expected: f64, tolerance: f64, scale: f64, context: &str) {
+    let error = (found - expected).abs();
+    assert!(
+        error <= tolerance * scale.max(1.0),
+        "{found} against {expected} (off by {error:e}, scale {scale:e}), {context}"
+    );
+}
