@@ -358,14 +358,15 @@ pub(crate) fn in_plane(position: &Vector3<f64>) -> Result<(), KinematicsError> {
     })
 }
 
-/// Refuses a position that is nowhere, which equations would hand on as joints that are nowhere.
-pub(crate) fn finite(position: &Vector3<f64>) -> Result<(), KinematicsError> {
-    let Some(number) = position.iter().find(|number| !number.is_finite()) else { return Ok(()) };
+/// Refuses a position or direction that is nowhere, which equations would hand on as joints that are
+/// nowhere.
+pub(crate) fn finite(target: &Vector3<f64>) -> Result<(), KinematicsError> {
+    let Some(number) = target.iter().find(|number| !number.is_finite()) else { return Ok(()) };
     Err(KinematicsError {
         code: "not_a_number",
         axis: None,
         value: *number,
         limit: f64::MAX,
-        detail: "the position has a coordinate that is not a finite number",
+        detail: "a coordinate of the target is not a finite number",
     })
 }

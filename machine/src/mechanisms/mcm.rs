@@ -18,7 +18,7 @@ use signals::math;
 use super::transmission::Elasticity;
 use crate::kinematics::{
     Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
-    ToolMotion,
+    ToolMotion, finite,
 };
 use crate::taylor::Scalar;
 
@@ -282,7 +282,10 @@ impl Mechanism<5> for Mcm {
         branch: McmBranch,
         previous: &Joints<5>,
     ) -> Result<Joints<5>, KinematicsError> {
-        let axis: [f64; 3] = (-pose.rotation.column(2)).into();
+        let axis = -pose.rotation.column(2);
+        finite(&pose.position)?;
+        finite(&axis)?;
+        let axis: [f64; 3] = axis.into();
         let upright = math::hypot(axis[0], axis[1]) <= UPRIGHT;
         let joints = self.solve(pose.position.into(), axis, upright, branch, previous)?;
         Ok(Joints::from(joints))
@@ -297,6 +300,8 @@ impl Mechanism<5> for Mcm {
         branch: McmBranch,
         previous: &Joints<5>,
     ) -> Result<JointMotion<5>, KinematicsError> {
+        finite(&tool.position)?;
+        finite(&tool.attitude.rotation.column(2).into_owned())?;
         let axis = tool.attitude.series().map(|row| -row[2]);
         let lean = math::hypot(axis[0].value, axis[1].value);
         let upright = lean <= UPRIGHT;

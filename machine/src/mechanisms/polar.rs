@@ -19,7 +19,7 @@ use signals::math;
 use super::transmission::Elasticity;
 use crate::kinematics::{
     Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
-    ToolMotion,
+    ToolMotion, finite,
 };
 use crate::taylor::Scalar;
 
@@ -270,6 +270,7 @@ impl Mechanism<3> for Polar {
         branch: PolarBranch,
         previous: &Joints<3>,
     ) -> Result<Joints<3>, KinematicsError> {
+        finite(&pose.position)?;
         let [x, y, z] = pose.position.into();
         let radius = math::hypot(x, y);
         self.check_reach(radius)?;
@@ -298,6 +299,7 @@ impl Mechanism<3> for Polar {
         branch: PolarBranch,
         previous: &Joints<3>,
     ) -> Result<JointMotion<3>, KinematicsError> {
+        finite(&tool.position)?;
         let radius = math::hypot(tool.position.x, tool.position.y);
         self.check_reach(radius)?;
         self.check_edge(radius)?;

@@ -59,7 +59,7 @@ pub(crate) fn efforts<const N: usize, M: Mechanism<N>>(
     let gradients: [Joints<N>; N] = core::array::from_fn(across);
     for (row, gradient) in gradients.iter().enumerate() {
         for (column, other) in gradients.iter().enumerate() {
-            near(gradient[column], other[row], 1e-8, gravity.amax(), context);
+            near(gradient[column], other[row], 1e-7, gradient.amax(), context);
         }
     }
 }
@@ -105,7 +105,7 @@ pub(crate) fn free_motion<const N: usize, M: Mechanism<N>>(
         // Rates of joints, velocity, and work against gravity.
         let rates = |q: Joints<N>, velocity: Joints<N>| {
             let there = mechanism.assemble(&q, branch, Some(&assembly)).ok()?;
-            if !clear(mechanism, &there, 10.0) {
+            if !clear(mechanism, &there, 1.5) {
                 return None;
             }
             let fall = mechanism.mass_matrix(&there).cholesky()?;

@@ -4,8 +4,10 @@
 
 mod chains;
 mod dynamics;
+mod linkages;
 mod sample;
 mod suite;
+mod tables;
 
 use machine::kinematics::Joints;
 use machine::mechanisms::Elasticity;

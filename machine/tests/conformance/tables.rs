@@ -1,0 +1,114 @@
+//! Machines with a rotary table, and the platform on planar motors.
+
+use machine::kinematics::Joints;
+use machine::mechanisms::mcm::{McmBranch, McmLoad};
+use machine::mechanisms::polar::{PolarBranch, PolarLoad};
+use machine::mechanisms::tri_planar::{Fold, Legs, TriPlanar};
+use machine::{Mcm, Mechanism, Polar, Pose};
+use nalgebra::{Rotation3, Vector3};
+
+use super::SCREW;
+use super::suite::conforms;
+
+#[test]
+fn the_polar_machine_conforms_on_both_sides() {
+    let load = PolarLoad {
+        arm_mass: 1.2,
+        arm_center: 0.105,
+        arm_inertia: 0.0095,
+        head_mass: 0.38,
+        head_center: 0.252,
+        head_inertia: 3.2e-4,
+        table_inertia: 0.018,
+        workpiece_mass: 1.1,
+        workpiece_center: 0.004,
+        workpiece_inertia: 0.0026,
+        counterbalance: 2.0,
+        gravity: 9.806_65,
+        viscous: [0.035, 0.05, 6.0],
+        coulomb: [0.06, 0.09, 1.4],
+    };
+    let sides = [None, Some(1), Some(-1)].map(|side| PolarBranch { side, table_turn: None });
+    // With the arm as long as the table is far, and with a blind disc.
+    for (center_distance, sign) in [(0.25, 1.0), (0.25, -1.0), (0.23, 1.0)] {
+        let mechanism = Polar {
+            arm: 0.25,
+            center_distance,
+            height: 0.03,
+            singular_radius: 2e-4,
+            endless: true,
+            branch: PolarBranch::default(),
+            load,
+            elasticity: Some([SCREW; 3]),
+        };
+        conforms(&mechanism, &sides, |random| {
+            let mut q = random.joints([[0.1, 0.62], [-3.0, 9.0], [0.0, 0.12]]);
+            q[0] *= sign;
+            q
+        });
+    }
+}
+
+#[test]
+fn the_mcm_conforms_on_both_sides() {
+    let mechanism = Mcm {
+        tool: 0.12,
+        offset: 0.02,
+        height: 0.45,
+        reach: [0.1, 0.5],
+        singular_distance: 1e-4,
+        branch: McmBranch::default(),
+        load: McmLoad {
+            carriage_mass: 9.0,
+            slide_mass: 5.5,
+            table_inertia: 0.031,
+            yoke_inertia: 0.012,
+            head_mass: 2.3,
+            head_center: 0.045,
+            head_inertia: [0.0081, 0.0077, 0.0019],
+            counterbalance: 60.0,
+            gravity: 9.806_65,
+        },
+        elasticity: Some([SCREW; 5]),
+    };
+    let sides = [None, Some(1), Some(-1)].map(|side| McmBranch { side });
+    conforms(&mechanism, &sides, |random| {
+        random.joints([[0.2, 0.45], [0.0, 0.35], [-3.0, 9.0], [0.2, 1.5], [-2.0, 2.0]])
+    });
+}
+
+#[test]
+fn the_platform_on_planar_motors_conforms() {
+    let mixed = Legs([Fold::Inward, Fold::Outward, Fold::Outward]);
+    for legs in [Legs::default(), mixed] {
+        let mechanism = TriPlanar {
+            side: 0.2,
+            stator: [[-0.5, 0.5], [-0.4, 0.4]],
+            inductor: 0.08,
+            gap: 0.005,
+            clearance: 0.02,
+            type_1_limit: 0.15,
+            type_2_limit: 0.05,
+            platform_mass: 0.8,
+            platform_inertia: [2.1e-3, 2.3e-3, 4.0e-3],
+            leg_mass: 0.15,
+            inductor_mass: 0.35,
+            legs,
+            elasticity: Some([SCREW; 6]),
+        };
+        conforms(&mechanism, &[legs], |random| {
+            loop {
+                let spot = random.vector(1.0);
+                let tilt = random.vector(0.3);
+                let pose = Pose {
+                    position: Vector3::new(spot.x * 0.15, spot.y * 0.1, 0.1 + 0.02 * spot.z),
+                    rotation: Rotation3::from_euler_angles(tilt.x, tilt.y, 3.0 * tilt.z)
+                        .into_inner(),
+                };
+                if let Ok(q) = mechanism.inverse(&pose, legs, &Joints::zeros()) {
+                    return q;
+                }
+            }
+        });
+    }
+}
