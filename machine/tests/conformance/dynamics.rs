@@ -59,7 +59,7 @@ pub(crate) fn efforts<const N: usize, M: Mechanism<N>>(
     let gradients: [Joints<N>; N] = core::array::from_fn(across);
     for (row, gradient) in gradients.iter().enumerate() {
         for (column, other) in gradients.iter().enumerate() {
-            near(gradient[column], other[row], 1e-7, gradient.amax(), context);
+            near(gradient[column], other[row], 1e-6, gradient.amax(), context);
         }
     }
 }
