@@ -282,12 +282,11 @@ impl Mechanism<5> for Mcm {
         branch: McmBranch,
         previous: &Joints<5>,
     ) -> Result<Joints<5>, KinematicsError> {
-        let axis = -pose.rotation.column(2);
-        finite(&pose.position)?;
-        finite(&axis)?;
-        let axis: [f64; 3] = axis.into();
+        let axis: [f64; 3] = (-pose.rotation.column(2)).into();
         let upright = math::hypot(axis[0], axis[1]) <= UPRIGHT;
         let joints = self.solve(pose.position.into(), axis, upright, branch, previous)?;
+        finite(&pose.position)?;
+        finite(&pose.rotation.column(2).into_owned())?;
         Ok(Joints::from(joints))
     }
 
@@ -300,8 +299,6 @@ impl Mechanism<5> for Mcm {
         branch: McmBranch,
         previous: &Joints<5>,
     ) -> Result<JointMotion<5>, KinematicsError> {
-        finite(&tool.position)?;
-        finite(&tool.attitude.rotation.column(2).into_owned())?;
         let axis = tool.attitude.series().map(|row| -row[2]);
         let lean = math::hypot(axis[0].value, axis[1].value);
         let upright = lean <= UPRIGHT;
@@ -317,6 +314,8 @@ impl Mechanism<5> for Mcm {
             });
         }
         let joints = self.solve(tool.series(), axis, upright, branch, previous)?;
+        finite(&tool.position)?;
+        finite(&tool.attitude.rotation.column(2).into_owned())?;
         Ok(JointMotion::of_series(&joints))
     }
 

@@ -270,10 +270,10 @@ impl Mechanism<3> for Polar {
         branch: PolarBranch,
         previous: &Joints<3>,
     ) -> Result<Joints<3>, KinematicsError> {
-        finite(&pose.position)?;
         let [x, y, z] = pose.position.into();
         let radius = math::hypot(x, y);
         self.check_reach(radius)?;
+        finite(&pose.position)?;
         if radius < self.singular_radius {
             return Err(KinematicsError {
                 code: "singular_center",
@@ -299,10 +299,10 @@ impl Mechanism<3> for Polar {
         branch: PolarBranch,
         previous: &Joints<3>,
     ) -> Result<JointMotion<3>, KinematicsError> {
-        finite(&tool.position)?;
         let radius = math::hypot(tool.position.x, tool.position.y);
         self.check_reach(radius)?;
         self.check_edge(radius)?;
+        finite(&tool.position)?;
         let [x, y, z] = tool.series();
         let through = if self.offset() == 0.0 && radius < self.singular_radius {
             center::through(tool)
