@@ -196,7 +196,7 @@ fn of_letters(
         Style::H1 => (Some(H1_RAPID), None),
         Style::H2 => (Some(f64::INFINITY), Some(REPLICA)),
     };
-    findings.finish(Job { drawing, marking: how(marking), rapid, program: None, ideal_only })
+    findings.finish(Job { rapid, ideal_only, ..job_of(drawing, marking) })
 }
 
 fn of_points(
@@ -239,7 +239,14 @@ fn of_program(
 }
 
 fn job_of(drawing: Drawing, marking: &MarkingTable) -> Job {
-    Job { drawing, marking: how(marking), rapid: None, program: None, ideal_only: None }
+    Job {
+        drawing,
+        marking: how(marking),
+        rapid: None,
+        program: None,
+        ideal_only: None,
+        standing: None,
+    }
 }
 
 fn how(table: &MarkingTable) -> Marking {
