@@ -64,6 +64,8 @@ pub enum Course {
 }
 
 /// What a piece of motion says at one instant.
+// It lives on the stack for one look; a box would allocate four times a cycle.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reference {
     /// Where the tool shall be; the joints follow from it.
