@@ -244,3 +244,29 @@ fn a_job_begins_where_the_joints_stand() {
     let last = samples.last().unwrap().position[1];
     assert!((last - 8.0).abs() < core::f64::consts::PI, "{last}");
 }
+
+#[test]
+fn a_cloud_is_marked_from_below_in_rings_and_soon_planned() {
+    let machine = machine();
+    let text = "[cloud]\nface = \"0 mm\"\nindex = 1.5\npulses = 40\npulse_rate = \"20 kHz\"\n\
+                spacing = \"0.1 mm\"\nfrom = 10\n[cloud.sphere]\n\
+                center = [\"0 mm\", \"0 mm\", \"-20 mm\"]\nradius = \"12 mm\"\ncount = 1000\n";
+    let path = std::env::temp_dir().join(format!("graver-cloud-{}.toml", std::process::id()));
+    std::fs::write(&path, text).unwrap();
+    let read = Job::read(&path, &[], &machine);
+    std::fs::remove_file(&path).unwrap();
+    let job = read.unwrap();
+    let (plan, samples) = planned(&machine, &job);
+    let lit: u64 = samples.iter().filter(|s| s.laser.is_lit()).count() as u64;
+    // 40 pulses at 20 kHz are 2 ms.
+    let strokes = plan.facts.strokes as u64;
+    assert!((strokes * 2..=strokes * 3).contains(&lit), "{lit} {strokes}");
+    assert!(strokes > 900 && strokes <= 990, "{strokes}");
+    let heights: Vec<f64> = plan.artwork.strokes.iter().map(|s| s.points[0][2]).collect();
+    // z from −32 to −8 mm below the face is a lens travel of two thirds; a layer is 0.2 mm.
+    assert!(heights[0] < -0.02 && heights.last().unwrap() > &-0.0062, "{:?}", heights.len());
+    let layer = 0.2e-3 / 1.5;
+    assert!(heights.windows(2).all(|pair| pair[1] > pair[0] - layer));
+    assert!(plan.facts.notes.iter().any(|note| note.text.starts_with("10 points are taken")));
+    assert_eq!(plan.facts.uses.current.len(), 3);
+}

@@ -1,5 +1,7 @@
 //! Job readers: each turns one kind of file into a drawing.
 
+pub mod cloud;
+pub mod cloud_table;
 pub mod file;
 pub mod gcode;
 pub mod letters;
