@@ -28,8 +28,8 @@ pub mod source;
 pub mod winding;
 
 use machine::kinematics::{Joints, KinematicsError};
-use machine::{Axis, LaserSource, Machine, Mechanism, MechanismVisitor, Pose};
-use nalgebra::{SVector, Vector3};
+use machine::{Axis, LaserSource, Machine, Mechanism, MechanismVisitor};
+use nalgebra::SVector;
 use signals::time::CYCLE_TIME;
 use signals::{AxisArray, CommandMode, Fault, FaultCode, LaserCycle, MAX_AXES, Nanoseconds};
 
@@ -79,7 +79,7 @@ pub enum PlantError {
     /// More axes than a sample holds.
     #[error("{0} axes, and a sample holds {MAX_AXES}")]
     TooManyAxes(usize),
-    /// The tool cannot be at home.
+    /// The joints cannot be at home.
     #[error("home cannot be reached: {0}")]
     Home(KinematicsError),
     /// A joint moves no mass.
@@ -127,8 +127,8 @@ impl MechanismVisitor for Build<'_> {
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
         let Build { machine, options } = self;
-        let plant =
-            Plant::<N, M>::new(mechanism, &machine.axes, &machine.laser, machine.home, options)?;
+        let home = &machine.home_joints;
+        let plant = Plant::<N, M>::new(mechanism, &machine.axes, &machine.laser, home, options)?;
         Ok(Box::new(plant))
     }
 }
@@ -155,7 +155,7 @@ pub struct Plant<const N: usize, M: Mechanism<N>> {
 }
 
 impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
-    /// A plant of `mechanism`, at rest with its tool at `home` [m], unpowered and dark.
+    /// A plant of `mechanism`, at rest with its joints at `home` [m or rad], unpowered and dark.
     ///
     /// # Errors
     /// If it cannot be simulated.
@@ -163,7 +163,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         mechanism: M,
         axes: &[Axis],
         laser: &LaserSource,
-        home: [f64; 3],
+        home: &[f64],
         options: PlantOptions,
     ) -> Result<Self, PlantError> {
         let PlantOptions { substep, current_resolution, seed } = options;
@@ -176,8 +176,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         let axes = <[Axis; N]>::try_from(axes.to_vec())
             .map_err(|_| PlantError::AxisCount { expected: N, found: axes.len() })?;
         let branch = mechanism.branch();
-        let pose = Pose::at(Vector3::from(home));
-        let load = mechanism.inverse(&pose, branch, &Joints::zeros()).map_err(PlantError::Home)?;
+        let load = Joints::from_fn(|row, _| home.get(row).copied().unwrap_or(f64::NAN));
         let assembly = mechanism.assemble(&load, branch, None).map_err(PlantError::Home)?;
 
         // At rest, the motors stand ahead by what gravity stretches the transmission.

@@ -10,8 +10,9 @@ use arm::Arm;
 use drives::plant::dynamics::{Dynamics, Motors, Phases, State};
 use drives::plant::{Plant, PlantOptions, friction};
 use drives::{Actuation, Freshness, Measurement, Port};
-use machine::{Axis, Friction, LaserSource};
-use nalgebra::Vector2;
+use machine::kinematics::Joints;
+use machine::{Axis, Friction, LaserSource, Mechanism, Pose};
+use nalgebra::{Vector2, Vector3};
 use signals::{CommandMode, FaultCode, axis::axis_array};
 
 const SUBSTEP: f64 = 50e-6;
@@ -91,8 +92,10 @@ fn halving_the_substep_divides_the_error_by_eight() {
 fn where_the_chain_ends_the_plant_jams_with_a_fault() {
     let arm = Arm { stiffness: Some(40.0), reach: 1.2 };
     let dark = LaserSource { on_delay: 0.0, off_delay: 0.0 };
-    let home = [0.35, 0.0, 0.0];
-    let mut plant = Plant::new(arm, &axes(), &dark, home, PlantOptions::default()).unwrap();
+    let pose = Pose::at(Vector3::new(0.35, 0.0, 0.0));
+    let home = arm.inverse(&pose, arm.branch(), &Joints::zeros()).unwrap();
+    let mut plant =
+        Plant::new(arm, &axes(), &dark, home.as_slice(), PlantOptions::default()).unwrap();
     let push = Actuation {
         freshness: Freshness::Fresh,
         mode: CommandMode::Voltage,

@@ -41,7 +41,8 @@ fn axes(friction: Friction) -> [Axis; 2] {
 const SMOOTH: Friction = Friction { coulomb: 0.0, viscous: 0.0 };
 
 fn plant(mechanism: CoreXy, axes: &[Axis]) -> Plant<2, CoreXy> {
-    Plant::new(mechanism, axes, &DARK, Machine::builtin().home, PlantOptions::default()).unwrap()
+    Plant::new(mechanism, axes, &DARK, &Machine::builtin().home_joints, PlantOptions::default())
+        .unwrap()
 }
 
 fn voltage(voltage: &[f64]) -> Actuation {
@@ -377,7 +378,7 @@ fn an_elastic_lift_holds_its_height_on_the_brake() {
     let axes = [axis.clone(), axis.clone(), axis];
     let lift = Cartesian::<3> { mass, elasticity: Some([spring; 3]) };
     let mut plant =
-        Plant::new(lift, &axes, &DARK, [0.1, 0.1, 0.05], PlantOptions::default()).unwrap();
+        Plant::new(lift, &axes, &DARK, &[0.1, 0.1, 0.05], PlantOptions::default()).unwrap();
     let mut measurement = Measurement::default();
     for _ in 0..2000 {
         measurement = cycle(&mut plant, &Actuation::QUICK_STOP);

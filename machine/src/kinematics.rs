@@ -295,6 +295,24 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
         previous: &Joints<N>,
     ) -> Result<JointMotion<N>, KinematicsError>;
 
+    /// The joints that bring the tool to `position` [m] with the tilt and turn of its head given in
+    /// the machine frame [rad]; `None` for mechanisms whose head has no such angles.
+    fn inverse_machine_angles(
+        &self,
+        _position: &Vector3<f64>,
+        _angles: [f64; 2],
+        _branch: Self::Branch,
+        _previous: &Joints<N>,
+    ) -> Option<Result<Joints<N>, KinematicsError>> {
+        None
+    }
+
+    /// Friction of the joints at `velocity` [N or N·m], where the mechanism's own equations have it.
+    /// In motion friction is that of the motors' shafts ([`crate::Friction`]), the same put elsewhere.
+    fn friction(&self, _velocity: &Joints<N>) -> Joints<N> {
+        Joints::zeros()
+    }
+
     /// Inertia of the load in joint coordinates, symmetric and positive definite, rotors excluded
     /// [kg or kg·m²].
     fn mass_matrix(&self, assembly: &Self::Assembly) -> SMatrix<f64, N, N>;
@@ -338,6 +356,9 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
         self.mass_matrix(assembly) * acceleration + self.bias(assembly, velocity)
     }
 }
+
+/// Gravity at the surface [m/s²], against the z axis.
+pub const STANDARD_GRAVITY: f64 = 9.806_65;
 
 /// How far from z = 0 a planar mechanism's tool may be asked to go [m]: rounding of a path that
 /// lies in the plane, far below any encoder's count.

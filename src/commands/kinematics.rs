@@ -2,13 +2,14 @@
 
 pub mod lines;
 
-use self::lines::{Branch, Ellipse, ErrorBody, Reply, ReplyPose, Request};
+use self::lines::{Branch, Ellipse, ErrorBody, Reply, ReplyPose, Request, RequestPose};
 use crate::arguments::{KinematicsArguments, KinematicsVerb};
 use crate::exit::{Exit, Failure};
 use crate::inputs;
-use machine::kinematics::{Joints, KinematicsError};
+use machine::kinematics::{Branch as _, Freedom, Joints, KinematicsError};
 use machine::{Machine, Mechanism, MechanismVisitor, Pose};
-use nalgebra::{Matrix2, SMatrix, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SMatrix, SymmetricEigen, Vector3};
+use serde_json::Value;
 use signals::math;
 use std::io::{BufRead, BufWriter, Write};
 
@@ -35,9 +36,14 @@ impl<I: BufRead, O: Write> MechanismVisitor for Lines<'_, I, O> {
     type Output = Result<Exit, Failure>;
 
     fn visit<const N: usize, M: Mechanism<N>>(mut self, mechanism: M) -> Self::Output {
-        let answer =
-            Answer { mechanism: &mechanism, machine: &self.machine, arguments: self.arguments };
-        let mut previous = Joints::<N>::zeros();
+        let home = &self.machine.home_joints;
+        let mut answer = Answer {
+            mechanism: &mechanism,
+            machine: &self.machine,
+            arguments: self.arguments,
+            previous: Joints::from_fn(|axis, _| home.get(axis).copied().unwrap_or_default()),
+            near: None,
+        };
         let mut line = String::new();
         let mut number = 0;
         loop {
@@ -60,8 +66,7 @@ impl<I: BufRead, O: Write> MechanismVisitor for Lines<'_, I, O> {
                     )));
                 }
             };
-            let reply = answer.line(&request, &mut previous);
-            let reply = reply.unwrap_or_else(|error| Reply::Error { error });
+            let reply = answer.line(&request).unwrap_or_else(|error| Reply::Error { error });
             serde_json::to_writer(&mut self.output, &reply).map_err(Failure::service)?;
             self.output.write_all(b"\n").map_err(Failure::service)?;
         }
@@ -70,17 +75,20 @@ impl<I: BufRead, O: Write> MechanismVisitor for Lines<'_, I, O> {
     }
 }
 
-struct Answer<'a, const N: usize, M> {
+/// Answers lines in order; each starts from the answer before.
+struct Answer<'a, const N: usize, M: Mechanism<N>> {
     mechanism: &'a M,
     machine: &'a Machine,
     arguments: &'a KinematicsArguments,
+    previous: Joints<N>,
+    near: Option<M::Assembly>,
 }
 
 impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
-    fn line(&self, request: &Request, previous: &mut Joints<N>) -> Result<Reply, ErrorBody> {
+    fn line(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
         match self.arguments.verb {
             KinematicsVerb::Forward => self.forward(request),
-            KinematicsVerb::Inverse => self.inverse(request, previous),
+            KinematicsVerb::Inverse => self.inverse(request),
             KinematicsVerb::Jacobian => self.jacobian(request),
             KinematicsVerb::Dynamics => self.dynamics(request),
             KinematicsVerb::Ellipse => self.ellipse(request),
@@ -107,58 +115,115 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         Ok(Joints::<N>::from_fn(|axis, _| values[axis]).component_mul(&self.ratios()))
     }
 
-    fn assemble(&self, q: &Joints<N>) -> Result<M::Assembly, ErrorBody> {
-        self.mechanism
-            .assemble(q, self.mechanism.branch(), None)
-            .map_err(|error| self.kinematics_error(&error))
+    /// The branch that a line asks for; what it leaves open is as the machine is built.
+    fn branch(&self, request: &Request) -> Result<M::Branch, ErrorBody> {
+        let mut branch = self.mechanism.branch();
+        for (name, value) in request.branch.iter().flatten() {
+            let number =
+                |value: &Value| value.as_i64().and_then(|number| i32::try_from(number).ok());
+            let values: Option<Vec<i32>> = match value {
+                Value::Array(values) => values.iter().map(number).collect(),
+                value => number(value).map(|number| vec![number]),
+            };
+            let chosen = values.and_then(|values| branch.choose(name, &values));
+            branch = chosen.ok_or_else(|| {
+                let names: Vec<&str> = branch.choices().iter().map(|(name, _)| *name).collect();
+                let known = match names.as_slice() {
+                    [] => "this mechanism has one solution only".to_owned(),
+                    names => format!("its branches are {}", names.join(", ")),
+                };
+                ErrorBody::bad_request(format!("\"branch\": no \"{name}\": {value}; {known}"))
+            })?;
+        }
+        Ok(branch)
     }
 
-    fn forward(&self, request: &Request) -> Result<Reply, ErrorBody> {
+    /// The chain with the joints at `q`, solved from the one before.
+    fn assemble(&mut self, q: &Joints<N>, branch: M::Branch) -> Result<M::Assembly, ErrorBody> {
+        let assembly = self
+            .mechanism
+            .assemble(q, branch, self.near.as_ref())
+            .or_else(|_| self.mechanism.assemble(q, branch, None))
+            .map_err(|error| self.kinematics_error(&error))?;
+        self.near = Some(assembly);
+        Ok(assembly)
+    }
+
+    /// The chain that a line speaks of.
+    fn assembly(&mut self, request: &Request) -> Result<M::Assembly, ErrorBody> {
+        let q = self.joints("q", request.q.as_ref())?;
+        let branch = self.branch(request)?;
+        self.assemble(&q, branch)
+    }
+
+    fn forward(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
         let q = self.joints("q", request.q.as_ref())?;
         self.check_limits(&q)?;
-        let pose = self
-            .mechanism
-            .forward(&q, self.mechanism.branch())
-            .map_err(|error| self.kinematics_error(&error))?;
-        let pose = ReplyPose { position: self.shown(&pose.position) };
-        Ok(Reply::Forward { pose, branch: Branch::new() })
+        let branch = self.branch(request)?;
+        let assembly = self.assemble(&q, branch)?;
+        let pose = self.mechanism.pose(&assembly);
+        let freedom = self.mechanism.freedom();
+        let rotation = (freedom == Freedom::Pose).then(|| {
+            core::array::from_fn(|row| core::array::from_fn(|column| pose.rotation[(row, column)]))
+        });
+        let axis = (freedom == Freedom::Axis).then(|| beam(&pose).into());
+        let pose = ReplyPose { position: self.shown(&pose.position), rotation, axis };
+        Ok(Reply::Forward { pose, branch: shown_branch(self.mechanism.branch_of(&assembly)) })
     }
 
-    fn inverse(&self, request: &Request, previous: &mut Joints<N>) -> Result<Reply, ErrorBody> {
-        let pose = request.pose.as_ref().ok_or_else(|| missing("pose"))?;
+    fn inverse(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
+        let wanted = request.pose.as_ref().ok_or_else(|| missing("pose"))?;
         let shown = self.dimensions();
-        if pose.position.len() < shown || pose.position.len() > 3 {
+        if wanted.position.len() < shown || wanted.position.len() > 3 {
             return Err(ErrorBody::bad_request(format!(
                 "\"position\" has {} values, the tool moves in {shown}",
-                pose.position.len()
+                wanted.position.len()
             )));
         }
         if request.previous.is_some() {
-            *previous = self.joints("previous", request.previous.as_ref())?;
+            self.previous = self.joints("previous", request.previous.as_ref())?;
         }
+        let branch = self.branch(request)?;
         let position =
-            Vector3::from_fn(|row, _| pose.position.get(row).copied().unwrap_or_default());
-        let q = self
-            .mechanism
-            .inverse(&Pose::at(position), self.mechanism.branch(), previous)
-            .map_err(|error| self.kinematics_error(&error))?;
+            Vector3::from_fn(|row, _| wanted.position.get(row).copied().unwrap_or_default());
+        let solved = match (wanted.a, wanted.r) {
+            (None, None) => {
+                let pose = Pose { position, rotation: rotation(wanted)? };
+                self.mechanism.inverse(&pose, branch, &self.previous)
+            }
+            (a, r) => self
+                .mechanism
+                .inverse_machine_angles(
+                    &position,
+                    [a.unwrap_or_default(), r.unwrap_or_default()],
+                    branch,
+                    &self.previous,
+                )
+                .ok_or_else(|| {
+                    ErrorBody::bad_request(
+                        "\"a\" and \"r\" are angles of an mcm; this machine has none".to_owned(),
+                    )
+                })?,
+        };
+        let q = solved.map_err(|error| self.kinematics_error(&error))?;
         self.check_limits(&q)?;
-        *previous = q;
-        let margin = self
-            .machine
-            .axes
-            .iter()
-            .zip(q.iter())
-            .map(|(axis, value)| {
-                let [lower, upper] = axis.limits.position;
-                (axis.name.clone(), (value - lower).min(upper - value))
-            })
+        self.previous = q;
+        let assembly = self.assemble(&q, branch)?;
+        let axes = self.machine.axes.iter().zip(q.iter()).filter_map(|(axis, value)| {
+            let [lower, upper] = axis.limits.position;
+            let distance = (value - lower).min(upper - value);
+            distance.is_finite().then(|| (axis.name.clone(), distance))
+        });
+        let singularities = self.mechanism.margins(&assembly);
+        let margin = axes
+            .chain(singularities.iter().map(|margin| (margin.name.to_owned(), margin.value)))
             .collect();
         let shown = q.component_div(&self.ratios());
-        Ok(Reply::Inverse { q: shown.as_slice().to_vec(), branch: Branch::new(), margin })
+        let branch = shown_branch(self.mechanism.branch_of(&assembly));
+        Ok(Reply::Inverse { q: shown.as_slice().to_vec(), branch, margin })
     }
 
-    /// Tool velocity per joint rate, in the directions in which the tool moves.
+    /// Tool velocity per joint rate, in the joint values that the user speaks of.
     fn tool_jacobian(&self, assembly: &M::Assembly) -> SMatrix<f64, 6, N> {
         let mut jacobian = self.mechanism.jacobian(assembly);
         for (axis, ratio) in self.ratios().iter().enumerate() {
@@ -167,25 +232,49 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         jacobian
     }
 
-    fn jacobian(&self, request: &Request) -> Result<Reply, ErrorBody> {
-        let q = self.joints("q", request.q.as_ref())?;
-        let jacobian = self.tool_jacobian(&self.assemble(&q)?);
-        let square = SMatrix::<f64, N, N>::from_fn(|row, column| jacobian[(row, column)]);
+    /// The rows of the tool's Jacobian in which the mechanism can choose the tool's motion.
+    fn task_jacobian(&self, assembly: &M::Assembly) -> DMatrix<f64> {
+        let jacobian = self.tool_jacobian(assembly);
+        let rows = match self.mechanism.freedom() {
+            Freedom::Plane => 2,
+            Freedom::Space => 3,
+            Freedom::Axis | Freedom::Pose => 6,
+        };
+        let mut task = DMatrix::from_fn(rows, N, |row, column| jacobian[(row, column)]);
+        if self.mechanism.freedom() == Freedom::Axis {
+            // The rate of the beam's direction, ω×t: turning about the beam does not show in it.
+            let beam = beam(&self.mechanism.pose(assembly));
+            for column in 0..N {
+                let turning: Vector3<f64> = jacobian.fixed_view::<3, 1>(3, column).into_owned();
+                task.view_mut((3, column), (3, 1)).copy_from(&turning.cross(&beam));
+            }
+        }
+        task
+    }
+
+    fn jacobian(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
+        let assembly = self.assembly(request)?;
+        let task = self.task_jacobian(&assembly);
         let rows: Vec<Vec<f64>> =
-            square.row_iter().map(|row| row.iter().copied().collect()).collect();
-        let dynamic = nalgebra::DMatrix::from_fn(N, N, |row, column| square[(row, column)]);
-        let determinant = dynamic.clone().lu().determinant();
-        let mut singular: Vec<f64> = dynamic.singular_values().iter().copied().collect();
+            task.row_iter().map(|row| row.iter().copied().collect()).collect();
+        let determinant = if task.is_square() {
+            task.clone().lu().determinant()
+        } else if task.nrows() > N {
+            (task.transpose() * &task).lu().determinant().max(0.0).sqrt()
+        } else {
+            (&task * task.transpose()).lu().determinant().max(0.0).sqrt()
+        };
+        let mut singular: Vec<f64> = task.singular_values().iter().copied().collect();
         singular.sort_by(|a, b| b.total_cmp(a));
         Ok(Reply::Jacobian { j: rows, det: determinant, singular_values: singular })
     }
 
-    fn dynamics(&self, request: &Request) -> Result<Reply, ErrorBody> {
-        let position = self.joints("q", request.q.as_ref())?;
+    fn dynamics(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
         let velocity = self.joints("qd", request.qd.as_ref())?;
         let acceleration = self.joints("qdd", request.qdd.as_ref())?;
-        let assembly = self.assemble(&position)?;
-        let mut effort = self.mechanism.inverse_dynamics(&assembly, &velocity, &acceleration);
+        let assembly = self.assembly(request)?;
+        let mut effort = self.mechanism.inverse_dynamics(&assembly, &velocity, &acceleration)
+            + self.mechanism.friction(&velocity);
         if let Some(wrench) = &request.wrench {
             if wrench.len() > 6 {
                 return Err(ErrorBody::bad_request(format!(
@@ -209,32 +298,34 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         Ok(Reply::Dynamics { effort: shown.as_slice().to_vec() })
     }
 
-    fn ellipse(&self, request: &Request) -> Result<Reply, ErrorBody> {
-        let q = self.joints("q", request.q.as_ref())?;
-        let jacobian = self.tool_jacobian(&self.assemble(&q)?);
-        let plane = jacobian.fixed_view::<2, N>(0, 0);
-        let product: Matrix2<f64> = plane * plane.transpose();
-        let (axes, angle) = principal_axes(product);
-        if axes[1] <= 0.0 {
+    fn ellipse(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
+        let assembly = self.assembly(request)?;
+        let jacobian = self.tool_jacobian(&assembly);
+        let size = self.dimensions();
+        let linear = DMatrix::from_fn(size, N, |row, column| jacobian[(row, column)]);
+        let axes = principal_axes(&linear * linear.transpose());
+        let least = axes.last().map_or(0.0, |(axis, _)| *axis);
+        if least <= 0.0 {
             return Err(ErrorBody {
                 code: "singular".into(),
                 axis: None,
-                value: Some(axes[1]),
+                value: Some(least),
                 limit: Some(0.0),
                 detail: "the tool cannot move in one direction here".into(),
             });
         }
+        let ellipse = |axes: Vec<(f64, DVector<f64>)>| Ellipse {
+            angle: axes.first().map_or(0.0, |(_, direction)| angle(direction)),
+            directions: axes.iter().map(|(_, along)| along.iter().copied().collect()).collect(),
+            axes: axes.iter().map(|(axis, _)| *axis).collect(),
+        };
         // Kinetostatic duality (source 003 eq. 5.13, 5.14): the force ellipse is the inverse one.
-        let right = core::f64::consts::FRAC_PI_2;
-        let turned = if angle > 0.0 { angle - right } else { angle + right };
-        Ok(Reply::Ellipse {
-            velocity: Ellipse { axes, angle },
-            force: Ellipse { axes: [1.0 / axes[1], 1.0 / axes[0]], angle: turned },
-        })
+        let inverse = axes.iter().rev().map(|(axis, along)| (1.0 / axis, along.clone())).collect();
+        Ok(Reply::Ellipse { velocity: ellipse(axes), force: ellipse(inverse) })
     }
 
     fn dimensions(&self) -> usize {
-        if N < 3 { 2 } else { 3 }
+        if self.mechanism.freedom() == Freedom::Plane { 2 } else { 3 }
     }
 
     fn shown(&self, position: &Vector3<f64>) -> Vec<f64> {
@@ -275,21 +366,73 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     }
 }
 
-/// Semi-axes, larger first, of the ellipse of a symmetric matrix, and the angle of the larger one
-/// in (−π/2, π/2] [rad].
-fn principal_axes(matrix: Matrix2<f64>) -> ([f64; 2], f64) {
-    let eigen = SymmetricEigen::new(matrix);
-    let (major, minor) = if eigen.eigenvalues[0] >= eigen.eigenvalues[1] { (0, 1) } else { (1, 0) };
-    let direction = eigen.eigenvectors.column(major);
-    let mut angle = math::atan2(direction[1], direction[0]);
-    let right = core::f64::consts::FRAC_PI_2;
-    if angle > right {
-        angle -= 2.0 * right;
-    } else if angle <= -right {
-        angle += 2.0 * right;
+/// The direction in which the beam shines.
+fn beam(pose: &Pose) -> Vector3<f64> {
+    -pose.rotation.column(2).into_owned()
+}
+
+/// The orientation that a pose asks for; level where it asks for none.
+fn rotation(pose: &RequestPose) -> Result<Matrix3<f64>, ErrorBody> {
+    /// How far from orthonormal a rotation may be written.
+    const ROUNDING: f64 = 1e-6;
+    if let Some(rows) = &pose.rotation {
+        let rotation = Matrix3::from_fn(|row, column| rows[row][column]);
+        let off = (rotation * rotation.transpose() - Matrix3::identity()).amax();
+        if off.is_nan() || off > ROUNDING || rotation.determinant() < 0.0 {
+            return Err(ErrorBody::bad_request("\"rotation\" is not a rotation".to_owned()));
+        }
+        return Ok(rotation);
     }
-    let semi = |index: usize| eigen.eigenvalues[index].max(0.0).sqrt();
-    ([semi(major), semi(minor)], angle)
+    let Some(axis) = pose.axis else { return Ok(Matrix3::identity()) };
+    let axis = Vector3::from(axis);
+    if !(axis.norm() > 0.0 && axis.norm().is_finite()) {
+        return Err(ErrorBody::bad_request("\"axis\" has no direction".to_owned()));
+    }
+    let down = -Vector3::z();
+    let turned = Rotation3::rotation_between(&down, &axis)
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI));
+    Ok(turned.into_inner())
+}
+
+/// A branch as it is printed: single values as numbers.
+fn shown_branch(branch: impl machine::kinematics::Branch) -> Branch {
+    branch
+        .choices()
+        .into_iter()
+        .map(|(name, values)| {
+            let value = match values.as_slice() {
+                [value] => (*value).into(),
+                values => values.into(),
+            };
+            (name.to_owned(), value)
+        })
+        .collect()
+}
+
+/// Semi-axes, larger first, of the ellipsoid of a symmetric matrix, with their directions.
+fn principal_axes(matrix: DMatrix<f64>) -> Vec<(f64, DVector<f64>)> {
+    let eigen = SymmetricEigen::new(matrix);
+    let mut axes: Vec<(f64, DVector<f64>)> = eigen
+        .eigenvalues
+        .iter()
+        .zip(eigen.eigenvectors.column_iter())
+        .map(|(value, direction)| (value.max(0.0).sqrt(), direction.into_owned()))
+        .collect();
+    axes.sort_by(|(first, _), (second, _)| second.total_cmp(first));
+    axes
+}
+
+/// Angle of a line along `direction` in the x-y plane, in (−π/2, π/2] [rad].
+fn angle(direction: &DVector<f64>) -> f64 {
+    let right = core::f64::consts::FRAC_PI_2;
+    let angle = math::atan2(direction[1], direction[0]);
+    if angle > right {
+        angle - 2.0 * right
+    } else if angle <= -right {
+        angle + 2.0 * right
+    } else {
+        angle
+    }
 }
 
 fn missing(key: &str) -> ErrorBody {

@@ -3,6 +3,7 @@
 
 mod axes;
 mod doubts;
+pub mod mechanism;
 pub mod tables;
 mod validate;
 

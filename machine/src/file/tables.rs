@@ -4,6 +4,10 @@
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
+use super::mechanism::{
+    five_bar::FiveBarTable, mcm::McmTable, polar::PolarTable, prrrp::PrrrpTable,
+    serial::SerialTable, tri_planar::TriPlanarTable, twin_actuator::TwinActuatorTable,
+};
 use crate::document::{
     Either, Fraction, Keyword, Located, Named, NonNegative, Number, Point, Positive,
 };
@@ -83,6 +87,20 @@ table! {
         pub cartesian: Option<CartesianTable>,
         /// Two crossed belts that move one head.
         pub corexy: Option<CoreXyTable>,
+        /// Two arms whose forearms meet in the tool (5R).
+        pub five_bar: Option<FiveBarTable>,
+        /// Two carts on one rail with a link each to the tool.
+        pub prrrp: Option<PrrrpTable>,
+        /// An arm over a rotary table.
+        pub polar: Option<PolarTable>,
+        /// A platform on three planar motors, six degrees of freedom.
+        pub tri_planar: Option<TriPlanarTable>,
+        /// A head that turns and tilts over a rotary table.
+        pub mcm: Option<McmTable>,
+        /// Two actuators of variable length that meet in one joint.
+        pub twin_actuator: Option<TwinActuatorTable>,
+        /// Any open chain of turning and sliding joints.
+        pub serial: Option<SerialTable>,
     }
 }
 

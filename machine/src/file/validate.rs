@@ -2,26 +2,24 @@
 
 use std::path::PathBuf;
 
-use super::axes::{Joint, JointUnit, axis};
+use super::axes::{Joint, axis};
 use super::doubts;
-use super::tables::{
-    AreaTable, AxisTable, CartesianTable, CoreXyTable, MachineTable, MechanismTable, OriginsTable,
-    ScrewTable,
-};
+use super::mechanism::{self, Built};
+use super::tables::{AreaTable, AxisTable, MachineTable, OriginsTable};
 use crate::document::{
-    Document, DocumentError, Findings, Located, Named, Number, Place, Point, Positive, ProblemKind,
-    nearest,
+    Document, DocumentError, Findings, Located, Named, Place, Point, ProblemKind, nearest,
 };
 use crate::limits::{PathLimits, WorkArea};
 use crate::machine::Machine;
-use crate::mechanisms::{Cartesian, CoreXy, Elasticity, MechanismKind};
 use crate::process::{GcodeSettings, LaserSource, ZMeaning};
 
 pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let (table, mut findings) = document.decode::<MachineTable>()?;
     let area = area(&table.area, &mut findings);
     let home = home(table.home, &area, &mut findings);
-    let Some((mechanism, joints)) = mechanism(&table, &area, home, &mut findings) else {
+    let Some(Built { mechanism, joints, home }) =
+        mechanism::build(&table, &area, home, &mut findings)
+    else {
         return findings.fail();
     };
     let Some(tables) = axes_in_order(&table.axis, &joints, &mut findings) else {
@@ -37,9 +35,9 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         axes.push(axis);
     }
     warnings.extend(
-        damping_ratios(&table.mechanism).filter_map(|ratio| doubts::of_damping(ratio, &findings)),
+        mechanism::damping_ratios(&table).filter_map(|ratio| doubts::of_damping(ratio, &findings)),
     );
-    if table.area.z.is_none() && mechanism.axes() == 3 {
+    if table.area.z.is_none() && mechanism.moves_in_z() {
         findings.contradict(
             table.area.place,
             "the machine has a z axis, but its area has no range of z".to_owned(),
@@ -47,7 +45,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         );
     }
     if let Some([lower, _]) = table.area.z
-        && mechanism.axes() < 3
+        && !mechanism.moves_in_z()
     {
         findings.contradict(
             lower.place,
@@ -56,7 +54,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         );
     }
     let gcode = &table.gcode;
-    if gcode.z.value == ZMeaning::Focus && mechanism.axes() < 3 {
+    if gcode.z.value == ZMeaning::Focus && !mechanism.moves_in_z() {
         findings.contradict(
             gcode.z.place,
             "Z cannot move the focus: the mechanism has no z axis".to_owned(),
@@ -135,132 +133,6 @@ fn home(point: Option<Point>, area: &WorkArea, findings: &mut Findings) -> [f64;
         }
     }
     point.value
-}
-
-/// The mechanism, and what it asks of each axis, in the order of its joints.
-fn mechanism(
-    table: &MachineTable,
-    area: &WorkArea,
-    home: [f64; 3],
-    findings: &mut Findings,
-) -> Option<(MechanismKind, Vec<Joint>)> {
-    match (&table.mechanism.cartesian, &table.mechanism.corexy) {
-        (Some(cartesian), None) => cartesian_kind(cartesian, area, home, findings),
-        (None, Some(corexy)) => Some(corexy_kind(corexy, area, home)),
-        (None, None) => {
-            findings.refuse(
-                ProblemKind::MissingKey,
-                table.mechanism.place,
-                "no mechanism is given".to_owned(),
-                Some("add [mechanism.cartesian] or [mechanism.corexy]".to_owned()),
-            );
-            None
-        }
-        (Some(cartesian), Some(corexy)) => {
-            findings.contradict(
-                cartesian.place.max(corexy.place),
-                "the machine has two mechanisms".to_owned(),
-                "keep either [mechanism.cartesian] or [mechanism.corexy]",
-            );
-            None
-        }
-    }
-}
-
-/// The damping ratios of the springs that there are.
-fn damping_ratios(table: &MechanismTable) -> impl Iterator<Item = &Number<Positive>> {
-    let screws = table
-        .cartesian
-        .iter()
-        .flat_map(|cartesian| [&cartesian.x, &cartesian.y].into_iter().chain(&cartesian.z));
-    let sprung = screws.filter(|screw| screw.stiffness.is_some());
-    let belt = table.corexy.iter().flat_map(|corexy| &corexy.belt);
-    sprung.map(|screw| &screw.damping_ratio).chain(belt.map(|belt| &belt.damping_ratio))
-}
-
-fn cartesian_kind(
-    table: &CartesianTable,
-    area: &WorkArea,
-    home: [f64; 3],
-    findings: &mut Findings,
-) -> Option<(MechanismKind, Vec<Joint>)> {
-    let screws: Vec<&ScrewTable> = [&table.x, &table.y].into_iter().chain(&table.z).collect();
-    let joints: Vec<Joint> = ["x", "y", "z"]
-        .into_iter()
-        .zip(&screws)
-        .enumerate()
-        .map(|(index, (name, screw))| Joint {
-            name,
-            travel: screw.lead.value,
-            load: screw.mass.value,
-            stiff_inertia: screw.inertia.value,
-            unit: JointUnit::Length,
-            range: Some([area.lower[index], area.upper[index]]),
-            home: home[index],
-            worst_speed: 1.0,
-        })
-        .collect();
-    let springs: Vec<Elasticity> = screws
-        .iter()
-        .filter_map(|screw| {
-            Some(Elasticity::of_screw(
-                screw.stiffness?.value,
-                screw.lead.value,
-                screw.mass.value,
-                screw.damping_ratio.value,
-            ))
-        })
-        .collect();
-    if !springs.is_empty() && springs.len() < screws.len() {
-        let rigid = screws.iter().find(|screw| screw.stiffness.is_none());
-        findings.contradict(
-            rigid.map_or(table.place, |screw| screw.place),
-            "this screw is rigid, another one is not".to_owned(),
-            "give every screw its `stiffness`, or none",
-        );
-        return None;
-    }
-    let kind = match *screws.as_slice() {
-        [x, y] => MechanismKind::Cartesian(Cartesian {
-            mass: [x.mass.value, y.mass.value],
-            elasticity: springs.try_into().ok(),
-        }),
-        [x, y, z] => MechanismKind::CartesianLift(Cartesian {
-            mass: [x.mass.value, y.mass.value, z.mass.value],
-            elasticity: springs.try_into().ok(),
-        }),
-        _ => return None,
-    };
-    Some((kind, joints))
-}
-
-fn corexy_kind(
-    table: &CoreXyTable,
-    area: &WorkArea,
-    home: [f64; 3],
-) -> (MechanismKind, Vec<Joint>) {
-    let mass = [table.mass_x.value, table.mass_y.value];
-    let joint = |name, range, home| Joint {
-        name,
-        travel: table.pulley_radius.value,
-        // Source 003 eq. 4.6: the diagonal of Jᵀ·M·J.
-        load: (mass[0] + mass[1]) / 4.0,
-        stiff_inertia: 0.0,
-        unit: JointUnit::Length,
-        range: Some(range),
-        home,
-        // Along a diagonal one belt takes the whole motion.
-        worst_speed: core::f64::consts::SQRT_2,
-    };
-    let ([x0, y0, _], [x1, y1, _]) = (area.lower, area.upper);
-    let joints = vec![
-        joint("a", [x0 + y0, x1 + y1], home[0] + home[1]),
-        joint("b", [x0 - y1, x1 - y0], home[0] - home[1]),
-    ];
-    let elasticity = table.belt.as_ref().map(|belt| {
-        mass.map(|mass| Elasticity::damped(belt.stiffness.value, mass, belt.damping_ratio.value))
-    });
-    (MechanismKind::CoreXy(CoreXy { mass, elasticity }), joints)
 }
 
 /// The axes' tables in the order of the joints; each joint has one, and no other is there.

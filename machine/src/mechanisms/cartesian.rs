@@ -7,12 +7,9 @@ use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::transmission::Elasticity;
 use crate::kinematics::{
-    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
-    finite, in_plane,
+    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
+    STANDARD_GRAVITY, ToolMotion, finite, in_plane,
 };
-
-/// Gravity at the surface [m/s²], against the z axis.
-pub(super) const STANDARD_GRAVITY: f64 = 9.806_65;
 
 /// Carriages in x, y and, with `N` = 3, z.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -331,6 +331,16 @@ impl Mechanism<5> for Mcm {
         self.load.weight(q)
     }
 
+    fn inverse_machine_angles(
+        &self,
+        position: &Vector3<f64>,
+        [tilt, turn]: [f64; 2],
+        branch: McmBranch,
+        previous: &Joints<5>,
+    ) -> Option<Result<Joints<5>, KinematicsError>> {
+        Some(Self::inverse_machine_angles(self, position, tilt, turn, branch.side, previous))
+    }
+
     fn stiffness(&self) -> Option<SMatrix<f64, 5, 5>> {
         self.elasticity.map(|springs| {
             SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.stiffness)))

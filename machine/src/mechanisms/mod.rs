@@ -23,7 +23,7 @@ pub use transmission::Elasticity;
 pub use tri_planar::TriPlanar;
 pub use twin_actuator::{ActuatorBodies, TwinActuator, TwinBranch};
 
-use crate::kinematics::Mechanism;
+use crate::kinematics::{Freedom, Mechanism};
 
 /// The mechanism of a machine file, matched once when a stage starts.
 #[derive(Debug, Clone, PartialEq)]
@@ -119,6 +119,18 @@ impl MechanismKind {
             | Self::Serial5(_)
             | Self::Serial6(_) => Serial::<2>::NAME,
         }
+    }
+
+    /// Whether it moves its tool in z.
+    pub fn moves_in_z(&self) -> bool {
+        struct MovesInZ;
+        impl MechanismVisitor for MovesInZ {
+            type Output = bool;
+            fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> bool {
+                mechanism.freedom() != Freedom::Plane
+            }
+        }
+        self.visit(MovesInZ)
     }
 
     /// The number of actuated axes.

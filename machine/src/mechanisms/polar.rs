@@ -344,6 +344,10 @@ impl Mechanism<3> for Polar {
         [false, self.endless, false]
     }
 
+    fn friction(&self, velocity: &Joints<3>) -> Joints<3> {
+        Self::friction(self, velocity)
+    }
+
     fn stiffness(&self) -> Option<Matrix3<f64>> {
         self.elasticity.map(|springs| {
             Matrix3::from_diagonal(&Vector3::from(springs.map(|spring| spring.stiffness)))

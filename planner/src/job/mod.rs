@@ -1,7 +1,5 @@
 //! Job readers: each turns one kind of file into a drawing.
 
-pub mod cloud;
-pub mod cloud_table;
 pub mod file;
 pub mod gcode;
 pub mod letters;
@@ -30,9 +28,6 @@ pub struct Job {
     pub program: Option<gcode::ProgramFacts>,
     /// Why this job can be planned but not run on a machine, if so.
     pub ideal_only: Option<&'static str>,
-    /// How the joints stand before the job, load side [m or rad], on a machine that is planned by
-    /// its joints; `None` where they are at home.
-    pub standing: Option<signals::AxisArray>,
 }
 
 /// How a job wants its lines marked; what is `None` the machine file's `[path]` table rules.

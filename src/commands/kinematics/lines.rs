@@ -32,6 +32,14 @@ pub struct Request {
 pub struct RequestPose {
     /// Machine frame, two or three numbers [m].
     pub position: Vec<f64>,
+    /// Orientation, row by row, where the tool has a free one.
+    pub rotation: Option<[[f64; 3]; 3]>,
+    /// Direction of the beam, where the tool has one.
+    pub axis: Option<[f64; 3]>,
+    /// Tilt of an mcm's head, machine frame, instead of `axis` [rad].
+    pub a: Option<f64>,
+    /// Turn of an mcm's head, machine frame, instead of `axis` [rad].
+    pub r: Option<f64>,
 }
 
 /// One line of output.
@@ -51,14 +59,16 @@ pub enum Reply {
         q: Vec<f64>,
         /// The branch it is in; empty for mechanisms that have none.
         branch: Branch,
-        /// Distance of each axis to its nearer soft limit [m or rad at the joint].
+        /// Distance of each axis to its nearer soft limit [m or rad at the joint], and to each
+        /// singularity, 0 being the singularity itself.
         margin: BTreeMap<String, f64>,
     },
     /// Of `jacobian`.
     Jacobian {
-        /// Tool velocity per joint rate, a row for each direction.
+        /// Tool velocity per joint rate, a row for each direction; then angular velocity, or the rate
+        /// of the beam's direction, where the tool can turn.
         j: Vec<Vec<f64>>,
-        /// Its determinant.
+        /// Its determinant; where it is not square, the root of that of J·Jᵀ or Jᵀ·J.
         det: f64,
         /// Its singular values, the largest first.
         singular_values: Vec<f64>,
@@ -83,22 +93,30 @@ pub enum Reply {
 }
 
 /// The branch of a mechanism's solution, by the mechanism's own names.
-pub type Branch = BTreeMap<String, i32>;
+pub type Branch = BTreeMap<String, Value>;
 
 /// Where the tool is.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ReplyPose {
     /// Machine frame, two numbers for plane mechanisms, else three [m].
     pub position: Vec<f64>,
+    /// Orientation, row by row, where the tool has a free one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<[[f64; 3]; 3]>,
+    /// Direction of the beam, where the tool has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
 }
 
-/// An ellipse in the plane of the tool.
+/// An ellipse in the plane of the tool, or an ellipsoid where it moves in space.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Ellipse {
     /// Semi-axes, the larger first.
-    pub axes: [f64; 2],
-    /// Angle of the larger one, −π/2 to π/2 [rad].
+    pub axes: Vec<f64>,
+    /// Angle of the largest one in the x-y plane, −π/2 to π/2 [rad].
     pub angle: f64,
+    /// Direction of each, a unit vector.
+    pub directions: Vec<Vec<f64>>,
 }
 
 /// Why a line has no answer.

@@ -5,9 +5,9 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
-use super::super::cartesian::STANDARD_GRAVITY;
 use super::{TriPlanar, TriPlanarAssembly};
 use crate::kinematics::Joints;
+use crate::kinematics::STANDARD_GRAVITY;
 
 type Twist = SVector<f64, 6>;
 
