@@ -5,7 +5,7 @@
 //! velocity `Kp = J·ω_v/k` with its corner at `ω_v/4`. The integrals are kept in the unit of the
 //! output, already multiplied by their gain, so that changing a gain does not move the output.
 
-use machine::Axis;
+use machine::{DcMotor, LoopGains};
 use signals::time::CYCLE_TIME;
 
 /// A proportional-integral controller with a limited output.
@@ -101,14 +101,13 @@ pub struct Cascade {
 }
 
 impl Cascade {
-    /// Gains and limits from the axis' data.
-    pub fn new(axis: &Axis) -> Self {
-        let (motor, gains) = (&axis.motor, &axis.gains);
+    /// Gains and limits from the data of motor and load.
+    pub fn new(motor: &DcMotor, gains: &LoopGains) -> Self {
         // Source 003 ch. 3: Kp_v = J·ω_v/k, corner frequency ω_v/4.
         let velocity = gains.inertia * gains.velocity / motor.torque_constant;
         Self {
             position: gains.position,
-            speed_limit: motor.voltage / motor.torque_constant,
+            speed_limit: motor.no_load_speed(),
             velocity: ProportionalIntegral::new(
                 velocity,
                 velocity * gains.velocity / 4.0,
@@ -160,8 +159,12 @@ impl Cascade {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use machine::Machine;
+    use machine::{Axis, Machine};
     use signals::math;
+
+    fn of(axis: &Axis) -> Cascade {
+        Cascade::new(axis.motor.dc().unwrap(), &axis.gains)
+    }
 
     /// The current loop on a locked rotor, one cycle of delay, exact winding.
     #[test]
@@ -180,11 +183,12 @@ mod tests {
             let decay = math::exp(-period * resistance / inductance);
             let mut machine = Machine::builtin();
             let axis = &mut machine.axes[0];
-            axis.motor.resistance = resistance;
-            axis.motor.inductance = inductance;
-            axis.motor.voltage = number(&case["Vmax"]);
+            let motor = axis.motor.dc_mut().unwrap();
+            motor.resistance = resistance;
+            motor.inductance = inductance;
+            motor.voltage = number(&case["Vmax"]);
             axis.gains.current = number(&case["wc"]);
-            let mut current_loop = Cascade::new(axis).current;
+            let mut current_loop = of(axis).current;
             assert!((current_loop.proportional - number(&case["Kp"])).abs() < 1e-12);
             assert!((current_loop.integral - number(&case["Ki"])).abs() < 1e-9);
             let (mut current, mut applied) = (0.0, 0.0);
@@ -202,7 +206,7 @@ mod tests {
 
     #[test]
     fn gains_follow_from_motor_and_load() {
-        let cascade = Cascade::new(&Machine::builtin().axes[0]);
+        let cascade = of(&Machine::builtin().axes[0]);
         // Source 003, the pilot: CoreXY Kp_v 0.0194, Ki_v 0.775, Kp_i 0.803, Ki_i 803.
         assert!((cascade.velocity.proportional - 0.0194).abs() < 1e-4);
         assert!((cascade.velocity.integral - 0.775).abs() < 2e-3);
@@ -223,7 +227,7 @@ mod tests {
 
     #[test]
     fn a_voltage_at_its_limit_stops_the_velocity_integral() {
-        let mut cascade = Cascade::new(&Machine::builtin().axes[0]);
+        let mut cascade = of(&Machine::builtin().axes[0]);
         let far = Reference { position: 100.0, ..Reference::default() };
         // The measured current stays away, so that the voltage stays at its limit.
         for _ in 0..1000 {
@@ -235,7 +239,7 @@ mod tests {
 
     #[test]
     fn what_is_not_a_number_goes_out_and_stays_in_no_integral() {
-        let mut cascade = Cascade::new(&Machine::builtin().axes[0]);
+        let mut cascade = of(&Machine::builtin().axes[0]);
         for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX] {
             for slot in 0..7 {
                 let at = |index: usize| if index == slot { number } else { 0.0 };
@@ -252,7 +256,7 @@ mod tests {
 
     #[test]
     fn at_its_references_it_gives_the_feedforward_alone() {
-        let mut cascade = Cascade::new(&Machine::builtin().axes[0]);
+        let mut cascade = of(&Machine::builtin().axes[0]);
         let reference = Reference { position: 3.0, velocity: 7.0, current: 0.5, voltage: 2.0 };
         let measured = Measurement { position: 3.0, velocity: 7.0, current: 0.5 };
         assert_eq!(cascade.step(&reference, &measured, true), Drive { current: 0.5, voltage: 2.0 });

@@ -19,6 +19,9 @@
 //! | `Holding`, `Stopping` | voltage | along the stream to rest | off |
 //! | `Stopping` after a fault | voltage while the axes follow, else quick stop | the same | off |
 //!
+//! Where the table says voltage, steppers get positions instead: their drivers close the current
+//! loops, and what they are counted by are the pulses that they were sent. There is no loop to close.
+//!
 //! A hold that nobody asked for ends by itself, and the mark is taken up where it was left:
 //!
 //! - light was lost, because a command came too late and drives kept its cycle dark;
@@ -47,7 +50,7 @@ use crate::statistics::Statistics;
 use crate::stream_time::{ONE, StreamTime};
 use crate::supervision::{Elapsed, Finding, Supervision, Tracking};
 use answer::PROGRESS_INTERVAL;
-use machine::Machine;
+use machine::{Axis, Machine, Motor};
 use signals::feedback::status;
 use signals::{
     CommandMode, ControllerReport, Fault, FaultCode, Feedback, LaserCycle, MAX_AXES, Nanoseconds,
@@ -74,7 +77,10 @@ pub struct Controller {
     player: Player,
     alignment: Alignment,
     feedforward: Feedforward,
-    cascades: [Cascade; MAX_AXES],
+    /// None for steppers.
+    cascades: [Option<Cascade>; MAX_AXES],
+    /// The mode in which the motors follow the plan.
+    drive: CommandMode,
     supervision: Supervision,
     statistics: Statistics,
     /// The stream being played, from its first setpoint until it is over; 0 for none.
@@ -95,8 +101,7 @@ impl Controller {
     /// # Panics
     /// If the machine has no axis; machine files without are refused when read.
     pub fn new(machine: &Machine) -> Self {
-        let last = machine.axes.len() - 1;
-        let cascade = |index: usize| Cascade::new(&machine.axes[index.min(last)]);
+        let cascade = |axis: &Axis| axis.motor.dc().map(|motor| Cascade::new(motor, &axis.gains));
         Self {
             state: State::Disabled,
             fault: Fault::default(),
@@ -104,7 +109,11 @@ impl Controller {
             player: Player::new(),
             alignment: Alignment::default(),
             feedforward: Feedforward::new(machine),
-            cascades: core::array::from_fn(cascade),
+            cascades: core::array::from_fn(|index| machine.axes.get(index).and_then(cascade)),
+            drive: match machine.axes[0].motor {
+                Motor::Dc(_) => CommandMode::Voltage,
+                Motor::Stepper(_) => CommandMode::Position,
+            },
             supervision: Supervision::new(machine),
             statistics: Statistics::new(machine),
             playing: 0,
@@ -155,9 +164,12 @@ impl Controller {
             self.fail(finding.at(now));
         }
         self.command(now, inputs, &mut outputs.command);
-        let voltages = &outputs.command.voltage;
-        if let Some(index) = voltages.iter().position(|voltage| !voltage.is_finite()) {
-            let value = voltages[index];
+        let targets = match self.drive {
+            CommandMode::Position => &outputs.command.position,
+            _ => &outputs.command.voltage,
+        };
+        if let Some(index) = targets.iter().position(|target| !target.is_finite()) {
+            let value = targets[index];
             let code = FaultCode::NotFinite;
             self.fail(Finding::on(index, code, value, 0.0, Tracking::Lost).at(now));
             self.command(now, inputs, &mut outputs.command);
@@ -265,7 +277,7 @@ impl Controller {
             if feedback.position.iter().all(|position| position.is_finite()) {
                 self.feedforward.rest_at(&feedback.position, tool);
             }
-            for cascade in &mut self.cascades {
+            for cascade in self.cascades.iter_mut().flatten() {
                 cascade.reset();
             }
             return;

@@ -14,7 +14,7 @@ use crate::cascade::Reference;
 use crate::lookahead::Lookahead;
 use crate::player::Instant;
 use crate::winding::Winding;
-use machine::{Axis, Machine};
+use machine::{Axis, Machine, Motor};
 use signals::time::CYCLE_TIME;
 use signals::{AxisArray, MAX_AXES};
 
@@ -40,7 +40,8 @@ pub struct Planned {
 pub struct Target {
     /// Motor angle at its end [rad].
     pub position: f64,
-    /// Mean motor speed [rad/s].
+    /// Mean motor speed; a stepper's at the end of the cycle, so that the pulses inside it can be
+    /// placed along a curve [rad/s].
     pub velocity: f64,
     /// Mean motor torque, friction included [N·m].
     pub effort: f64,
@@ -50,7 +51,7 @@ pub struct Target {
 #[derive(Debug, Clone)]
 pub struct Feedforward {
     axes: Vec<Axis>,
-    windings: Vec<Winding>,
+    windings: Vec<Option<Winding>>,
     before: Planned,
     now: Planned,
     next: Planned,
@@ -63,7 +64,7 @@ impl Feedforward {
         let resting = Planned { tool: machine.home, ..Planned::default() };
         Self {
             axes: machine.axes.clone(),
-            windings: machine.axes.iter().map(Winding::new).collect(),
+            windings: machine.axes.iter().map(|axis| axis.motor.dc().map(Winding::new)).collect(),
             before: resting,
             now: resting,
             next: resting,
@@ -85,7 +86,7 @@ impl Feedforward {
     pub fn rest_at(&mut self, angle: &AxisArray, tool: [f64; 3]) {
         let resting = Planned { angle: *angle, tool, ..Planned::default() };
         (self.before, self.now, self.next, self.after) = (resting, resting, resting, resting);
-        self.windings.iter_mut().for_each(Winding::rest);
+        self.windings.iter_mut().flatten().for_each(Winding::rest);
     }
 
     /// Goes on by one cycle, to `planned` at its end.
@@ -93,7 +94,8 @@ impl Feedforward {
         for (index, axis) in self.axes.iter().enumerate() {
             let voltage = self.voltage(index, axis);
             let Self { next, after, windings, .. } = self;
-            windings[index].advance(
+            let Some(winding) = &mut windings[index] else { continue };
+            winding.advance(
                 voltage,
                 (after.angle[index] - next.angle[index]) / CYCLE_TIME,
                 after.speed[index] - next.speed[index],
@@ -175,14 +177,15 @@ impl Feedforward {
         Reference {
             position: self.now.angle[index],
             velocity: (self.now.angle[index] - self.before.angle[index]) / CYCLE_TIME,
-            current: self.windings[index].now(),
+            current: self.windings[index].as_ref().map_or(0.0, Winding::now),
             voltage: self.voltage(index, axis),
         }
     }
 
-    /// The voltage over the cycle in which the command acts.
+    /// The voltage over the cycle in which the command acts; 0 for a stepper, whose driver has its
+    /// own current loop.
     fn voltage(&self, index: usize, axis: &Axis) -> f64 {
-        let motor = &axis.motor;
+        let Some(motor) = axis.motor.dc() else { return 0.0 };
         let friction = axis.friction.coulomb / motor.torque_constant;
         let current = |planned: &Planned| planned.torque[index] / motor.torque_constant;
         let (first, last) = (current(&self.next), current(&self.after));
@@ -201,7 +204,10 @@ impl Feedforward {
         let torque = (self.next.torque[index] + self.after.torque[index]) / 2.0;
         Target {
             position: self.after.angle[index],
-            velocity: (self.after.angle[index] - self.next.angle[index]) / CYCLE_TIME,
+            velocity: match axis.motor {
+                Motor::Dc(_) => (self.after.angle[index] - self.next.angle[index]) / CYCLE_TIME,
+                Motor::Stepper(_) => self.after.speed[index],
+            },
             effort: torque + axis.friction.coulomb * mean,
         }
     }

@@ -6,7 +6,7 @@
 //! checker vouches for rate 1.
 
 use crate::ramp::{AVERAGING, OVERRIDE_CHANGE};
-use machine::{Axis, Machine};
+use machine::{Axis, DcMotor, Machine, Motor};
 use signals::Setpoint;
 
 /// The fastest a stream is ever played.
@@ -111,18 +111,25 @@ impl RateLimit {
 
 impl AxisRate {
     fn new(axis: &Axis) -> Self {
-        let (motor, limits) = (&axis.motor, &axis.limits);
-        // R·τ/k + k·ω ≤ V, times k/R.
-        let scale = motor.torque_constant / motor.resistance;
+        let limits = &axis.limits;
+        let (velocity, [by_current, by_voltage, back_emf]) = match &axis.motor {
+            Motor::Dc(motor) => (limits.velocity, lines_of_dc(motor, axis.ratio)),
+            Motor::Stepper(motor) => {
+                let fastest = limits.velocity.min(motor.largest_speed() * axis.ratio);
+                // What it still gives at its fastest it gives at every speed below.
+                let torque = motor.pull_out_torque(fastest / axis.ratio) * CURRENT_SHARE;
+                (fastest, [torque, torque, 0.0])
+            }
+        };
         Self {
-            velocity: 1.0 / limits.velocity,
+            velocity: 1.0 / velocity,
             acceleration: 1.0 / limits.acceleration,
             jerk: 1.0 / limits.jerk,
             viscous: axis.friction.viscous / axis.ratio,
             coulomb: axis.friction.coulomb,
-            by_current: motor.torque_constant * motor.current * CURRENT_SHARE,
-            by_voltage: scale * motor.voltage * VOLTAGE_SHARE,
-            back_emf: scale * motor.torque_constant / axis.ratio,
+            by_current,
+            by_voltage,
+            back_emf,
         }
     }
 
@@ -135,6 +142,18 @@ impl AxisRate {
         let slope = viscous + self.back_emf * speed;
         by_current.min(largest_root(moving, slope, constant - self.by_voltage))
     }
+}
+
+/// Torque that the current gives, that the voltage gives at standstill, and what each unit of joint
+/// speed takes from that.
+fn lines_of_dc(motor: &DcMotor, ratio: f64) -> [f64; 3] {
+    // R·τ/k + k·ω ≤ V, times k/R.
+    let scale = motor.torque_constant / motor.resistance;
+    [
+        motor.torque_constant * motor.current * CURRENT_SHARE,
+        scale * motor.voltage * VOLTAGE_SHARE,
+        scale * motor.torque_constant / ratio,
+    ]
 }
 
 /// The largest `r` up to [`LARGEST_RATE`] with `a·r² + b·r + c ≤ 0`, for `a, b ≥ 0`; 0 without.
@@ -175,6 +194,7 @@ fn brightest(setpoint: &Setpoint) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]
@@ -210,7 +230,8 @@ mod tests {
         setpoint.velocity[0] = 0.3;
         setpoint.effort[0] = 0.01;
         let rate = RateLimit::new(&machine).of(&setpoint);
-        let (motor, speed) = (&machine.axes[0].motor, rate * 0.3 / machine.axes[0].ratio);
+        let motor = machine.axes[0].motor.dc().unwrap();
+        let speed = rate * 0.3 / machine.axes[0].ratio;
         let torque = 0.01 * rate * rate + 5e-3 + 1e-6 * speed;
         let voltage =
             motor.resistance * torque / motor.torque_constant + motor.torque_constant * speed;

@@ -35,7 +35,7 @@ impl Statistics {
             velocity: 1.0 / axis.limits.velocity,
             acceleration: 1.0 / axis.limits.acceleration,
             jerk: 1.0 / axis.limits.jerk,
-            current: 1.0 / axis.motor.current,
+            current: axis.motor.dc().map_or(0.0, |motor| 1.0 / motor.current),
         };
         Self {
             path_acceleration: 1.0 / machine.path.acceleration,

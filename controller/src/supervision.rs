@@ -3,7 +3,7 @@
 //! A finding says what is wrong and whether the axes can still be trusted to follow the plan. If
 //! so they come to rest along the path, else the drives brake them.
 
-use machine::{Axis, Machine};
+use machine::{Axis, DcMotor, Machine, Motor};
 use signals::feedback::status;
 use signals::setpoint::flags;
 use signals::time::CYCLE_TIME;
@@ -209,10 +209,10 @@ impl Supervision {
                 let code = FaultCode::PositionLimit;
                 return Err(Finding::on(index, code, measured, limit, Tracking::Lost));
             }
-            if let Some(continuous) = axis.motor.continuous_current {
+            if let Some(continuous) = axis.motor.dc().and_then(|motor| motor.continuous_current) {
                 let current = feedback.current[index];
                 let heating = &mut self.heating[index];
-                *heating += (current * current - *heating) * (CYCLE_TIME / HEATING_TIME);
+                *heating = DcMotor::heated(*heating, current, CYCLE_TIME, HEATING_TIME);
                 if *heating > continuous * continuous {
                     let (code, value) = (FaultCode::Overload, heating.sqrt());
                     return Err(Finding::on(index, code, value, continuous, Tracking::Sound));
@@ -253,7 +253,11 @@ impl Supervision {
             let [position, velocity, acceleration, jerk, _, _, effort, ..] = numbers;
             let friction =
                 axis.friction.coulomb + axis.friction.viscous * (velocity / axis.ratio).abs();
-            let torque = axis.motor.torque_constant * axis.motor.current + friction;
+            let torque = friction
+                + match &axis.motor {
+                    Motor::Dc(motor) => motor.torque_constant * motor.current,
+                    Motor::Stepper(motor) => motor.holding_torque,
+                };
             let [lower, upper] = limits.position;
             let broken = [
                 (lower - position, ROUNDING, position, lower),

@@ -1,6 +1,6 @@
 //! What the feedforward voltage makes of a winding's current by the instants of measurement.
 
-use machine::{Axis, DcMotor};
+use machine::DcMotor;
 use signals::math;
 use signals::time::CYCLE_TIME;
 
@@ -24,9 +24,9 @@ pub(crate) struct Winding {
 }
 
 impl Winding {
-    /// Of this axis, without current.
-    pub(crate) fn new(axis: &Axis) -> Self {
-        let DcMotor { resistance, inductance, torque_constant, .. } = axis.motor;
+    /// Of this motor, without current.
+    pub(crate) fn new(motor: &DcMotor) -> Self {
+        let DcMotor { resistance, inductance, torque_constant, .. } = *motor;
         let time = inductance / resistance;
         let keep = math::exp(-CYCLE_TIME / time);
         // L·i′ + R·i = v − k·ω with ω = ω̄ + Δω·(t − T/2)/T, solved over one cycle.
@@ -64,15 +64,16 @@ impl Winding {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
     use machine::Machine;
 
     #[test]
     fn the_winding_is_the_exact_answer_to_an_even_voltage_and_a_tilted_speed() {
         let machine = Machine::builtin();
-        let axis = &machine.axes[0];
-        let DcMotor { resistance, inductance, torque_constant, .. } = axis.motor;
-        let mut winding = Winding::new(axis);
+        let motor = machine.axes[0].motor.dc().unwrap();
+        let DcMotor { resistance, inductance, torque_constant, .. } = *motor;
+        let mut winding = Winding::new(motor);
         let (mut current, mut speed) = (0.0, 0.0);
         for cycle in 0..50 {
             let (voltage, change) = (f64::from(cycle % 7) - 2.0, f64::from(cycle % 5) * 4.0 - 7.0);

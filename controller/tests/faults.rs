@@ -192,7 +192,7 @@ fn overruns_are_bounded_on_a_clock_that_does_not_slip() {
 fn an_overloaded_winding_stops_the_machine() {
     let mut machine = Machine::builtin();
     for axis in &mut machine.axes {
-        axis.motor.continuous_current = Some(0.05);
+        axis.motor.dc_mut().unwrap().continuous_current = Some(0.05);
     }
     let job = two_marks(&machine, 0.25, 0.5);
     let mut bench = Bench::enabled(&machine);

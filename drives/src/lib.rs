@@ -13,6 +13,7 @@
 pub mod bridge;
 pub mod plant;
 pub mod port;
+pub mod pulses;
 pub mod service;
 pub mod watchdog;
 

@@ -1,13 +1,15 @@
 //! The simulated plant: motors, transmission, load, encoders and laser source of a machine file.
 //!
-//! Modes: `Disabled` (phases open, motors coast), `Voltage` (held over the cycle) and `QuickStop`
-//! (the drive's own [`brake`]). The drives of this plant have no position, velocity or torque
-//! interface: those modes are refused with a fault, not imitated.
+//! Modes: `Disabled` (phases open, motors coast) and `QuickStop` (the drive's own [`brake`], or a
+//! ramp of the pulses); DC motors take `Voltage` (held over the cycle), steppers `Position` (by
+//! pulses, see [`stepping`]). These drives have no other interface: other modes are refused with a
+//! fault, not imitated.
 //!
 //! What is and is not modelled:
 //!
 //! - The supply saturates the voltage. A chopper keeps the current at the power stage's limit: it
 //!   is cut there at the end of each substep, without a trip.
+//! - A stepper's position is the count of its pulses, and its current is not measured.
 //! - Encoders count in whole counts from power-on, rounded to the nearest; the machine is homed,
 //!   at rest at `machine.home`. Currents are read at the deadline, rounded to
 //!   [`PlantOptions::current_resolution`].
@@ -25,9 +27,11 @@ pub mod coupling;
 pub mod dynamics;
 pub mod friction;
 pub mod source;
+pub mod stepping;
 pub mod winding;
 
 use machine::kinematics::{Joints, KinematicsError};
+use machine::motor::BeyondTorque;
 use machine::{Axis, LaserSource, Machine, Mechanism, MechanismVisitor};
 use nalgebra::SVector;
 use signals::time::CYCLE_TIME;
@@ -38,6 +42,7 @@ use brake::Brake;
 use coupling::Unsolvable;
 use dynamics::{Dynamics, Motors, Phases, State};
 use source::Source;
+use stepping::Stepping;
 use winding::Weights;
 
 /// Largest eigenvalue times substep: the stability region of the classical Runge–Kutta method
@@ -82,6 +87,9 @@ pub enum PlantError {
     /// The joints cannot be at home.
     #[error("home cannot be reached: {0}")]
     Home(KinematicsError),
+    /// A stepper cannot hold the load at home.
+    #[error("a stepper cannot hold its axis at home: {0}")]
+    Hold(BeyondTorque),
     /// A joint moves no mass.
     #[error("the mass matrix of the load is singular at home: an elastic joint must move a mass")]
     SingularMass,
@@ -138,6 +146,8 @@ impl MechanismVisitor for Build<'_> {
 pub struct Plant<const N: usize, M: Mechanism<N>> {
     dynamics: Dynamics<N, M>,
     brake: Brake<N>,
+    /// The drivers of steppers.
+    stepping: Option<Stepping<N>>,
     source: Source,
     weights: Weights<N>,
     substeps: u32,
@@ -180,13 +190,24 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         let assembly = mechanism.assemble(&load, branch, None).map_err(PlantError::Home)?;
 
         // At rest, the motors stand ahead by what gravity stretches the transmission.
+        let gravity = mechanism.gravity(&assembly);
         let sag = mechanism
             .stiffness()
             .and_then(|stiffness| stiffness.try_inverse())
-            .map_or_else(Joints::zeros, |compliance| compliance * mechanism.gravity(&assembly));
+            .map_or_else(Joints::zeros, |compliance| compliance * gravity);
         let motors = Motors::of(&axes);
         let angle = (load + sag).component_div(&motors.ratio);
-        let dynamics = Dynamics::new(mechanism, motors, assembly)?;
+        // A stepper's magnetic axis stands ahead again, by the load angle.
+        let mut origin = angle;
+        for (row, axis) in axes.iter().enumerate() {
+            if let Some(stepper) = axis.motor.stepper() {
+                let torque = axis.ratio * gravity[row];
+                origin[row] += stepper.load_angle(torque, 0.0).map_err(PlantError::Hold)?;
+            }
+        }
+        let stepping = Stepping::of(&axes, origin);
+        let field = stepping.as_ref().map(|stepping| stepping.field(angle));
+        let dynamics = Dynamics::new(mechanism, motors, assembly)?.with_field(field);
 
         let rate = dynamics.fastest();
         let substeps = (CYCLE_TIME / substep - 1e-9).max(rate * CYCLE_TIME / STABLE_PRODUCT).ceil();
@@ -207,7 +228,8 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             substeps: substeps as u32,
             current_resolution,
             resolution: SVector::from_fn(|row, _| axes[row].encoder.resolution()),
-            origin: angle,
+            origin,
+            stepping,
             phase: SVector::from_fn(|row, _| encoder_phase(seed, row as u64)),
             state,
             passed: state,
@@ -239,9 +261,19 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
     fn advance(&mut self, actuation: &Actuation) {
         let motors = *self.dynamics.motors();
         let step = self.weights.step;
-        for _ in 0..self.substeps {
+        for index in 0..self.substeps {
+            if let (Some(stepping), Some(field)) = (&self.stepping, self.dynamics.field_mut()) {
+                // A pulse in the first half of a substep counts for all of it, one in the second
+                // half for nothing of it: in the mean, none is early or late.
+                let at = (f64::from(index) + 0.5) / f64::from(self.substeps);
+                stepping.drive(field, at, actuation.mode);
+                if let Err(stall) = stepping.in_step(field, &self.state) {
+                    self.fail(stall.axis as u32 + 1, stall.value, stall.limit);
+                }
+            }
             let phases = match actuation.mode {
                 CommandMode::Disabled => Phases::Open,
+                _ if self.stepping.is_some() => Phases::Open,
                 CommandMode::Voltage => Phases::Driven(SVector::from_fn(|row, _| {
                     saturate(actuation.voltage[row], motors.voltage[row])
                 })),
@@ -296,13 +328,12 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             return Actuation { laser: LaserCycle::OFF, ..*actuation };
         }
         if !self.fault.is_some() {
-            self.fault = refusal::<N>(actuation);
+            self.fault = self.refusal(actuation);
         }
         if self.fault.is_some() {
             return self.stopped();
         }
-        let dark =
-            actuation.freshness == Freshness::Stale || actuation.mode != CommandMode::Voltage;
+        let dark = actuation.freshness == Freshness::Stale || actuation.mode != self.following();
         let laser = if dark { LaserCycle::OFF } else { actuation.laser };
         Actuation { laser, ..*actuation }
     }
@@ -317,7 +348,14 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
 
     fn measure(&mut self, measurement: &mut Measurement) {
         *measurement = Measurement::default();
+        let pulses = self.stepping.as_ref().map(Stepping::counts);
         for row in 0..N {
+            if let Some(pulses) = &pulses {
+                measurement.counts[row] = pulses[row];
+                measurement.position[row] =
+                    self.origin[row] + pulses[row] as f64 * self.resolution[row];
+                continue;
+            }
             let turned = (self.state.angle[row] - self.origin[row]) / self.resolution[row];
             let counts = (turned + self.phase[row]).round();
             measurement.counts[row] = counts as i64;
@@ -335,6 +373,43 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             Err(error) => self.fail(0, error.value, error.limit),
         }
         measurement.laser = self.light;
+    }
+
+    /// The mode in which the motors follow the controller.
+    fn following(&self) -> CommandMode {
+        match self.stepping {
+            None => CommandMode::Voltage,
+            Some(_) => CommandMode::Position,
+        }
+    }
+
+    /// Why this plant cannot carry `actuation` out, if it cannot.
+    fn refusal(&self, actuation: &Actuation) -> Fault {
+        let fault = |code: FaultCode, axis, value| Fault {
+            code: code as u32,
+            axis,
+            value,
+            limit: 0.0,
+            at: Nanoseconds(0),
+        };
+        let targets: &[&AxisArray] = match actuation.mode {
+            CommandMode::Disabled | CommandMode::QuickStop => &[],
+            mode if mode != self.following() => {
+                return fault(FaultCode::DriveFault, 0, f64::from(mode as u32));
+            }
+            CommandMode::Position => &[&actuation.position, &actuation.velocity],
+            _ => &[&actuation.voltage],
+        };
+        for values in targets {
+            if let Some(axis) = values.iter().take(N).position(|value| !value.is_finite()) {
+                return fault(FaultCode::NotFinite, axis as u32 + 1, values[axis]);
+            }
+        }
+        if actuation.laser.is_valid() {
+            Fault::default()
+        } else {
+            fault(FaultCode::DriveFault, 0, f64::from(actuation.laser.edge_count))
+        }
     }
 
     fn fail(&mut self, axis: u32, value: f64, limit: f64) {
@@ -366,7 +441,16 @@ impl<const N: usize, M: Mechanism<N>> Port for Plant<N, M> {
             }
         }
         self.measure(measurement);
-        let admitted = self.admit(actuation);
+        let mut admitted = self.admit(actuation);
+        if let Some(stepping) = &mut self.stepping
+            && let Err(beyond) = stepping.engage(&admitted, &self.state)
+        {
+            self.fail(beyond.axis as u32 + 1, beyond.value, beyond.limit);
+            admitted = self.stopped();
+            if let Some(stepping) = &mut self.stepping {
+                stepping.brake();
+            }
+        }
         let braking = |mode| matches!(mode, Some(CommandMode::QuickStop));
         if braking(Some(admitted.mode)) && !braking(self.in_force.map(|before| before.mode)) {
             self.brake.engage(&self.state);
@@ -376,34 +460,6 @@ impl<const N: usize, M: Mechanism<N>> Port for Plant<N, M> {
         }
         measurement.fault = self.fault;
         self.in_force = Some(admitted);
-    }
-}
-
-/// Why this plant cannot carry `actuation` out, if it cannot.
-fn refusal<const N: usize>(actuation: &Actuation) -> Fault {
-    let fault = |code: FaultCode, axis, value| Fault {
-        code: code as u32,
-        axis,
-        value,
-        limit: 0.0,
-        at: Nanoseconds(0),
-    };
-    let finite = |values: &AxisArray| values.iter().take(N).position(|value| !value.is_finite());
-    match actuation.mode {
-        CommandMode::Disabled | CommandMode::QuickStop => {}
-        CommandMode::Voltage => {
-            if let Some(axis) = finite(&actuation.voltage) {
-                return fault(FaultCode::NotFinite, axis as u32 + 1, actuation.voltage[axis]);
-            }
-        }
-        mode @ (CommandMode::Position | CommandMode::Velocity | CommandMode::Effort) => {
-            return fault(FaultCode::DriveFault, 0, f64::from(mode as u32));
-        }
-    }
-    if actuation.laser.is_valid() {
-        Fault::default()
-    } else {
-        fault(FaultCode::DriveFault, 0, f64::from(actuation.laser.edge_count))
     }
 }
 

@@ -32,10 +32,11 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 fn motor(parameters: &Value, inertia: f64, friction: Friction, load: f64) -> Dynamics<1, Shaft> {
     let mut axis = shaft::axis(inertia, friction);
-    axis.motor.resistance = number(parameters, "R");
-    axis.motor.inductance = number(parameters, "L");
-    axis.motor.torque_constant = number(parameters, "kt");
-    axis.motor.voltage = number(parameters, "U");
+    let motor = axis.motor.dc_mut().unwrap();
+    motor.resistance = number(parameters, "R");
+    motor.inductance = number(parameters, "L");
+    motor.torque_constant = number(parameters, "kt");
+    motor.voltage = number(parameters, "U");
     Dynamics::new(Shaft { load, spread: 0.0 }, Motors::of(&[axis]), Vector1::zeros()).unwrap()
 }
 

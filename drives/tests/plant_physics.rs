@@ -170,7 +170,7 @@ fn friction_does_not_lower_the_accuracy_below_a_nanometre() {
 #[test]
 fn torque_below_stiction_never_creeps() {
     let machine = Machine::builtin();
-    let motor = machine.axes[0].motor;
+    let motor = *machine.axes[0].motor.dc().unwrap();
     let breakaway = machine.axes[0].friction.coulomb / motor.torque_constant * motor.resistance;
     let mut plant = plant(corexy(), &machine.axes);
     let start = *plant.state();
@@ -258,7 +258,7 @@ fn one_motor_can_stick_while_the_other_moves_a_rigid_machine() {
 /// Stretch of the belts over the acceleration of the load, along a direction of the tool [s²].
 fn stretch(direction: [f64; 2]) -> f64 {
     let machine = Machine::builtin();
-    let motor = machine.axes[0].motor;
+    let motor = *machine.axes[0].motor.dc().unwrap();
     let ratio = machine.axes[0].ratio;
     let mut plant = plant(corexy(), &axes(SMOOTH));
     let [x, y] = direction;

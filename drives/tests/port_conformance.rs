@@ -37,7 +37,7 @@ fn cartesian() -> Machine {
     });
     for axis in &mut machine.axes {
         axis.ratio = lead / 3.0;
-        axis.motor.rotor_inertia = 2e-6 + 6.468e-6 / 9.0;
+        axis.motor.dc_mut().unwrap().rotor_inertia = 2e-6 + 6.468e-6 / 9.0;
         axis.gains.inertia = 3.94e-6;
     }
     machine

@@ -1,26 +1,7 @@
 //! What moves a joint: motor, encoder, transmission ratio, and the gains of its cascade.
 
 use crate::limits::AxisLimits;
-
-/// A permanent-magnet DC motor (source 003 sec. 3.3): `V = R·i + L·i′ + k·ω`, torque `k·i`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DcMotor {
-    /// Winding resistance [Ω].
-    pub resistance: f64,
-    /// Winding inductance [H].
-    pub inductance: f64,
-    /// Torque constant [N·m/A], equal to the back-EMF constant [V·s/rad].
-    pub torque_constant: f64,
-    /// Inertia at the shaft on the motor's side of the transmission's spring [kg·m²]: the rotor,
-    /// and what turns with it stiffly, such as a screw through its gear (`J_screw/i²`).
-    pub rotor_inertia: f64,
-    /// Largest voltage that the supply can apply [V].
-    pub voltage: f64,
-    /// Largest current that the power stage may command [A].
-    pub current: f64,
-    /// Current that the winding bears for ever [A]; `None` where the file does not say.
-    pub continuous_current: Option<f64>,
-}
+use crate::motor::Motor;
 
 /// Friction at the motor shaft.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,16 +12,18 @@ pub struct Friction {
     pub viscous: f64,
 }
 
-/// An incremental encoder on the motor shaft.
+/// What a motor's position is counted in: the counts of an incremental encoder on its shaft, or the
+/// pulses sent to a stepper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Encoder {
-    /// Counts per revolution of the motor, all edges counted.
+    /// Counts per revolution of the motor, all edges counted, or pulses per revolution.
     pub counts: f64,
 }
 
 /// Gains of the position/velocity/current cascade.
 ///
-/// Taken from motor and load data unless the machine file overrides a bandwidth.
+/// Taken from motor and load data unless the machine file overrides a bandwidth. A stepper has no
+/// cascade: its bandwidths are 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopGains {
     /// Bandwidth of the position loop [1/s].
@@ -67,10 +50,10 @@ pub struct Axis {
     /// feedforward alike; counting them here as well would count them twice.
     pub efficiency: f64,
     /// The motor.
-    pub motor: DcMotor,
+    pub motor: Motor,
     /// Friction at its shaft.
     pub friction: Friction,
-    /// Its encoder.
+    /// Its encoder, or the pulses that take its place.
     pub encoder: Encoder,
     /// Gains of its cascade.
     pub gains: LoopGains,

@@ -167,15 +167,15 @@ fn the_cartesian_x_axis_is_the_plant_of_the_golden_cascade() {
     let file = golden("cascade");
     let plant = &file["params"]["plant"];
     let number = |key: &str| plant[key].as_f64().unwrap();
-    assert_eq!(axis.motor.resistance, number("R"));
-    assert_eq!(axis.motor.inductance, number("L"));
-    assert_eq!(axis.motor.torque_constant, number("kt"));
+    assert_eq!(axis.motor.dc().unwrap().resistance, number("R"));
+    assert_eq!(axis.motor.dc().unwrap().inductance, number("L"));
+    assert_eq!(axis.motor.dc().unwrap().torque_constant, number("kt"));
     assert_eq!(axis.friction.coulomb, number("Tc"));
     assert_eq!(axis.friction.viscous, number("gam"));
     // Jtot = Jm + (Js + m·p_s²)/i².
     check("Jtot", axis.gains.inertia, number("Jtot"), number("Jtot"));
     let screw = number("Jm") + number("Js") / (number("ig") * number("ig"));
-    check("rotor with screw", axis.motor.rotor_inertia, screw, screw);
+    check("rotor with screw", axis.motor.rotor_inertia(), screw, screw);
     // B = 2·ζ·√(K·m·p_s²) about the screw; through p_s² in translation.
     let MechanismKind::Cartesian(cartesian) = machine.mechanism else { panic!("not cartesian") };
     let [spring, _] = cartesian.elasticity.unwrap();
@@ -185,11 +185,11 @@ fn the_cartesian_x_axis_is_the_plant_of_the_golden_cascade() {
 
     let controller = &file["configs"]["1k/1k"]["controller"];
     let gains = &axis.gains;
-    let velocity = gains.inertia * gains.velocity / axis.motor.torque_constant;
+    let velocity = gains.inertia * gains.velocity / axis.motor.dc().unwrap().torque_constant;
     let expected = controller["Kp_v"].as_f64().unwrap();
     check("Kp_v", velocity, expected, expected);
     // The golden ω_c is 0.34907 (20°) per cycle; the pilot's rounded 0.349 is kept.
-    let current = axis.motor.inductance * gains.current;
+    let current = axis.motor.dc().unwrap().inductance * gains.current;
     let expected = controller["Kp_i"].as_f64().unwrap();
     assert!((current - expected).abs() <= 5e-4 * expected, "Kp_i {current} against {expected}");
     assert_eq!(gains.position, controller["Kp_pos"].as_f64().unwrap());
@@ -206,11 +206,11 @@ fn the_corexy_has_the_pilots_numbers() {
         assert!((found - printed).abs() <= digit / 2.0, "{found} against {printed}");
     };
     near(gains.inertia, 2.54e-6, 1e-8);
-    let proportional = gains.inertia * gains.velocity / axis.motor.torque_constant;
+    let proportional = gains.inertia * gains.velocity / axis.motor.dc().unwrap().torque_constant;
     near(proportional, 0.0194, 1e-4);
     near(proportional * gains.velocity / 4.0, 0.775, 1e-3);
-    near(axis.motor.inductance * gains.current, 0.803, 1e-3);
-    near(axis.motor.resistance * gains.current, 803.0, 1.0);
+    near(axis.motor.dc().unwrap().inductance * gains.current, 0.803, 1e-3);
+    near(axis.motor.dc().unwrap().resistance * gains.current, 803.0, 1.0);
     assert_eq!(axis.encoder.counts, 4096.0);
     let MechanismKind::CoreXy(corexy) = machine.mechanism else { panic!("not a corexy") };
     let [x, y] = corexy.elasticity.unwrap();

@@ -12,7 +12,7 @@ use crate::stage::Clock;
 use crate::summary::{
     ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, Summary,
 };
-use machine::Machine;
+use machine::{Axis, Machine};
 use serde::{Deserialize, Serialize};
 use signals::artwork::Artwork;
 use signals::time::CYCLE_TIME;
@@ -273,8 +273,9 @@ pub fn write(
 ) -> io::Result<()> {
     summary.out = Some(folder.path().to_string_lossy().into_owned());
     if let Some(findings) = findings {
-        let constants: Vec<f64> =
-            machine.axes.iter().map(|axis| axis.motor.torque_constant).collect();
+        // A stepper's current says nothing of its torque.
+        let constant = |axis: &Axis| axis.motor.dc().map_or(0.0, |motor| motor.torque_constant);
+        let constants: Vec<f64> = machine.axes.iter().map(constant).collect();
         let began = Instant::now();
         let report = Report {
             summary,

@@ -1,6 +1,6 @@
 //! Every sample of a plan against every limit of path, area and axes, before the first one is sent.
 
-use machine::{Axis, Machine, PathLimits};
+use machine::{Axis, Machine, Motor, PathLimits};
 use signals::Setpoint;
 use signals::time::CYCLE_TIME;
 
@@ -131,23 +131,38 @@ impl<'a> Checker<'a> {
     }
 
     /// Current and voltage that the motion needs, friction included: what the controller will
-    /// feed forward for the cycle between the sample before and this one.
+    /// feed forward for the cycle between the sample before and this one. Of a stepper, the share of
+    /// the pull-out torque at its speed stands for that of the current, and the share of the pulse
+    /// rate for that of the voltage.
     fn motors(&mut self, setpoint: &Setpoint, time: f64) -> Result<(), Breach> {
         let mut now = Vec::with_capacity(self.axes.len());
         for (index, axis) in self.axes.iter().enumerate() {
-            let motor = &axis.motor;
             let angle = (setpoint.position[index] + setpoint.lead[index]) / axis.ratio;
             let before = self.before.as_ref().map(|motors| motors[index]);
             let speed = before.map_or(0.0, |(earlier, _)| (angle - earlier) / CYCLE_TIME);
             // Below the speed at which no setpoint moves, friction takes no side.
             let side = if speed.abs() > 1e-9 { speed.signum() } else { 0.0 };
             let friction = axis.friction.coulomb * side + axis.friction.viscous * speed;
-            let current = (setpoint.effort[index] + friction) / motor.torque_constant;
+            let torque = setpoint.effort[index] + friction;
+            let name = Some(axis.name.as_str());
+            let motor = match &axis.motor {
+                Motor::Dc(motor) => motor,
+                Motor::Stepper(motor) => {
+                    let (torque, most) = (torque.abs(), motor.pull_out_torque(speed));
+                    let share = below(torque, most, 1.0, time, name, "motor torque", "N·m")?;
+                    self.uses.current[index] = self.uses.current[index].max(share);
+                    let (rate, most) = (speed.abs() * motor.pulses_per_radian(), motor.pulse_rate);
+                    let share = below(rate, most, 1.0, time, name, "pulse rate", "1/s")?;
+                    self.uses.voltage[index] = self.uses.voltage[index].max(share);
+                    now.push((angle, 0.0));
+                    continue;
+                }
+            };
+            let current = torque / motor.torque_constant;
             let earlier = before.map_or(current, |(_, current)| current);
             let voltage = motor.resistance * (current + earlier) / 2.0
                 + motor.inductance * (current - earlier) / CYCLE_TIME
                 + motor.torque_constant * speed;
-            let name = Some(axis.name.as_str());
             let share = below(current.abs(), motor.current, 1.0, time, name, "motor current", "A")?;
             self.uses.current[index] = self.uses.current[index].max(share);
             let share = below(voltage.abs(), motor.voltage, 1.0, time, name, "motor voltage", "V")?;

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use machine::kinematics::{JointMotion, Joints, KinematicsError, ToolMotion};
-use machine::{Axis, Mechanism};
+use machine::{Axis, Friction, Mechanism, StepperMotor};
 use signals::time::CYCLE_TIME;
 use signals::{GateEdge, LaserCycle, Setpoint, axis::axis_array, setpoint::flags};
 
@@ -23,6 +23,9 @@ const STEP: f64 = CYCLE_TIME / STEPS as f64;
 
 /// A stream ends once no motor is farther than this from where it will stay [joint units].
 const SETTLED: f64 = 1e-9;
+
+/// Motor speed below which friction takes no side, as in the controller [rad/s].
+const STANDING: f64 = 0.01;
 
 /// Nanoseconds in a cycle.
 const CYCLE: i64 = signals::time::CYCLE_PERIOD.0;
@@ -66,6 +69,29 @@ enum Stream {
 struct Drive {
     ratio: f64,
     inertia: f64,
+    friction: Friction,
+    stepper: Option<StepperMotor>,
+}
+
+impl Drive {
+    /// Adds to the lead of `axis` what a stepper's magnetic axis must be ahead of its rotor, which
+    /// moves at `velocity` [joint units/s]. A DC motor's angle is its rotor's.
+    ///
+    /// Like the rest of the lead it is then played with the square of the rate, the part of a
+    /// change of rate taken at the stiffness around zero torque.
+    fn lead_rotor(&self, axis: usize, velocity: f64, setpoint: &mut Setpoint) {
+        let Some(stepper) = &self.stepper else { return };
+        let speed = velocity / self.ratio;
+        let side = if speed.abs() < STANDING { 0.0 } else { speed.signum() };
+        let friction = self.friction.coulomb * side + self.friction.viscous * speed;
+        let torque = setpoint.effort[axis] + friction;
+        // Beyond its torque there is no load angle: the checker refuses the sample for that torque.
+        let angle = stepper
+            .load_angle(torque, speed)
+            .unwrap_or_else(|_| stepper.largest_load_angle().copysign(torque));
+        setpoint.lead[axis] += self.ratio * angle;
+        setpoint.lead_momentum[axis] += self.ratio * setpoint.momentum[axis] / stepper.stiffness();
+    }
 }
 
 /// The laser as the samples so far left it.
@@ -113,7 +139,9 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             mechanism,
             drives: std::array::from_fn(|axis| Drive {
                 ratio: axes[axis].ratio,
-                inertia: axes[axis].motor.rotor_inertia,
+                inertia: axes[axis].motor.rotor_inertia(),
+                friction: axes[axis].friction,
+                stepper: axes[axis].motor.stepper().copied(),
             }),
             trajectory,
             stream,
@@ -175,6 +203,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         let Look { tool, motion, assembly, effort } = self.advance()?;
         add(&effort, 1.0);
         let lead = *self.lead.value();
+        let motor_velocity = self.motor_velocity;
         for _ in 1..STEPS / 2 {
             let look = self.advance()?;
             add(&look.effort, 1.0);
@@ -190,7 +219,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             let values: [f64; N] = std::array::from_fn(|axis| value(axis, &self.drives[axis]));
             axis_array(&values)
         };
-        Ok(Setpoint {
+        let mut setpoint = Setpoint {
             tool: tool.position.into(),
             path_velocity: tool.velocity.norm(),
             path_acceleration: tool.acceleration.norm(),
@@ -209,7 +238,11 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
                 drive.inertia * motion.velocity[axis] / drive.ratio + drive.ratio * impulse[axis]
             }),
             ..Setpoint::default()
-        })
+        };
+        for (axis, drive) in self.drives.iter().enumerate() {
+            drive.lead_rotor(axis, motor_velocity[axis], &mut setpoint);
+        }
+        Ok(setpoint)
     }
 
     /// The laser in the cycle that starts with sample `sequence`, and the stroke it lights; `None`

@@ -389,12 +389,12 @@ fn broken_limits_are_named() {
     assert!(found.value > 0.2 && found.value < 0.2003, "{}", found.value);
 
     let mut weak = machine.clone();
-    weak.axes[1].motor.voltage = 3.0;
+    weak.axes[1].motor.dc_mut().unwrap().voltage = 3.0;
     let found = breach(&weak, 0.05);
     assert_eq!((found.axis.as_deref(), found.quantity), (Some("b"), "motor voltage"));
 
     let mut weak = machine.clone();
-    weak.axes[0].motor.current = 0.5;
+    weak.axes[0].motor.dc_mut().unwrap().current = 0.5;
     let found = breach(&weak, 0.05);
     assert_eq!((found.axis.as_deref(), found.quantity), (Some("a"), "motor current"));
 

@@ -93,13 +93,12 @@ fn axes(machine: &Machine) -> Vec<AxisReport> {
         .iter()
         .map(|axis| {
             let motor = &axis.motor;
-            let current = motor.current.min(motor.voltage / motor.resistance);
             AxisReport {
                 name: axis.name.clone(),
                 position: axis.limits.position,
                 velocity: axis.limits.velocity,
-                no_load_velocity: motor.voltage / motor.torque_constant * axis.ratio,
-                stall_torque: motor.torque_constant * current,
+                no_load_velocity: motor.largest_speed() * axis.ratio,
+                stall_torque: motor.stall_torque(),
                 resolution: axis.encoder.resolution() * axis.ratio,
             }
         })

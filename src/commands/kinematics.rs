@@ -292,7 +292,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         if self.arguments.motor {
             for (axis, value) in shown.iter_mut().enumerate() {
                 let settings = &self.machine.axes[axis];
-                *value += settings.motor.rotor_inertia * acceleration[axis] / settings.ratio;
+                *value += settings.motor.rotor_inertia() * acceleration[axis] / settings.ratio;
             }
         }
         Ok(Reply::Dynamics { effort: shown.as_slice().to_vec() })

@@ -6,7 +6,9 @@ use crate::exchange::Inputs;
 use crate::gate::TooManyEdges;
 use crate::state::State;
 use crate::supervision::{Finding, Tracking};
-use signals::{Command, FaultCode, LaserCycle, MAX_AXES, MAX_EDGES, Nanoseconds, Progress};
+use signals::{
+    Command, CommandMode, FaultCode, LaserCycle, MAX_AXES, MAX_EDGES, Nanoseconds, Progress,
+};
 
 /// Cycles between two progress samples.
 pub(super) const PROGRESS_INTERVAL: u64 = 5;
@@ -49,7 +51,10 @@ impl Controller {
             published: now,
             setpoint_published: newest.0,
             setpoint_received: newest.1,
-            mode: self.state.mode() as u32,
+            mode: match self.state.mode() {
+                CommandMode::Voltage => self.drive,
+                mode => mode,
+            } as u32,
             state: self.state.to_wire() as u32,
             outputs,
             stream_time: self.player.now().time.seconds(),
@@ -78,6 +83,7 @@ impl Controller {
                 continue;
             }
             command.following_error[index] = error;
+            let Some(cascade) = cascade else { continue };
             let held_by_friction =
                 self.feedforward.stands(index) && error.abs() <= axis.encoder.resolution();
             let drive = cascade.step(&reference, &measured, !held_by_friction);

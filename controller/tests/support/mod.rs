@@ -41,7 +41,7 @@ impl Motor {
 
     /// One cycle with `voltage`, or with the phases open.
     fn run(&mut self, voltage: Option<f64>) {
-        let (motor, friction) = (self.axis.motor, self.axis.friction);
+        let (motor, friction) = (*self.axis.motor.dc().unwrap(), self.axis.friction);
         let inertia = self.axis.gains.inertia;
         for _ in 0..(CYCLE_TIME / STEP).round() as usize {
             self.current = match voltage {

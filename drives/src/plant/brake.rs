@@ -10,10 +10,10 @@
 //! motor after its ramp, there it is held; within one encoder count the position counts as
 //! reached. So integral action and stiction do not hunt.
 //!
-//! Deceleration: what half the current limit gives to rotor and load seen at the shaft, leaving
+//! Deceleration: what half the current limit, or half a stepper's torque at its fastest, gives to rotor and load seen at the shaft, leaving
 //! the other half to the loops, and never more than the axis's own limit of acceleration.
 
-use machine::Axis;
+use machine::{Axis, Motor};
 use nalgebra::SVector;
 
 use super::dynamics::{Motors, State};
@@ -27,6 +27,17 @@ const INTEGRAL_CORNER: f64 = 0.25;
 /// Bandwidth of the current loop as a share of the substep's rate [1/s per 1/s]: a proportional
 /// loop that acts on the state at the start of each substep is well damped at a tenth of it.
 const CURRENT_SHARE: f64 = 0.1;
+
+/// What the ramp of `axis` takes from its motor's speed [rad/s²].
+pub(super) fn deceleration(axis: &Axis) -> f64 {
+    let torque = match &axis.motor {
+        Motor::Dc(motor) => RAMP_SHARE * motor.current * motor.torque_constant,
+        Motor::Stepper(motor) => {
+            RAMP_SHARE * motor.pull_out_torque(axis.limits.velocity / axis.ratio)
+        }
+    };
+    (torque / axis.gains.inertia).min(axis.limits.acceleration / axis.ratio)
+}
 
 /// The braking loop of all axes.
 #[derive(Debug, Clone, Copy)]
@@ -49,10 +60,7 @@ impl<const N: usize> Brake<N> {
             position_gain: each(|axis| axis.gains.position),
             velocity_gain: each(|axis| axis.gains.velocity),
             inertia: each(|axis| axis.gains.inertia),
-            deceleration: each(|axis| {
-                let torque = RAMP_SHARE * axis.motor.current * axis.motor.torque_constant;
-                (torque / axis.gains.inertia).min(axis.limits.acceleration / axis.ratio)
-            }),
+            deceleration: each(deceleration),
             resolution: each(|axis| axis.encoder.resolution()),
             angle: SVector::zeros(),
             speed: SVector::zeros(),

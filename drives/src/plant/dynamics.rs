@@ -17,12 +17,13 @@
 //! [`coupling`](super::coupling).
 
 use machine::kinematics::{Joints, KinematicsError};
-use machine::{Axis, Mechanism};
+use machine::{Axis, DcMotor, Mechanism};
 use nalgebra::{SMatrix, SVector};
 
 use super::PlantError;
 use super::coupling::{Coupling, LoadSide, Unsolvable};
 use super::friction::Contacts;
+use super::stepping::Field;
 use super::winding::{Weights, Windings};
 
 /// Where the plant is.
@@ -74,18 +75,23 @@ impl<const N: usize> Motors<N> {
         let each = |value: fn(&Axis) -> f64| SVector::from_fn(|row, _| value(&axes[row]));
         Self {
             windings: Windings::new(
-                each(|axis| axis.motor.resistance),
-                each(|axis| axis.motor.inductance),
-                each(|axis| axis.motor.torque_constant),
+                each(|axis| dc(axis, 1.0, |motor| motor.resistance)),
+                each(|axis| dc(axis, 1.0, |motor| motor.inductance)),
+                each(|axis| dc(axis, 0.0, |motor| motor.torque_constant)),
             ),
-            inertia: each(|axis| axis.motor.rotor_inertia),
+            inertia: each(|axis| axis.motor.rotor_inertia()),
             coulomb: each(|axis| axis.friction.coulomb),
             viscous: each(|axis| axis.friction.viscous),
             ratio: each(|axis| axis.ratio),
-            voltage: each(|axis| axis.motor.voltage),
-            current: each(|axis| axis.motor.current),
+            voltage: each(|axis| dc(axis, 0.0, |motor| motor.voltage)),
+            current: each(|axis| dc(axis, 0.0, |motor| motor.current)),
         }
     }
+}
+
+/// A value of a DC motor, or what stands for it in a stepper: a winding without current and torque.
+fn dc(axis: &Axis, other: f64, value: fn(&DcMotor) -> f64) -> f64 {
+    axis.motor.dc().map_or(other, value)
 }
 
 /// What joins motors and load.
@@ -102,6 +108,8 @@ pub struct Dynamics<const N: usize, M: Mechanism<N>> {
     motors: Motors<N>,
     transmission: Transmission<N>,
     coupling: Coupling<N, M>,
+    /// What turns steppers.
+    field: Option<Field<N>>,
     /// 1/J of each rotor.
     mobility: SVector<f64, N>,
     /// ratio/J of each rotor.
@@ -146,6 +154,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             motors,
             transmission,
             coupling,
+            field: None,
             mobility,
             reaction: motors.ratio.component_mul(&mobility),
         })
@@ -162,6 +171,16 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// Where it cannot close.
     pub fn assemble(&self, load: &Joints<N>) -> Result<M::Assembly, KinematicsError> {
         self.mechanism.assemble(load, self.mechanism.branch(), Some(self.coupling.assembly()))
+    }
+
+    /// The same with steppers, which turn in `field`.
+    pub(super) fn with_field(self, field: Option<Field<N>>) -> Self {
+        Self { field, ..self }
+    }
+
+    /// What turns steppers, to be moved on.
+    pub(super) fn field_mut(&mut self) -> Option<&mut Field<N>> {
+        self.field.as_mut()
     }
 
     /// The motors.
@@ -182,9 +201,14 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// For `s² + d·s + w²` with matrix norms `d` and `w²`, `|s| ≤ (d + √(d² + 4w²))/2`.
     pub fn fastest(&self) -> f64 {
         let motors = &self.motors;
-        let drag = motors.viscous.component_div(&motors.inertia).amax();
+        let mut drag = motors.viscous.component_div(&motors.inertia).amax();
+        let mut spring = 0.0;
+        if let Some(field) = &self.field {
+            drag += field.damping().component_div(&motors.inertia).amax();
+            spring = field.stiffness().component_div(&motors.inertia).amax();
+        }
         let Transmission::Elastic { stiffness, damping } = &self.transmission else {
-            return drag;
+            return if spring > 0.0 { bound(drag, spring) } else { drag };
         };
         let admittance = self.coupling.middle().mobility
             + SMatrix::from_diagonal(
@@ -193,9 +217,9 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         let row_sum = |matrix: SMatrix<f64, N, N>| {
             matrix.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
         };
-        let square = row_sum(admittance * stiffness);
+        let square = row_sum(admittance * stiffness) + spring;
         let linear = row_sum(admittance * damping) + drag;
-        (linear + (linear * linear + 4.0 * square).sqrt()) / 2.0
+        bound(linear, square)
     }
 
     /// Solves the load side for a substep of `step` [s] that begins in `state`.
@@ -219,8 +243,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// out: what its stiction must hold.
     pub fn net_torque(&self, state: &State<N>, contacts: &Contacts<N>, at: f64) -> SVector<f64, N> {
         let motors = &self.motors;
-        let shaft = motors.windings.torque_constant.component_mul(&state.current)
-            - motors.viscous.component_mul(&state.speed);
+        let shaft = self.driven(state) - motors.viscous.component_mul(&state.speed);
         match self.transmission {
             Transmission::Elastic { .. } => {
                 shaft - motors.ratio.component_mul(&self.transmitted(state))
@@ -232,6 +255,15 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
                 let load_side = side.inertia * load + side.bias;
                 shaft - motors.ratio.component_mul(&load_side)
             }
+        }
+    }
+
+    /// Torque of currents and fields on the rotors [N·m].
+    #[inline(always)]
+    fn driven(&self, state: &State<N>) -> SVector<f64, N> {
+        match &self.field {
+            None => self.motors.windings.torque_constant.component_mul(&state.current),
+            Some(field) => field.torque(state),
         }
     }
 
@@ -257,9 +289,8 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         side: &LoadSide<N>,
     ) -> (SVector<f64, N>, Joints<N>) {
         let motors = &self.motors;
-        let torque = motors.windings.torque_constant.component_mul(&state.current)
-            - motors.viscous.component_mul(&state.speed)
-            - contacts.torque();
+        let torque =
+            self.driven(state) - motors.viscous.component_mul(&state.speed) - contacts.torque();
         match self.transmission {
             Transmission::Elastic { .. } => {
                 let effort = self.transmitted(state);
@@ -365,6 +396,11 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         self.couple(&mut end);
         end
     }
+}
+
+/// `|s|` of `s² + linear·s + square` at most.
+fn bound(linear: f64, square: f64) -> f64 {
+    (linear + (linear * linear + 4.0 * square).sqrt()) / 2.0
 }
 
 /// Accelerations of the joints that are free, the others being held.

@@ -4,7 +4,7 @@
 use machine::kinematics::{
     Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
 };
-use machine::{AxisLimits, DcMotor, Encoder, Friction, LoopGains};
+use machine::{AxisLimits, DcMotor, Encoder, Friction, LoopGains, Motor};
 use nalgebra::{SMatrix, Vector1, Vector3};
 
 /// A rigid joint of 1 rad per radian.
@@ -101,7 +101,7 @@ pub(crate) fn axis(inertia: f64, friction: Friction) -> machine::Axis {
         name: "shaft".to_owned(),
         ratio: 1.0,
         efficiency: 1.0,
-        motor: DcMotor {
+        motor: Motor::Dc(DcMotor {
             resistance: 2.3,
             inductance: 2.3e-3,
             torque_constant: 0.021,
@@ -109,7 +109,7 @@ pub(crate) fn axis(inertia: f64, friction: Friction) -> machine::Axis {
             voltage: 12.0,
             current: 5.2,
             continuous_current: None,
-        },
+        }),
         friction,
         encoder: Encoder { counts: 4096.0 },
         gains: LoopGains { position: 40.0, velocity: 160.0, current: 349.0, inertia },

@@ -38,7 +38,7 @@ impl Findings {
     }
 
     /// What stands at `place`.
-    pub(super) fn text(&self, place: Place) -> &str {
+    pub(crate) fn text(&self, place: Place) -> &str {
         let source = self.sources.get(place.source);
         source.and_then(|source| source.text.get(place.start..place.end)).unwrap_or_default()
     }

@@ -1,11 +1,11 @@
 //! From the axes' tables to [`Axis`]: ratios, what the loops move, and the motor's own limits.
 
-use core::f64::consts::TAU;
-
-use super::tables::{AxisTable, LimitsTable};
-use crate::actuator::{Axis, DcMotor, Encoder, Friction, LoopGains};
-use crate::document::{Either, Findings, ProblemKind, Quantity, Range};
+use super::motors::{counts, motor};
+use super::tables::{AxisTable, LimitsTable, LoopsTable};
+use crate::actuator::{Axis, Friction, LoopGains};
+use crate::document::{Decode, Either, Findings, ProblemKind, Quantity, Range};
 use crate::limits::AxisLimits;
+use crate::motor::Motor;
 use crate::quantity::Kind;
 
 /// Share of the motor's no-load speed that an axis may use where the file sets no limit: what is
@@ -87,40 +87,13 @@ impl JointUnit {
     }
 }
 
-/// The axis that `table` describes, driving `joint`.
-pub(super) fn axis(table: &AxisTable, joint: &Joint, findings: &mut Findings) -> Axis {
+/// The axis that `table` describes, driving `joint`; `None` where it has no motor.
+pub(super) fn axis(table: &AxisTable, joint: &Joint, findings: &mut Findings) -> Option<Axis> {
     let gear = table.gear.value;
     let ratio = joint.travel / gear;
-    let data = &table.motor.dc;
-    let motor = DcMotor {
-        resistance: data.resistance.value,
-        inductance: data.inductance.value,
-        torque_constant: data.torque_constant.value,
-        rotor_inertia: data.rotor_inertia.value + joint.stiff_inertia / (gear * gear),
-        voltage: data.voltage.value,
-        current: data.current.value,
-        continuous_current: data.continuous_current.map(|current| current.value),
-    };
-    if let Some(continuous) = data.continuous_current
-        && continuous.value > data.current.value
-    {
-        findings.contradict(
-            continuous.place,
-            format!(
-                "the continuous current of {:.3} A is above the power stage's {:.3} A",
-                continuous.value, data.current.value
-            ),
-            "lower `continuous_current`, or raise `current`",
-        );
-    }
-    if data.nominal_torque.is_some() != data.nominal_speed.is_some() {
-        findings.contradict(
-            data.place,
-            "`nominal_torque` and `nominal_speed` only say something together".to_owned(),
-            "give both or none",
-        );
-    }
-    Axis {
+    let motor = motor(table, joint, findings)?;
+    let inertia = motor.rotor_inertia() + ratio * ratio * joint.load;
+    Some(Axis {
         name: joint.name.to_owned(),
         ratio,
         efficiency: table.efficiency.value,
@@ -129,30 +102,24 @@ pub(super) fn axis(table: &AxisTable, joint: &Joint, findings: &mut Findings) ->
             coulomb: table.friction.coulomb.value,
             viscous: table.friction.viscous.value,
         },
-        encoder: encoder(table, findings),
-        gains: gains(table, motor.rotor_inertia + ratio * ratio * joint.load, findings),
+        encoder: counts(table, &motor, findings)?,
+        gains: match motor {
+            Motor::Dc(_) => gains(table, inertia, findings)?,
+            Motor::Stepper(_) => LoopGains { position: 0.0, velocity: 0.0, current: 0.0, inertia },
+        },
         limits: limits(&table.limits, joint, &motor, ratio, findings),
-    }
+    })
 }
 
-fn encoder(table: &AxisTable, findings: &mut Findings) -> Encoder {
-    /// Rounding of a resolution that was written per radian or per degree.
-    const WHOLE: f64 = 1e-6;
-    let resolution = table.encoder.resolution;
-    let counts = (resolution.value * TAU).round();
-    if counts < 1.0 || (resolution.value * TAU - counts).abs() > WHOLE * counts {
-        findings.refuse(
-            ProblemKind::OutOfRange,
-            resolution.place,
-            format!("{} counts in a revolution cannot be", resolution.value * TAU),
-            Some("an encoder has a whole number of counts, such as \"4096 counts/rev\"".to_owned()),
-        );
-    }
-    Encoder { counts }
-}
-
-fn gains(table: &AxisTable, inertia: f64, findings: &mut Findings) -> LoopGains {
-    let loops = &table.loops;
+fn gains(table: &AxisTable, inertia: f64, findings: &mut Findings) -> Option<LoopGains> {
+    let defaults;
+    let loops = match &table.loops {
+        Some(loops) => loops,
+        None => {
+            defaults = LoopsTable::absent(table.place, findings)?;
+            &defaults
+        }
+    };
     // A loop that answers within its own cycle cannot be stable.
     let fastest = 1.0 / signals::time::CYCLE_TIME;
     for bandwidth in [loops.position, loops.velocity, loops.current] {
@@ -182,18 +149,18 @@ fn gains(table: &AxisTable, inertia: f64, findings: &mut Findings) -> LoopGains 
             );
         }
     }
-    LoopGains {
+    Some(LoopGains {
         position: loops.position.value,
         velocity: loops.velocity.value,
         current: loops.current.value,
         inertia,
-    }
+    })
 }
 
 fn limits(
     table: &LimitsTable,
     joint: &Joint,
-    motor: &DcMotor,
+    motor: &Motor,
     ratio: f64,
     findings: &mut Findings,
 ) -> AxisLimits {
@@ -255,7 +222,7 @@ fn limits(
             [lower.value, upper.value]
         }
     };
-    let no_load = motor.voltage / motor.torque_constant * ratio;
+    let no_load = motor.largest_speed() * ratio;
     if let Some(velocity) = table.velocity
         && velocity.value > no_load
     {

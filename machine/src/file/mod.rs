@@ -4,6 +4,7 @@
 mod axes;
 mod doubts;
 pub mod mechanism;
+mod motors;
 pub mod tables;
 mod validate;
 

@@ -170,12 +170,12 @@ table! {
         pub motor: MotorTable,
         /// Friction, all of it seen at the motor shaft.
         pub friction: FrictionTable,
-        /// The encoder on the motor shaft.
-        pub encoder: EncoderTable,
+        /// The encoder on the motor shaft; a stepper has none.
+        pub encoder: Option<EncoderTable>,
         /// Limits beyond those of the path.
         pub limits: LimitsTable,
-        /// Bandwidths of the control loops.
-        pub loops: LoopsTable,
+        /// Bandwidths of the control loops; a stepper has none.
+        pub loops: Option<LoopsTable>,
     }
 }
 
@@ -183,7 +183,9 @@ table! {
     /// The motor: exactly one of these.
     pub struct MotorTable {
         /// A brushed permanent-magnet motor.
-        pub dc: DcMotorTable,
+        pub dc: Option<DcMotorTable>,
+        /// A two-phase hybrid stepper, rotating or linear.
+        pub stepper: Option<StepperMotorTable>,
     }
 }
 
@@ -208,6 +210,35 @@ table! {
         pub nominal_torque: Option<Above<unit::Torque>>,
         /// Speed at which it promises that torque.
         pub nominal_speed: Option<Above<unit::AngularSpeed>>,
+    }
+}
+
+table! {
+    /// A two-phase hybrid stepper with its driver and supply. A linear one is unrolled: 4 full steps
+    /// to a turn, whose lead is the tooth pitch; its torque is its force times `lead/2π`.
+    pub struct StepperMotorTable {
+        /// Full steps in a turn, a multiple of 4.
+        pub full_steps: Number<Positive> = 200.0,
+        /// Pulses per full step.
+        pub microsteps: Number<Positive> = 16.0,
+        /// Largest torque at standstill with both phases at rated current.
+        pub holding_torque: Above<unit::Torque>,
+        /// Torque of the unpowered motor.
+        pub detent_torque: AtLeastZero<unit::Torque> = "0 N m",
+        /// Moment of inertia of the rotor.
+        pub rotor_inertia: Above<unit::Inertia>,
+        /// Peak current of a phase that gives the holding torque.
+        pub current: Above<unit::Current>,
+        /// Resistance of a phase.
+        pub resistance: Above<unit::Resistance>,
+        /// Inductance of a phase.
+        pub inductance: Above<unit::Inductance>,
+        /// Voltage of the supply.
+        pub voltage: Above<unit::Voltage>,
+        /// Damping that the driver gives the rotor.
+        pub damping: AtLeastZero<unit::TorsionalDamping> = "0 N m s/rad",
+        /// Largest pulse rate of the driver.
+        pub pulse_rate: Above<unit::PulseRate> = "200 kHz",
     }
 }
 

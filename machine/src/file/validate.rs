@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::axes::{Joint, axis};
 use super::doubts;
 use super::mechanism::{self, Built};
+use super::motors;
 use super::tables::{AreaTable, AxisTable, MachineTable, OriginsTable};
 use crate::document::{
     Document, DocumentError, Findings, Located, Named, Place, Point, ProblemKind, nearest,
@@ -27,12 +28,17 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     };
     let mut axes = Vec::with_capacity(joints.len());
     let mut warnings = Vec::new();
-    for (axis_table, joint) in tables.into_iter().zip(&joints) {
-        let axis = axis(axis_table, joint, &mut findings);
-        warnings.extend(doubts::of_motor(joint.name, &axis_table.motor.dc, &findings));
+    for (axis_table, joint) in tables.iter().copied().zip(&joints) {
+        let Some(axis) = axis(axis_table, joint, &mut findings) else { continue };
+        if let Some(dc) = &axis_table.motor.dc {
+            warnings.extend(doubts::of_motor(joint.name, dc, &findings));
+        }
         let speeds = [&table.path.speed, &table.path.rapid];
         warnings.extend(doubts::of_speeds(speeds, joint, &axis, &findings));
         axes.push(axis);
+    }
+    if axes.len() == tables.len() {
+        motors::of_one_kind(tables.into_iter().zip(&axes), &mut findings);
     }
     warnings.extend(
         mechanism::damping_ratios(&table).filter_map(|ratio| doubts::of_damping(ratio, &findings)),

@@ -99,4 +99,6 @@ kinds! {
     TravelJerk = "a jerk", "500" "m/s^3", [1, 0, -3, 0, 0, 0] [0, 0, -3, 0, 1, 0];
     /// Of a spring between motor and joint, [N/m] or [N·m/rad].
     JointStiffness = "a stiffness", "60" "N/mm", [0, 1, -2, 0, 0, 0] [2, 1, -2, 0, -1, 0];
+    /// [rad/s]: 2π for each pulse a second, as of every frequency.
+    PulseRate = "a pulse rate", "200" "kHz", [0, 0, -1, 0, 1, 0];
 }

@@ -11,9 +11,9 @@ mod unit;
 
 pub use kind::{
     Acceleration, Angle, AngularSpeed, Bandwidth, CountsPerTurn, Current, Damping, Duration, Force,
-    Inductance, Inertia, Jerk, JointStiffness, Kind, Lead, Length, Mass, Modulus, Resistance,
-    SecondMoment, Speed, Stiffness, Torque, TorqueConstant, TorsionalDamping, TorsionalStiffness,
-    Travel, TravelAcceleration, TravelJerk, TravelSpeed, Voltage,
+    Inductance, Inertia, Jerk, JointStiffness, Kind, Lead, Length, Mass, Modulus, PulseRate,
+    Resistance, SecondMoment, Speed, Stiffness, Torque, TorqueConstant, TorsionalDamping,
+    TorsionalStiffness, Travel, TravelAcceleration, TravelJerk, TravelSpeed, Voltage,
 };
 pub use parse::{QuantityError, QuantityErrorKind};
 pub use unit::Dimension;

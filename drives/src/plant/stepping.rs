@@ -1,0 +1,190 @@
+//! Steppers with their drivers: a magnetic axis that jumps with each pulse, and a rotor that
+//! follows it as if on a spring.
+//!
+//! The driver's two currents settle within the winding's `L/V`, tens of microseconds, here at once;
+//! what the supply cannot drive at speed is in the pull-out torque. The axis' position is what the
+//! pulses say: what the rotor does about it, nobody measures. A rotor more than two full steps away
+//! has fallen out of step, which this plant knows, and reports as a fault; a real driver may not.
+//!
+//! Unpowered, only the teeth hold the rotor. The count then follows it, as if it were homed anew
+//! when the power comes back.
+
+use machine::{Axis, StepperMotor};
+use nalgebra::SVector;
+use signals::CommandMode;
+
+use super::brake;
+use super::dynamics::State;
+use crate::port::{Actuation, Freshness};
+use crate::pulses::{Segment, count};
+
+/// Rounding by which a pulse rate may exceed its limit.
+const EXCESS: f64 = 1.001;
+
+/// The motors' torque at one state of their drivers.
+#[derive(Debug, Clone, Copy)]
+pub struct Field<const N: usize> {
+    motors: [StepperMotor; N],
+    /// Angles of the rotors at home, where a full step is [rad].
+    origin: SVector<f64, N>,
+    /// Whether the phases are driven.
+    powered: bool,
+    /// The magnetic axes [rad].
+    angle: SVector<f64, N>,
+    /// How fast the commanded angles move [rad/s].
+    speed: SVector<f64, N>,
+}
+
+impl<const N: usize> Field<N> {
+    /// Torque on the rotors [N·m].
+    pub fn torque(&self, state: &State<N>) -> SVector<f64, N> {
+        SVector::from_fn(|row, _| {
+            let motor = &self.motors[row];
+            let (angle, speed) = (state.angle[row], state.speed[row]);
+            let teeth = motor.teeth_torque(angle - self.origin[row]);
+            if !self.powered {
+                return teeth;
+            }
+            let spring = motor.field_torque(motor.pull_out_torque(speed), self.angle[row] - angle);
+            spring + motor.damping * (self.speed[row] - speed) + teeth
+        })
+    }
+
+    /// The rotors' springs [N·m/rad], at their stiffest.
+    pub(super) fn stiffness(&self) -> SVector<f64, N> {
+        SVector::from_fn(|row, _| {
+            let motor = &self.motors[row];
+            motor.stiffness() + 4.0 * motor.periods() * motor.detent_torque
+        })
+    }
+
+    /// The drivers' damping [N·m·s/rad].
+    pub(super) fn damping(&self) -> SVector<f64, N> {
+        SVector::from_fn(|row, _| self.motors[row].damping)
+    }
+}
+
+/// Something that the drivers or the rotors cannot do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Failure {
+    pub(super) axis: usize,
+    pub(super) value: f64,
+    pub(super) limit: f64,
+}
+
+/// The drivers of all axes.
+#[derive(Debug, Clone)]
+pub(super) struct Stepping<const N: usize> {
+    motors: [StepperMotor; N],
+    deceleration: [f64; N],
+    /// Commanded angles at home [rad]; pulses count from there.
+    origin: SVector<f64, N>,
+    /// Commanded angles from home through the cycle at hand.
+    segments: [Segment; N],
+}
+
+impl<const N: usize> Stepping<N> {
+    /// The drivers of `axes`, at home with the magnetic axes at `origin` [rad]; `None` where the
+    /// axes have no steppers.
+    pub(super) fn of(axes: &[Axis; N], origin: SVector<f64, N>) -> Option<Self> {
+        let mut motors = axes.iter().map(|axis| axis.motor.stepper().copied());
+        let first = motors.next()??;
+        let mut all = [first; N];
+        for (slot, motor) in all[1..].iter_mut().zip(motors) {
+            *slot = motor?;
+        }
+        Some(Self {
+            motors: all,
+            deceleration: core::array::from_fn(|row| brake::deceleration(&axes[row])),
+            origin,
+            segments: [Segment::rest(0.0); N],
+        })
+    }
+
+    /// The unpowered field of rotors whose teeth stand on a full step at `rotor` [rad].
+    pub(super) fn field(&self, rotor: SVector<f64, N>) -> Field<N> {
+        Field {
+            motors: self.motors,
+            origin: rotor,
+            powered: false,
+            angle: self.origin,
+            speed: SVector::zeros(),
+        }
+    }
+
+    /// Takes what the next cycle shall do.
+    ///
+    /// # Errors
+    /// A pulse rate beyond a driver's limit; the cycle is then left as it was.
+    pub(super) fn engage(
+        &mut self,
+        actuation: &Actuation,
+        state: &State<N>,
+    ) -> Result<(), Failure> {
+        let mut segments = self.segments;
+        for (row, segment) in segments.iter_mut().enumerate() {
+            let motor = &self.motors[row];
+            *segment = match (actuation.mode, actuation.freshness) {
+                (CommandMode::Disabled, _) => Segment::rest(state.angle[row] - self.origin[row]),
+                (CommandMode::Position, Freshness::Fresh) => segment
+                    .then(actuation.position[row] - self.origin[row], actuation.velocity[row]),
+                // Nobody said where to: on as before, for the few cycles that the bridge allows.
+                (CommandMode::Position, Freshness::Stale) => segment.coast(),
+                _ => segment.brake(self.deceleration[row]),
+            };
+            let rate = segment.fastest() * motor.pulses_per_radian();
+            let follows = actuation.mode == CommandMode::Position;
+            if follows && (rate > motor.pulse_rate * EXCESS || rate.is_nan()) {
+                return Err(Failure { axis: row, value: rate, limit: motor.pulse_rate });
+            }
+        }
+        self.segments = segments;
+        Ok(())
+    }
+
+    /// Puts the field where the pulses have it at the share `at` of the cycle.
+    pub(super) fn drive(&self, field: &mut Field<N>, at: f64, mode: CommandMode) {
+        field.powered = mode != CommandMode::Disabled;
+        for (row, segment) in self.segments.iter().enumerate() {
+            let (angle, speed) = segment.at(at);
+            field.angle[row] = self.origin[row] + self.stepped(row, angle);
+            field.speed[row] = speed;
+        }
+    }
+
+    /// Whether all rotors are in step with `field`.
+    ///
+    /// # Errors
+    /// One that is not, with how far it is off [rad].
+    pub(super) fn in_step(&self, field: &Field<N>, state: &State<N>) -> Result<(), Failure> {
+        for (row, motor) in self.motors.iter().enumerate() {
+            let lag = (field.angle[row] - state.angle[row]).abs();
+            let limit = motor.stall_angle();
+            if field.powered && (lag > limit || lag.is_nan()) {
+                return Err(Failure { axis: row, value: lag, limit });
+            }
+        }
+        Ok(())
+    }
+
+    /// Pulses sent to the end of the cycle.
+    pub(super) fn counts(&self) -> [i64; N] {
+        core::array::from_fn(|row| count(self.per_radian(row), self.segments[row].to))
+    }
+
+    /// Slows all axes down in the next cycle.
+    pub(super) fn brake(&mut self) {
+        for (segment, deceleration) in self.segments.iter_mut().zip(&self.deceleration) {
+            *segment = segment.brake(*deceleration);
+        }
+    }
+
+    fn per_radian(&self, row: usize) -> f64 {
+        self.motors[row].pulses_per_radian()
+    }
+
+    /// `angle` from home as whole pulses [rad].
+    fn stepped(&self, row: usize, angle: f64) -> f64 {
+        count(self.per_radian(row), angle) as f64 / self.per_radian(row)
+    }
+}

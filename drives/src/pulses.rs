@@ -1,0 +1,252 @@
+//! Step pulses: how many, and when inside a cycle.
+//!
+//! A stepper's driver is told a position by pulses, `N = ⌊K·θ + ½⌋` for the commanded angle θ from
+//! home with `K` pulses per radian. The count is absolute: it follows from the angle at hand alone,
+//! so that nothing adds up over a job. A pulse falls where `K·θ` passes a half-integer, to the
+//! nanosecond, along the cubic that joins the angles and speeds at both ends of the cycle.
+
+use signals::Nanoseconds;
+use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
+
+/// Bisections after which a crossing is known to 2⁻⁴⁰ of a cycle, 1 fs.
+const BISECTIONS: usize = 40;
+
+/// A commanded angle through one cycle.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Segment {
+    /// Angle at its start [rad].
+    pub from: f64,
+    /// Speed at its start [rad/s].
+    pub from_speed: f64,
+    /// Angle at its end [rad].
+    pub to: f64,
+    /// Speed at its end [rad/s].
+    pub to_speed: f64,
+}
+
+/// Which way a pulse steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// Towards larger angles.
+    Up,
+    /// Towards smaller ones.
+    Down,
+}
+
+/// One pulse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pulse {
+    /// When, from the start of the cycle.
+    pub offset: Nanoseconds,
+    /// Which way.
+    pub direction: Direction,
+}
+
+/// Pulses sent by the time the commanded angle from home is `angle` [rad].
+pub fn count(per_radian: f64, angle: f64) -> i64 {
+    (per_radian * angle + 0.5).floor() as i64
+}
+
+impl Segment {
+    /// At rest at `angle` [rad].
+    pub fn rest(angle: f64) -> Self {
+        Self { from: angle, to: angle, ..Self::default() }
+    }
+
+    /// What comes after this one at an even speed.
+    pub fn coast(&self) -> Self {
+        let speed = self.to_speed;
+        self.then(self.to + speed * CYCLE_TIME, speed)
+    }
+
+    /// What comes after this one, to `angle` [rad] and `speed` [rad/s] at its end.
+    pub fn then(&self, angle: f64, speed: f64) -> Self {
+        Self { from: self.to, from_speed: self.to_speed, to: angle, to_speed: speed }
+    }
+
+    /// What comes after this one, slowing down by `deceleration` [rad/s²] or to rest.
+    pub fn brake(&self, deceleration: f64) -> Self {
+        let speed = self.to_speed;
+        let left = speed.abs() - deceleration * CYCLE_TIME;
+        if left > 0.0 {
+            let end = left * speed.signum();
+            return self.then(self.to + 0.5 * (speed + end) * CYCLE_TIME, end);
+        }
+        self.then(self.to + 0.5 * speed * speed.abs() / deceleration, 0.0)
+    }
+
+    /// Angle [rad] and speed [rad/s] at the share `at` of the cycle; exactly its ends at 0 and 1.
+    pub fn at(&self, at: f64) -> (f64, f64) {
+        let (slope, square, cube) = self.coefficients();
+        let speed = (slope + at * (2.0 * square + at * 3.0 * cube)) / CYCLE_TIME;
+        let angle = match at {
+            1.0 => self.to,
+            _ => self.from + at * (slope + at * (square + at * cube)),
+        };
+        (angle, speed)
+    }
+
+    /// The largest |speed| inside it [rad/s].
+    pub fn fastest(&self) -> f64 {
+        let (_, square, cube) = self.coefficients();
+        let turn = -square / (3.0 * cube);
+        let inside = if turn > 0.0 && turn < 1.0 { self.at(turn).1.abs() } else { 0.0 };
+        self.from_speed.abs().max(self.to_speed.abs()).max(inside)
+    }
+
+    /// Gives `each` the pulses of the cycle in order, at `per_radian` pulses per radian.
+    ///
+    /// They take the count from that of [`Segment::from`] to that of [`Segment::to`].
+    pub fn pulses(&self, per_radian: f64, mut each: impl FnMut(Pulse)) {
+        let (first, second) = self.turns();
+        for (start, end) in [(0.0, first), (first, second), (second, 1.0)] {
+            if start >= end {
+                continue;
+            }
+            let level = |at: f64| per_radian * self.at(at).0 + 0.5;
+            let (low, high) = (level(start).floor(), level(end).floor());
+            let rising = high > low;
+            let mut reached = low;
+            let mut begin = start;
+            while reached != high {
+                // The count becomes n where the level comes up to n, and n − 1 where it falls below.
+                let passed = if rising { reached + 1.0 } else { reached };
+                begin = crossing(level, passed, begin, end, rising);
+                let direction = if rising { Direction::Up } else { Direction::Down };
+                let offset = (begin * CYCLE_PERIOD.0 as f64).round() as i64;
+                each(Pulse { offset: Nanoseconds(offset), direction });
+                reached += if rising { 1.0 } else { -1.0 };
+            }
+        }
+    }
+
+    /// Slope, square and cube of the angle in the share of the cycle.
+    fn coefficients(&self) -> (f64, f64, f64) {
+        let rise = self.to - self.from;
+        let (slope, last) = (self.from_speed * CYCLE_TIME, self.to_speed * CYCLE_TIME);
+        (slope, 3.0 * rise - 2.0 * slope - last, slope + last - 2.0 * rise)
+    }
+
+    /// Shares of the cycle between which, and beside which, the motion keeps its direction.
+    fn turns(&self) -> (f64, f64) {
+        let (slope, square, cube) = self.coefficients();
+        let discriminant = square * square - 3.0 * cube * slope;
+        if discriminant.is_nan() || discriminant <= 0.0 {
+            return (1.0, 1.0);
+        }
+        // The stable pair of the roots of slope + 2·square·s + 3·cube·s².
+        let sum = -(square + square.signum() * discriminant.sqrt());
+        let inside = |root: f64| if root > 0.0 && root < 1.0 { root } else { 1.0 };
+        let (one, two) = (inside(sum / (3.0 * cube)), inside(slope / sum));
+        (one.min(two), one.max(two))
+    }
+}
+
+/// Where a monotonic `level` passes `value` between `start` and `end`.
+fn crossing(level: impl Fn(f64) -> f64, value: f64, start: f64, end: f64, rising: bool) -> f64 {
+    let (mut before, mut after) = (start, end);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (before + after);
+        if (level(middle) >= value) == rising {
+            after = middle;
+        } else {
+            before = middle;
+        }
+    }
+    after
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PER_RADIAN: f64 = 3200.0 / core::f64::consts::TAU;
+
+    fn all(segment: &Segment) -> Vec<Pulse> {
+        let mut pulses = Vec::new();
+        segment.pulses(PER_RADIAN, |pulse| pulses.push(pulse));
+        pulses
+    }
+
+    fn sum(pulses: &[Pulse]) -> i64 {
+        pulses.iter().map(|pulse| if pulse.direction == Direction::Up { 1 } else { -1 }).sum()
+    }
+
+    #[test]
+    fn an_even_speed_gives_even_pulses_at_the_half_integers() {
+        // 10 pulses in a cycle, from 0: they fall at 0.05, 0.15, … of it.
+        let speed = 10.0 / PER_RADIAN / CYCLE_TIME;
+        let segment =
+            Segment { from: 0.0, from_speed: speed, to: 10.0 / PER_RADIAN, to_speed: speed };
+        let offsets: Vec<i64> = all(&segment).iter().map(|pulse| pulse.offset.0).collect();
+        let expected: Vec<i64> = (0..10).map(|index| 50_000 + 100_000 * index).collect();
+        assert_eq!(offsets, expected);
+        assert_eq!(count(PER_RADIAN, segment.to), 10);
+    }
+
+    #[test]
+    fn pulses_of_an_acceleration_fall_where_the_parabola_says() {
+        // From rest to 32 pulses a cycle: θ = 16·s² pulses, so pulse n at √((n − ½)/16).
+        let unit = 1.0 / PER_RADIAN;
+        let segment = Segment {
+            from: 0.0,
+            from_speed: 0.0,
+            to: 16.0 * unit,
+            to_speed: 32.0 * unit / CYCLE_TIME,
+        };
+        let pulses = all(&segment);
+        assert_eq!(pulses.len(), 16);
+        for (index, pulse) in pulses.iter().enumerate() {
+            let exact = ((index as f64 + 0.5) / 16.0).sqrt() * 1e6;
+            assert!((pulse.offset.0 as f64 - exact).abs() <= 0.51, "{pulse:?} {exact}");
+        }
+        assert!((segment.fastest() * PER_RADIAN * CYCLE_TIME - 32.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_reversal_steps_up_and_down_again() {
+        // 3.2 pulses up and back: θ = 12.8·s·(1 − s).
+        let unit = 1.0 / PER_RADIAN;
+        let speed = 12.8 * unit / CYCLE_TIME;
+        let segment = Segment { from: 0.0, from_speed: speed, to: 0.0, to_speed: -speed };
+        let pulses = all(&segment);
+        let directions: Vec<_> = pulses.iter().map(|pulse| pulse.direction).collect();
+        assert_eq!(directions, [[Direction::Up; 3], [Direction::Down; 3]].concat());
+        for (up, down) in pulses[..3].iter().zip(pulses[3..].iter().rev()) {
+            assert!((up.offset.0 + down.offset.0 - 1_000_000).abs() <= 1, "{up:?} {down:?}");
+        }
+    }
+
+    #[test]
+    fn the_count_is_absolute_over_200_segments() {
+        let mut sent = 0;
+        let mut segment = Segment::rest(0.0);
+        let mut last = 0;
+        for index in 1..=200_i64 {
+            let phase = 0.063 * index as f64;
+            let (sine, cosine) = signals::math::sin_cos(phase);
+            // An odd amplitude, and a drift, so that no angle falls on a pulse.
+            let angle = 0.037 * sine + 1.3e-3 * index as f64;
+            segment = segment.then(angle, (0.037 * 0.063 * cosine + 1.3e-3) / CYCLE_TIME);
+            let pulses = all(&segment);
+            sent += sum(&pulses);
+            assert_eq!(sent, count(PER_RADIAN, angle), "segment {index}");
+            assert!(pulses.is_sorted_by_key(|pulse| pulse.offset.0));
+            assert!(pulses.iter().all(|pulse| (0..=1_000_000).contains(&pulse.offset.0)));
+            last = pulses.len().max(last);
+        }
+        assert_eq!(sent, (PER_RADIAN * segment.to).round() as i64);
+        assert!(last > 1);
+    }
+
+    #[test]
+    fn braking_ends_where_the_deceleration_says() {
+        let mut segment = Segment { from: 0.0, from_speed: 9.3, to: 0.0093, to_speed: 9.3 };
+        let exact = segment.to + 9.3 * 9.3 / (2.0 * 700.0);
+        for _ in 0..20 {
+            segment = segment.brake(700.0);
+        }
+        assert_eq!(segment.to_speed, 0.0);
+        assert!((segment.to - exact).abs() < 1e-12, "{} {exact}", segment.to);
+    }
+}

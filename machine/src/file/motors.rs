@@ -1,0 +1,172 @@
+//! From the motors' tables to [`Motor`], and what their positions are counted in.
+
+use core::f64::consts::TAU;
+
+use super::axes::Joint;
+use super::tables::{AxisTable, DcMotorTable, StepperMotorTable};
+use crate::actuator::{Axis, Encoder};
+use crate::document::{Findings, Number, Positive, ProblemKind};
+use crate::motor::{DcMotor, Motor, StepperMotor};
+
+/// Rounding of a whole number that was computed from other units.
+const WHOLE: f64 = 1e-6;
+
+/// The motor of `table`, which drives `joint`; `None` where there is not exactly one.
+pub(super) fn motor(table: &AxisTable, joint: &Joint, findings: &mut Findings) -> Option<Motor> {
+    let stiff = joint.stiff_inertia / (table.gear.value * table.gear.value);
+    match (&table.motor.dc, &table.motor.stepper) {
+        (Some(data), None) => Some(Motor::Dc(dc(data, stiff, findings))),
+        (None, Some(data)) => Some(Motor::Stepper(stepper(data, stiff, findings))),
+        (None, None) => {
+            findings.refuse(
+                ProblemKind::MissingKey,
+                table.motor.place,
+                format!("axis `{}` has no motor", joint.name),
+                Some(format!(
+                    "add [axis.{name}.motor.dc] or [axis.{name}.motor.stepper]",
+                    name = joint.name
+                )),
+            );
+            None
+        }
+        (Some(dc), Some(stepper)) => {
+            findings.contradict(
+                dc.place.max(stepper.place),
+                format!("axis `{}` has two motors", joint.name),
+                "keep either the table `dc` or the table `stepper`",
+            );
+            None
+        }
+    }
+}
+
+fn dc(data: &DcMotorTable, stiff_inertia: f64, findings: &mut Findings) -> DcMotor {
+    if let Some(continuous) = data.continuous_current
+        && continuous.value > data.current.value
+    {
+        findings.contradict(
+            continuous.place,
+            format!(
+                "the continuous current of {:.3} A is above the power stage's {:.3} A",
+                continuous.value, data.current.value
+            ),
+            "lower `continuous_current`, or raise `current`",
+        );
+    }
+    if data.nominal_torque.is_some() != data.nominal_speed.is_some() {
+        findings.contradict(
+            data.place,
+            "`nominal_torque` and `nominal_speed` only say something together".to_owned(),
+            "give both or none",
+        );
+    }
+    DcMotor {
+        resistance: data.resistance.value,
+        inductance: data.inductance.value,
+        torque_constant: data.torque_constant.value,
+        rotor_inertia: data.rotor_inertia.value + stiff_inertia,
+        voltage: data.voltage.value,
+        current: data.current.value,
+        continuous_current: data.continuous_current.map(|current| current.value),
+    }
+}
+
+fn stepper(data: &StepperMotorTable, stiff_inertia: f64, findings: &mut Findings) -> StepperMotor {
+    let mut whole = |number: &Number<Positive>, of: f64, due: &str| {
+        let rounded = (number.value / of).round();
+        if rounded < 1.0 || (number.value / of - rounded).abs() > WHOLE {
+            findings.refuse(
+                ProblemKind::OutOfRange,
+                number.place,
+                format!("{} of them cannot be", number.value),
+                Some(due.to_owned()),
+            );
+        }
+        rounded * of
+    };
+    let full_steps =
+        whole(&data.full_steps, 4.0, "a two-phase motor has 4 full steps a period, such as 200");
+    let microsteps = whole(&data.microsteps, 1.0, "a driver divides into whole parts, such as 16");
+    let driven = data.voltage.value / data.resistance.value;
+    if driven < data.current.value {
+        findings.contradict(
+            data.current.place,
+            format!(
+                "{:.1} V across {:.3} Ω drive at most {driven:.2} A, not {:.2} A",
+                data.voltage.value, data.resistance.value, data.current.value
+            ),
+            "raise `voltage`, or give `current` and `holding_torque` as the supply can drive them",
+        );
+    }
+    StepperMotor {
+        full_steps,
+        microsteps,
+        holding_torque: data.holding_torque.value,
+        detent_torque: data.detent_torque.value,
+        rotor_inertia: data.rotor_inertia.value + stiff_inertia,
+        current: data.current.value,
+        resistance: data.resistance.value,
+        inductance: data.inductance.value,
+        voltage: data.voltage.value,
+        damping: data.damping.value,
+        pulse_rate: data.pulse_rate.value / TAU,
+    }
+}
+
+/// What the position of `motor` is counted in; `None` where that is not said.
+pub(super) fn counts(table: &AxisTable, motor: &Motor, findings: &mut Findings) -> Option<Encoder> {
+    if let Motor::Stepper(motor) = motor {
+        let extra = [
+            table.encoder.as_ref().map(|encoder| (encoder.place, "encoder")),
+            table.loops.as_ref().map(|loops| (loops.place, "loops")),
+        ];
+        for (place, key) in extra.into_iter().flatten() {
+            findings.contradict(
+                place,
+                format!("an axis with a stepper has no `{key}`"),
+                "remove the table: a stepper counts its pulses, and no loop is closed",
+            );
+        }
+        return Some(Encoder { counts: motor.pulses_per_turn() });
+    }
+    let Some(encoder) = &table.encoder else {
+        let axis = findings.text(table.place).to_owned();
+        findings.refuse(
+            ProblemKind::MissingKey,
+            table.place,
+            format!("`encoder` is missing in the table `{axis}`"),
+            Some(format!("add the table `encoder` to the table `{axis}`")),
+        );
+        return None;
+    };
+    let resolution = encoder.resolution;
+    let counts = (resolution.value * TAU).round();
+    if counts < 1.0 || (resolution.value * TAU - counts).abs() > WHOLE * counts {
+        findings.refuse(
+            ProblemKind::OutOfRange,
+            resolution.place,
+            format!("{} counts in a revolution cannot be", resolution.value * TAU),
+            Some("an encoder has a whole number of counts, such as \"4096 counts/rev\"".to_owned()),
+        );
+    }
+    Some(Encoder { counts })
+}
+
+/// Refuses axes whose motors are not all of one kind: one command drives them all, by voltage or by
+/// position.
+pub(super) fn of_one_kind<'a>(
+    axes: impl IntoIterator<Item = (&'a AxisTable, &'a Axis)>,
+    findings: &mut Findings,
+) {
+    let mut axes = axes.into_iter();
+    let Some((_, first)) = axes.next() else { return };
+    for (table, axis) in axes {
+        if axis.motor.dc().is_some() != first.motor.dc().is_some() {
+            findings.contradict(
+                table.motor.place,
+                format!("axes `{}` and `{}` have motors of different kinds", first.name, axis.name),
+                "give all axes DC motors, or all of them steppers",
+            );
+        }
+    }
+}

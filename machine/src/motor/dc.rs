@@ -1,0 +1,94 @@
+//! The brushed permanent-magnet motor.
+
+/// A permanent-magnet DC motor (source 003 sec. 3.3): `V = R·i + L·i′ + k·ω`, torque `k·i`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DcMotor {
+    /// Winding resistance [Ω].
+    pub resistance: f64,
+    /// Winding inductance [H].
+    pub inductance: f64,
+    /// Torque constant [N·m/A], equal to the back-EMF constant [V·s/rad].
+    pub torque_constant: f64,
+    /// Inertia at the shaft on the motor's side of the transmission's spring [kg·m²]: the rotor,
+    /// and what turns with it stiffly, such as a screw through its gear (`J_screw/i²`).
+    pub rotor_inertia: f64,
+    /// Largest voltage that the supply can apply [V].
+    pub voltage: f64,
+    /// Largest current that the power stage may command [A].
+    pub current: f64,
+    /// Current that the winding bears for ever [A]; `None` where the file does not say.
+    pub continuous_current: Option<f64>,
+}
+
+impl DcMotor {
+    /// Current for a steady `torque` [N·m], in A.
+    pub fn current_for(&self, torque: f64) -> f64 {
+        torque / self.torque_constant
+    }
+
+    /// Voltage for a steady `torque` [N·m] at `speed` [rad/s], in V.
+    pub fn voltage_for(&self, torque: f64, speed: f64) -> f64 {
+        self.resistance * self.current_for(torque) + self.torque_constant * speed
+    }
+
+    /// Speed at which the back-EMF takes the whole supply [rad/s].
+    pub fn no_load_speed(&self) -> f64 {
+        self.voltage / self.torque_constant
+    }
+
+    /// Torque at standstill: what the power stage's current gives, or what the supply drives
+    /// through the winding, whichever is less [N·m].
+    pub fn stall_torque(&self) -> f64 {
+        self.torque_constant * self.current.min(self.voltage / self.resistance)
+    }
+
+    /// Largest steady torque in the direction of motion at `speed` [rad/s], in N·m; below 0 where
+    /// the back-EMF exceeds the supply.
+    pub fn torque_at(&self, speed: f64) -> f64 {
+        let left = self.voltage - self.torque_constant * speed.abs();
+        self.torque_constant * self.current.min(left / self.resistance)
+    }
+
+    /// The winding's mean square current [A²] after `step` [s] at `current` [A], from `mean_square`
+    /// before it, averaged over `time` [s]: the I²t measure of its heating.
+    pub fn heated(mean_square: f64, current: f64, step: f64, time: f64) -> f64 {
+        mean_square + (current * current - mean_square) * (step / time)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// EC035.120 of source 003.
+    const MOTOR: DcMotor = DcMotor {
+        resistance: 2.3,
+        inductance: 2.3e-3,
+        torque_constant: 0.021,
+        rotor_inertia: 2e-6,
+        voltage: 12.0,
+        current: 5.2,
+        continuous_current: None,
+    };
+
+    #[test]
+    fn the_voltage_line_bounds_torque_and_speed() {
+        assert!((MOTOR.no_load_speed() - 571.428_571).abs() < 1e-6);
+        // 12 V across 2.3 Ω drive 5.217 A, above the 5.2 A of the power stage.
+        assert!((MOTOR.stall_torque() - 0.1092).abs() < 1e-12);
+        let torque = MOTOR.torque_at(300.0);
+        assert!((torque - 0.021 * (12.0 - 6.3) / 2.3).abs() < 1e-15, "{torque}");
+        assert!((MOTOR.voltage_for(torque, 300.0) - 12.0).abs() < 1e-12);
+        assert!(MOTOR.torque_at(600.0) < 0.0);
+    }
+
+    #[test]
+    fn heating_tends_to_the_square_of_the_current() {
+        let mut heat = 0.0;
+        for _ in 0..5000 {
+            heat = DcMotor::heated(heat, 2.0, 1e-3, 5.0);
+        }
+        // One time constant: 1 − (1 − T/τ)^5000.
+        assert!((heat / 4.0 - (1.0 - (-1.0_f64).exp())).abs() < 1e-4, "{heat}");
+    }
+}
