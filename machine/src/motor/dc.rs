@@ -89,6 +89,6 @@ mod tests {
             heat = DcMotor::heated(heat, 2.0, 1e-3, 5.0);
         }
         // One time constant: 1 − (1 − T/τ)^5000.
-        assert!((heat / 4.0 - (1.0 - (-1.0_f64).exp())).abs() < 1e-4, "{heat}");
+        assert!((heat / 4.0 - (1.0 - signals::math::exp(-1.0))).abs() < 1e-4, "{heat}");
     }
 }
