@@ -5,11 +5,9 @@
 //! so that nothing adds up over a job. A pulse falls where `K·θ` passes a half-integer, to the
 //! nanosecond, along the cubic that joins the angles and speeds at both ends of the cycle.
 
+use machine::pulses::{crossings, nearest};
 use signals::Nanoseconds;
 use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
-
-/// Bisections after which a crossing is known to 2⁻⁴⁰ of a cycle, 1 fs.
-const BISECTIONS: usize = 40;
 
 /// A commanded angle through one cycle.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -44,7 +42,7 @@ pub struct Pulse {
 
 /// Pulses sent by the time the commanded angle from home is `angle` [rad].
 pub fn count(per_radian: f64, angle: f64) -> i64 {
-    (per_radian * angle + 0.5).floor() as i64
+    nearest(per_radian * angle)
 }
 
 impl Segment {
@@ -98,25 +96,14 @@ impl Segment {
     ///
     /// They take the count from that of [`Segment::from`] to that of [`Segment::to`].
     pub fn pulses(&self, per_radian: f64, mut each: impl FnMut(Pulse)) {
-        let (first, second) = self.turns();
-        for (start, end) in [(0.0, first), (first, second), (second, 1.0)] {
-            if start >= end {
-                continue;
-            }
-            let level = |at: f64| per_radian * self.at(at).0 + 0.5;
-            let (low, high) = (level(start).floor(), level(end).floor());
-            let rising = high > low;
-            let mut reached = low;
-            let mut begin = start;
-            while reached != high {
-                // The count becomes n where the level comes up to n, and n − 1 where it falls below.
-                let passed = if rising { reached + 1.0 } else { reached };
-                begin = crossing(level, passed, begin, end, rising);
-                let direction = if rising { Direction::Up } else { Direction::Down };
-                let offset = (begin * CYCLE_PERIOD.0 as f64).round() as i64;
-                each(Pulse { offset: Nanoseconds(offset), direction });
-                reached += if rising { 1.0 } else { -1.0 };
-            }
+        let rate = per_radian * CYCLE_TIME;
+        let (from, to) = (per_radian * self.from, per_radian * self.to);
+        let mut reached = nearest(from);
+        for crossing in crossings(from, to, rate * self.from_speed, rate * self.to_speed) {
+            let direction = if crossing.count > reached { Direction::Up } else { Direction::Down };
+            let offset = (crossing.share * CYCLE_PERIOD.0 as f64).round() as i64;
+            each(Pulse { offset: Nanoseconds(offset), direction });
+            reached = crossing.count;
         }
     }
 
@@ -126,34 +113,6 @@ impl Segment {
         let (slope, last) = (self.from_speed * CYCLE_TIME, self.to_speed * CYCLE_TIME);
         (slope, 3.0 * rise - 2.0 * slope - last, slope + last - 2.0 * rise)
     }
-
-    /// Shares of the cycle between which, and beside which, the motion keeps its direction.
-    fn turns(&self) -> (f64, f64) {
-        let (slope, square, cube) = self.coefficients();
-        let discriminant = square * square - 3.0 * cube * slope;
-        if discriminant.is_nan() || discriminant <= 0.0 {
-            return (1.0, 1.0);
-        }
-        // The stable pair of the roots of slope + 2·square·s + 3·cube·s².
-        let sum = -(square + square.signum() * discriminant.sqrt());
-        let inside = |root: f64| if root > 0.0 && root < 1.0 { root } else { 1.0 };
-        let (one, two) = (inside(sum / (3.0 * cube)), inside(slope / sum));
-        (one.min(two), one.max(two))
-    }
-}
-
-/// Where a monotonic `level` passes `value` between `start` and `end`.
-fn crossing(level: impl Fn(f64) -> f64, value: f64, start: f64, end: f64, rising: bool) -> f64 {
-    let (mut before, mut after) = (start, end);
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (before + after);
-        if (level(middle) >= value) == rising {
-            after = middle;
-        } else {
-            before = middle;
-        }
-    }
-    after
 }
 
 #[cfg(test)]

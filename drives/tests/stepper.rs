@@ -50,8 +50,7 @@ fn axis(motor: StepperMotor, coulomb: f64) -> Axis {
 /// An axis that bears `load` [N·m].
 fn plant(axis: &Axis, load: f64) -> Plant<1, Shaft> {
     let shaft = Shaft { load, spread: 0.0 };
-    Plant::new(shaft, core::slice::from_ref(axis), &DARK, [0.0; 3], PlantOptions::default())
-        .unwrap()
+    Plant::new(shaft, core::slice::from_ref(axis), &DARK, &[0.0], PlantOptions::default()).unwrap()
 }
 
 fn to(position: f64, velocity: f64) -> Actuation {

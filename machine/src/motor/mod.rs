@@ -15,6 +15,19 @@ pub enum Motor {
     Stepper(StepperMotor),
 }
 
+/// What bounds a motor's torque, and how fast it can change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Supply {
+    /// Largest current; of a stepper, that of its pull-out torque [A].
+    pub current: f64,
+    /// Voltage of the supply [V].
+    pub voltage: f64,
+    /// Inductance that it has to overcome [H].
+    pub inductance: f64,
+    /// Torque per current [N·m/A].
+    pub torque_constant: f64,
+}
+
 impl Motor {
     /// Inertia at the shaft on the motor's side of the transmission's spring [kg·m²].
     pub fn rotor_inertia(&self) -> f64 {
@@ -54,6 +67,27 @@ impl Motor {
         match self {
             Self::Dc(motor) => motor.no_load_speed(),
             Self::Stepper(motor) => motor.largest_speed(),
+        }
+    }
+
+    /// What the supply can do to the torque at `speed` [rad/s].
+    pub fn supply(&self, speed: f64) -> Supply {
+        match self {
+            Self::Dc(motor) => Supply {
+                current: motor.current,
+                voltage: motor.voltage,
+                inductance: motor.inductance,
+                torque_constant: motor.torque_constant,
+            },
+            Self::Stepper(motor) => {
+                let torque_constant = motor.holding_torque / motor.current;
+                Supply {
+                    current: motor.pull_out_torque(speed) / torque_constant,
+                    voltage: motor.voltage,
+                    inductance: motor.inductance,
+                    torque_constant,
+                }
+            }
         }
     }
 
