@@ -3,12 +3,15 @@
 use core::f64::consts::PI;
 
 use machine::PathLimits;
+use machine::kinematics::KinematicsError;
+use machine::surface::Surface;
 use nalgebra::Vector3;
 use signals::math;
 
 use crate::drawing::{Action, Curve, Drawing};
 use crate::outline::Outline;
 use crate::profile::Move;
+use crate::projected;
 use crate::track::Track;
 
 /// Marks whose tangents meet within this angle are one stroke [rad].
@@ -81,12 +84,13 @@ impl Feed {
             for index in 0..=LOOKS {
                 let share = (f64::from(index) / f64::from(LOOKS)).clamp(INSIDE, 1.0 - INSIDE);
                 let time = start + duration * share;
-                let (acceleration, jerk) = if let Track::Ellipse(_) = feed.track {
-                    bend.demands(&feed.profile.at(time))
-                } else {
-                    let motion = feed.at(time);
-                    (motion.acceleration.norm(), motion.jerk.norm())
-                };
+                let (acceleration, jerk) =
+                    if let Track::Ellipse(_) | Track::Projected(_) = feed.track {
+                        bend.demands(&feed.profile.at(time))
+                    } else {
+                        let motion = feed.at(time);
+                        (motion.acceleration.norm(), motion.jerk.norm())
+                    };
                 pace = pace
                     .max((acceleration / limits.acceleration).sqrt())
                     .max(math::cbrt(jerk / limits.jerk));
@@ -117,7 +121,20 @@ impl Feed {
 
 /// Gathers the steps of `drawing`: marks that go on into each other become one stroke, free moves
 /// that only lead to a stroke are left to its approach, and lit dwells in one place become one dot.
-pub(crate) fn itinerary(drawing: &Drawing, limits: &PathLimits) -> Vec<Stop> {
+///
+/// On a `surface` everything comes to lie on it.
+///
+/// # Errors
+/// The line of what goes beyond an edge of the surface, and by how much.
+pub(crate) fn itinerary(
+    drawing: &Drawing,
+    limits: &PathLimits,
+    surface: Option<&Surface>,
+) -> Result<Vec<Stop>, (u64, KinematicsError)> {
+    let placed = |point: &Vector3<f64>, line: u64| match surface {
+        None => Ok(*point),
+        Some(surface) => projected::place(point, surface).map_err(|cause| (line, cause)),
+    };
     let cosine = math::cos(CORNER);
     let mut stops: Vec<Stop> = Vec::new();
     let mut place = drawing.start;
@@ -126,23 +143,27 @@ pub(crate) fn itinerary(drawing: &Drawing, limits: &PathLimits) -> Vec<Stop> {
         let item = match &step.action {
             Action::Mark { curve, speed, power } => {
                 place = curve.to();
+                if surface.is_some() && Track::new(curve).length() <= NOTHING {
+                    continue;
+                }
+                let track = Track::on(curve, surface).map_err(|cause| (line, cause))?;
                 if let Some(Stop { item: Item::Stroke(stroke), .. }) = stops.last_mut()
                     && stroke.speed == *speed
-                    && stroke.extend(curve, *power, cosine, limits.tolerance)
+                    && stroke.extend(track.clone(), *power, cosine, limits.tolerance)
                 {
                     continue;
                 }
-                if Track::new(curve).length() <= NOTHING {
+                if track.length() <= NOTHING {
                     continue;
                 }
                 if matches!(stops.last(), Some(Stop { item: Item::Rapid(_), .. })) {
                     stops.pop();
                 }
-                Item::Stroke(Outline::new(curve, *speed, *power, line))
+                Item::Stroke(Outline::new(track, *speed, *power, line))
             }
             Action::Rapid { to } => {
                 place = *to;
-                Item::Rapid(*to)
+                Item::Rapid(placed(to, line)?)
             }
             Action::Feed { curve, speed } => {
                 place = curve.to();
@@ -151,10 +172,15 @@ pub(crate) fn itinerary(drawing: &Drawing, limits: &PathLimits) -> Vec<Stop> {
                 {
                     continue;
                 }
-                Item::Feed(Feed::new(Track::new(curve), *speed, limits))
+                Item::Feed(Feed::new(
+                    Track::on(curve, surface).map_err(|cause| (line, cause))?,
+                    *speed,
+                    limits,
+                ))
             }
             Action::Dwell { time, lit: Some(power) } if *time > 0.0 && *power > 0.0 => {
                 let exposure = (*time, *power);
+                let place = placed(&place, line)?;
                 if let Some(Stop { item: Item::Dot(dot), .. }) = stops.last_mut()
                     && dot.at == place
                 {
@@ -169,5 +195,5 @@ pub(crate) fn itinerary(drawing: &Drawing, limits: &PathLimits) -> Vec<Stop> {
         };
         stops.push(Stop { item, line });
     }
-    stops
+    Ok(stops)
 }

@@ -5,19 +5,28 @@
 
 mod arc_length;
 mod artwork;
+pub mod attitude;
 mod blend;
 pub mod check;
+mod demand;
 pub mod drawing;
 pub mod itinerary;
 pub mod jet;
 pub mod job;
+pub mod joint_move;
+mod joint_plan;
+pub mod law;
 mod lead;
 mod outline;
 pub mod plan;
+mod posture;
 pub mod profile;
+mod projected;
 #[cfg(test)]
 mod random;
+mod reach;
 pub mod request;
+mod route;
 pub mod run_in;
 mod sampler;
 pub mod service;

@@ -3,7 +3,7 @@
 use machine::PathLimits;
 
 use crate::blend::{Join, Quarter};
-use crate::drawing::{Curve, Power};
+use crate::drawing::Power;
 use crate::jet::Jet;
 use crate::stroke::StrokePath;
 use crate::track::{Bend, Track};
@@ -31,8 +31,7 @@ pub(crate) struct Outline {
 
 impl Outline {
     /// Starts with one curve.
-    pub(crate) fn new(curve: &Curve, speed: Option<f64>, power: Power, line: u64) -> Self {
-        let track = Track::new(curve);
+    pub(crate) fn new(track: Track, speed: Option<f64>, power: Power, line: u64) -> Self {
         let (length, bend) = (track.length(), track.bend());
         Self {
             tracks: vec![track],
@@ -45,16 +44,15 @@ impl Outline {
         }
     }
 
-    /// Goes on with `curve` if it continues the stroke: it starts at its end, with a tangent within
+    /// Goes on with `track` if it continues the stroke: it starts at its end, with a tangent within
     /// the angle whose cosine is `cosine`. Says whether it does.
     pub(crate) fn extend(
         &mut self,
-        curve: &Curve,
+        track: Track,
         power: Power,
         cosine: f64,
         tolerance: f64,
     ) -> bool {
-        let track = Track::new(curve);
         let (before, after) = (self.end(), track.at(0.0));
         if (after.point - before.point).norm() > GAP || before.first.dot(&after.first) < cosine {
             return false;

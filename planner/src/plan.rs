@@ -13,6 +13,7 @@ use crate::check::{Breach, Checker};
 use crate::drawing::Note;
 use crate::itinerary::itinerary;
 use crate::job::Job;
+use crate::joint_plan::{IsLinear, PlanJoints, Task};
 use crate::sampler::{Sampler, Unreachable};
 use crate::speed;
 use crate::trajectory::Trajectory;
@@ -225,35 +226,61 @@ fn plan_within(
         tolerance: job.marking.tolerance.unwrap_or(machine.path.tolerance),
         ..machine.path
     };
-    let stops = itinerary(drawing, &limits);
+    let stops = itinerary(drawing, &limits, job.surface.as_ref()).map_err(|(line, cause)| {
+        PlanError::Unreachable { line, place: Place { stroke: 0, time: 0.0 }, cause }
+    })?;
     let chosen = speed::choose(drawing.start, &stops, &limits, &job.marking)
         .map_err(|sharp| PlanError::TooSharp { line: sharp.line, speed: sharp.speed })?;
-    let trajectory =
-        Trajectory::new(drawing.start, &stops, &limits, &machine.laser, &chosen.speeds)
-            .map_err(|short| PlanError::TooShort { line: short.line, duration: short.duration })?;
-    if trajectory.end().is_nan() || trajectory.end() > LONGEST {
-        return Err(PlanError::TooLong { duration: trajectory.duration() });
-    }
-    check_edges(&trajectory)?;
-    let facts = PlanFacts {
-        name: drawing.name.clone(),
-        strokes: 0,
-        length: speed::outlines(&stops).map(crate::outline::Outline::length).sum(),
-        duration: trajectory.duration(),
-        samples: 0,
-        speed: chosen.speeds.iter().copied().fold(0.0, f64::max),
-        notes: drawing.notes.iter().cloned().chain(chosen.notes).collect(),
-        uses: Uses::default(),
-    };
     let mut plan = Plan {
         artwork: Artwork::default(),
-        facts,
-        trajectory: Arc::new(trajectory),
+        facts: PlanFacts {
+            name: drawing.name.clone(),
+            strokes: 0,
+            length: speed::outlines(&stops).map(crate::outline::Outline::length).sum(),
+            duration: 0.0,
+            samples: 0,
+            speed: chosen.speeds.iter().copied().fold(0.0, f64::max),
+            notes: drawing.notes.iter().cloned().chain(chosen.notes).collect(),
+            uses: Uses::default(),
+        },
+        trajectory: Arc::default(),
         mechanism: machine.mechanism.clone(),
         axes: machine.axes.clone(),
     };
-    let checker = Checker::new(machine, limits, ideal);
-    let (samples, uses) = plan.visit(CheckAll { plan: &plan, checker, abandoned })?;
+    let check = |trajectory: &Arc<Trajectory>| {
+        if trajectory.end().is_nan() || trajectory.end() > LONGEST {
+            return Err(PlanError::TooLong { duration: trajectory.duration() });
+        }
+        check_edges(trajectory)?;
+        let checker = Checker::new(machine, limits, ideal);
+        machine.mechanism.visit(CheckAll { trajectory, axes: &machine.axes, checker, abandoned })
+    };
+    let (samples, uses) = if ideal || machine.mechanism.visit(IsLinear) {
+        let mut trajectory =
+            Trajectory::new(drawing.start, &stops, &limits, &machine.laser, &chosen.speeds)
+                .map_err(|short| PlanError::TooShort {
+                    line: short.line,
+                    duration: short.duration,
+                })?;
+        trajectory.attitude = job.attitude;
+        plan.trajectory = Arc::new(trajectory);
+        check(&plan.trajectory)?
+    } else {
+        let task = Task {
+            machine,
+            limits,
+            stops: &stops,
+            speeds: &chosen.speeds,
+            standing: job.standing,
+            attitude: job.attitude,
+        };
+        let (routed, checked) = machine.mechanism.visit(PlanJoints { task, check })?;
+        plan.trajectory = routed.trajectory;
+        plan.facts.notes.extend(routed.notes);
+        plan.facts.speed = routed.speed;
+        checked
+    };
+    plan.facts.duration = plan.trajectory.duration();
     plan.facts.samples = samples;
     plan.facts.uses = uses;
     // Last, so that a drawing far beyond the area is refused before it is drawn point by point.
@@ -277,7 +304,8 @@ fn check_edges(trajectory: &Trajectory) -> Result<(), PlanError> {
 
 /// Samples the whole plan and checks every sample.
 struct CheckAll<'a> {
-    plan: &'a Plan,
+    trajectory: &'a Arc<Trajectory>,
+    axes: &'a [Axis],
     checker: Checker<'a>,
     abandoned: &'a dyn Fn() -> bool,
 }
@@ -286,14 +314,13 @@ impl MechanismVisitor for CheckAll<'_> {
     type Output = Result<(u64, Uses), PlanError>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let Self { plan, mut checker, abandoned } = self;
+        let Self { trajectory, axes, mut checker, abandoned } = self;
         let unreachable = |found: Unreachable| {
-            let (line, place) = plan.place(found.time);
+            let (line, place) = place(trajectory, found.time);
             PlanError::Unreachable { line, place, cause: found.cause }
         };
-        let trajectory = Arc::clone(&plan.trajectory);
         let mut sampler =
-            Sampler::new(mechanism, &plan.axes, trajectory, 1).map_err(unreachable)?;
+            Sampler::new(mechanism, axes, Arc::clone(trajectory), 1).map_err(unreachable)?;
         let mut samples: u64 = 0;
         for setpoint in sampler.by_ref() {
             samples += 1;
@@ -301,7 +328,7 @@ impl MechanismVisitor for CheckAll<'_> {
                 return Err(PlanError::Abandoned);
             }
             checker.look(&setpoint).map_err(|breach| {
-                let (line, place) = plan.place(breach.time);
+                let (line, place) = place(trajectory, breach.time);
                 PlanError::Limit { line, place, breach }
             })?;
         }
@@ -340,11 +367,11 @@ impl Plan {
     fn visit<V: MechanismVisitor>(&self, visitor: V) -> V::Output {
         self.mechanism.visit(visitor)
     }
+}
 
-    /// Line and place in the job at `time` [s].
-    fn place(&self, time: f64) -> (u64, Place) {
-        let piece = self.trajectory.piece_at(time);
-        let stroke = piece.map_or(0, |piece| piece.stroke);
-        (piece.map_or(0, |piece| piece.line), Place { stroke, time })
-    }
+/// Line and place in the job at `time` [s].
+fn place(trajectory: &Trajectory, time: f64) -> (u64, Place) {
+    let piece = trajectory.piece_at(time);
+    let stroke = piece.map_or(0, |piece| piece.stroke);
+    (piece.map_or(0, |piece| piece.line), Place { stroke, time })
 }

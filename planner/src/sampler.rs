@@ -12,8 +12,10 @@ use machine::{Axis, Friction, Mechanism, StepperMotor};
 use signals::time::CYCLE_TIME;
 use signals::{GateEdge, LaserCycle, Setpoint, axis::axis_array, setpoint::flags};
 
+use crate::joint_move::{JointMove, JointsAt};
 use crate::lead::Lead;
-use crate::trajectory::Trajectory;
+use crate::posture::{branches, follow, keeps_margins};
+use crate::trajectory::{Reference, Trajectory};
 
 /// Looks at the trajectory in a cycle; even, so that a sample lies on one.
 const STEPS: usize = 4;
@@ -40,6 +42,10 @@ pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
     /// Index of the next look, in steps of [`STEP`] from the first sample.
     look: i64,
     cursor: usize,
+    /// Of a mechanism whose joints do not go straight with the tool: its branches, and the number of
+    /// the one that the joints are on.
+    branches: Vec<M::Branch>,
+    branch: usize,
     joints: Joints<N>,
     assembly: M::Assembly,
     lead: Lead<N>,
@@ -104,7 +110,7 @@ struct Gate {
 
 /// The joints at one look.
 struct Look<const N: usize, A> {
-    tool: ToolMotion,
+    reference: Reference,
     motion: JointMotion<N>,
     assembly: A,
     effort: Joints<N>,
@@ -125,13 +131,25 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         stream: u64,
     ) -> Result<Self, Unreachable> {
         let mut cursor = 0;
-        let tool = trajectory.at(0.0, &mut cursor);
-        let motion = mechanism
-            .joint_motion(&tool, mechanism.branch(), &Joints::zeros())
-            .map_err(|cause| Unreachable { time: 0.0, cause })?;
-        let assembly = mechanism
-            .assemble(&motion.position, mechanism.branch(), None)
-            .map_err(|cause| Unreachable { time: 0.0, cause })?;
+        let unreachable = |cause| Unreachable { time: 0.0, cause };
+        let mut branch = 0;
+        let (branches, motion) = match trajectory.at(0.0, &mut cursor) {
+            Reference::Tool(tool) => {
+                let own = mechanism.branch();
+                let motion = trajectory
+                    .attitude
+                    .apply(&tool)
+                    .and_then(|tool| mechanism.joint_motion(&tool, own, &Joints::zeros()));
+                (vec![own], motion.map_err(unreachable)?)
+            }
+            Reference::Joints(at, way) => {
+                branch = way.branch;
+                let motion = joint_motion(&at);
+                (branches(&mechanism, &motion.position), motion)
+            }
+        };
+        let assembly =
+            mechanism.assemble(&motion.position, branches[branch], None).map_err(unreachable)?;
         let effort = mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
         let lead = Lead::new(&mechanism, effort, STEP);
         let end = (trajectory.end() / CYCLE_TIME).ceil() as i64;
@@ -148,6 +166,8 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             sequence: 0,
             look: -(STEPS as i64) / 2,
             cursor,
+            branches,
+            branch,
             joints: motion.position,
             assembly,
             lead,
@@ -175,9 +195,18 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     /// Goes on to the next look.
     fn advance(&mut self) -> Result<Look<N, M::Assembly>, KinematicsError> {
         self.look += 1;
-        let tool = self.trajectory.at(self.look as f64 * STEP, &mut self.cursor);
-        let branch = self.mechanism.branch();
-        let motion = self.mechanism.joint_motion(&tool, branch, &self.joints)?;
+        let reference = self.trajectory.at(self.look as f64 * STEP, &mut self.cursor);
+        let motion = match &reference {
+            Reference::Tool(tool) => {
+                let tool = &self.trajectory.attitude.apply(tool)?;
+                follow(&self.mechanism, &self.branches, tool, &mut self.branch, &self.joints)?
+            }
+            Reference::Joints(at, way) => {
+                self.branch = way.branch;
+                joint_motion(at)
+            }
+        };
+        let branch = self.branches[self.branch];
         let assembly = self.mechanism.assemble(&motion.position, branch, Some(&self.assembly))?;
         let effort =
             self.mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
@@ -189,7 +218,19 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         self.assembly = assembly;
         self.effort = effort;
         self.motor_velocity = motion.velocity + self.lead.rate();
-        Ok(Look { tool, motion, assembly, effort })
+        Ok(Look { reference, motion, assembly, effort })
+    }
+
+    /// The tool's motion while the joints lead.
+    fn tool(
+        &self,
+        at: &JointsAt,
+        way: &JointMove,
+        assembly: &M::Assembly,
+    ) -> Result<ToolMotion, KinematicsError> {
+        let branch = self.branches[way.branch];
+        let (tool, _) = way.way().tool(&self.mechanism, branch, at.share, Some(assembly))?;
+        Ok(tool)
     }
 
     fn setpoint(&mut self) -> Result<Setpoint, KinematicsError> {
@@ -200,7 +241,12 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             let look = self.advance()?;
             add(&look.effort, 1.0);
         }
-        let Look { tool, motion, assembly, effort } = self.advance()?;
+        let Look { reference, motion, assembly, effort } = self.advance()?;
+        let tool = match reference {
+            Reference::Tool(tool) => tool,
+            Reference::Joints(at, way) => self.tool(&at, &way, &assembly)?,
+        };
+        keeps_margins(&self.mechanism, &assembly)?;
         add(&effort, 1.0);
         let lead = *self.lead.value();
         let motor_velocity = self.motor_velocity;
@@ -324,6 +370,17 @@ impl<const N: usize, M: Mechanism<N>> Iterator for Sampler<N, M> {
         }
         self.sequence += 1;
         Some(setpoint)
+    }
+}
+
+/// The joints of a mechanism with `N` axes.
+fn joint_motion<const N: usize>(at: &JointsAt) -> JointMotion<N> {
+    let of = |array: &signals::AxisArray| Joints::from_fn(|axis, _| array[axis]);
+    JointMotion {
+        position: of(&at.position),
+        velocity: of(&at.velocity),
+        acceleration: of(&at.acceleration),
+        jerk: of(&at.jerk),
     }
 }
 

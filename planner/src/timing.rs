@@ -1,11 +1,16 @@
 //! The legs of a job in their order, once the speed of each stroke is known: every leg ends where
 //! the next begins, and all but strokes begin and end at rest or go into a stroke.
 
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use machine::PathLimits;
 use machine::kinematics::Attitude;
 use nalgebra::Vector3;
 
 use crate::itinerary::{Dot, Feed, Item, Stop};
+use crate::joint_move::JointMove;
+use crate::law::SpeedLaw;
 use crate::outline::Outline;
 use crate::profile::Move;
 use crate::run_in::{RunIn, RunOut};
@@ -25,6 +30,15 @@ pub(crate) struct Leg<'a> {
     pub(crate) line: u64,
     pub(crate) duration: f64,
     pub(crate) way: Way<'a>,
+    /// Where the joints stand, on a leg without motion of a machine that is planned by its joints.
+    pub(crate) standing: Option<JointMove>,
+}
+
+impl<'a> Leg<'a> {
+    /// A leg of the tool.
+    pub(crate) fn new(line: u64, duration: f64, way: Way<'a>) -> Self {
+        Self { line, duration, way, standing: None }
+    }
 }
 
 /// What happens on a leg.
@@ -32,9 +46,10 @@ pub(crate) struct Leg<'a> {
 pub(crate) enum Way<'a> {
     Rest(Vector3<f64>),
     Straight(Straight),
-    Feed(&'a Feed),
+    Joints(JointMove),
+    Feed(Cow<'a, Feed>),
     RunIn(RunIn),
-    Stroke { outline: &'a Outline, speed: f64 },
+    Stroke { outline: &'a Outline, speed: f64, law: Option<Arc<SpeedLaw>> },
     RunOut(RunOut),
     Dot(&'a Dot),
     Output { at: Vector3<f64>, bit: u32, on: bool },
@@ -50,7 +65,7 @@ pub struct Straight {
 }
 
 impl Straight {
-    fn new(from: Vector3<f64>, to: Vector3<f64>, limits: &PathLimits) -> Option<Self> {
+    pub(crate) fn new(from: Vector3<f64>, to: Vector3<f64>, limits: &PathLimits) -> Option<Self> {
         let way = to - from;
         let length = way.norm();
         let profile = Move::new(length, limits.rapid, limits.acceleration, limits.jerk);
@@ -84,7 +99,7 @@ pub(crate) fn travel<'a>(
     let mut total = 0.0;
     let mut go = |line: u64, duration: f64, way: Way<'a>| {
         total += duration;
-        sink(Leg { line, duration, way });
+        sink(Leg::new(line, duration, way));
     };
     for Stop { item, line } in stops {
         let line = *line;
@@ -102,14 +117,14 @@ pub(crate) fn travel<'a>(
                 let run_out = RunOut::new(&outline.end(), speed, limits);
                 approach(run_in.from(), &mut place);
                 go(line, run_in.duration(), Way::RunIn(run_in));
-                go(line, outline.length() / speed, Way::Stroke { outline, speed });
+                go(line, outline.length() / speed, Way::Stroke { outline, speed, law: None });
                 go(line, run_out.duration(), Way::RunOut(run_out));
                 place = run_out.to();
             }
             Item::Rapid(to) => approach(*to, &mut place),
             Item::Feed(feed) => {
                 approach(feed.track.at(0.0).point, &mut place);
-                go(line, feed.duration(), Way::Feed(feed));
+                go(line, feed.duration(), Way::Feed(Cow::Borrowed(feed)));
                 place = feed.track.at(feed.track.length()).point;
             }
             // Coming to rest is all that a rest without time asks for.

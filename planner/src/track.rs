@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use machine::kinematics::KinematicsError;
+use machine::surface::Surface;
 use nalgebra::Vector3;
 use signals::math;
 
@@ -9,6 +11,7 @@ use crate::arc_length::{ByArcLength, Parametric};
 use crate::drawing::Curve;
 use crate::jet::Jet;
 use crate::profile::Motion;
+use crate::projected::Projected;
 
 /// Steps of the table for a whole turn of an ellipse, before it is refined.
 const STEPS_PER_TURN: f64 = 64.0;
@@ -26,6 +29,8 @@ pub(crate) enum Track {
     Circle { arc: Arc<Ellipse>, length: f64 },
     /// Any other arc.
     Ellipse(Arc<ByArcLength<Ellipse>>),
+    /// A flat curve on a surface.
+    Projected(Arc<ByArcLength<Projected>>),
 }
 
 /// An arc of a [`Curve`] by the angle from its start, which is positive whatever its sense.
@@ -128,11 +133,22 @@ impl Track {
         }
     }
 
+    /// Takes `curve` as it lies on `surface`, or as it is drawn.
+    ///
+    /// # Errors
+    /// Where it goes beyond an edge of the surface.
+    pub(crate) fn on(curve: &Curve, surface: Option<&Surface>) -> Result<Self, KinematicsError> {
+        let Some(surface) = surface else { return Ok(Self::new(curve)) };
+        let projected = Projected::new(curve, surface)?;
+        Ok(Self::Projected(Arc::new(ByArcLength::new(projected, STEPS_PER_TURN as usize))))
+    }
+
     /// [m].
     pub(crate) fn length(&self) -> f64 {
         match self {
             Self::Line { length, .. } | Self::Circle { length, .. } => *length,
             Self::Ellipse(table) => table.length(),
+            Self::Projected(table) => table.length(),
         }
     }
 
@@ -156,6 +172,7 @@ impl Track {
                 }
             }
             Self::Ellipse(table) => table.at(distance),
+            Self::Projected(table) => table.at(distance),
         }
     }
 
@@ -165,6 +182,10 @@ impl Track {
             Self::Line { .. } => Bend::default(),
             Self::Circle { .. } => Bend::of(&self.at(0.0)),
             Self::Ellipse(table) => Bend {
+                curvature: table.curve().largest(|jet| jet.second.norm()),
+                third: table.curve().largest(|jet| jet.third.norm()),
+            },
+            Self::Projected(table) => Bend {
                 curvature: table.curve().largest(|jet| jet.second.norm()),
                 third: table.curve().largest(|jet| jet.third.norm()),
             },

@@ -11,7 +11,10 @@ use machine::{LaserSource, PathLimits, Pose};
 use nalgebra::Vector3;
 use signals::Nanoseconds;
 
+use crate::attitude::AttitudeLaw;
 use crate::itinerary::{Feed, Stop};
+use crate::joint_move::{JointMove, JointsAt};
+use crate::law::SpeedLaw;
 use crate::outline::Outline;
 use crate::run_in::{RunIn, RunOut};
 use crate::stroke::StrokePath;
@@ -46,15 +49,30 @@ pub enum Course {
     Feed(Box<Feed>),
     /// Into a stroke.
     RunIn(Box<RunIn>),
-    /// Along a stroke at constant speed.
+    /// Along a stroke.
     Stroke {
         /// The path.
         path: Arc<StrokePath>,
-        /// [m/s].
+        /// The speed, with a law the largest that was asked for [m/s].
         speed: f64,
+        /// How the speed changes on the way; `None` where it is constant.
+        law: Option<Arc<SpeedLaw>>,
     },
     /// Out of a stroke.
     RunOut(Box<RunOut>),
+    /// The joints together from rest to rest, or standing.
+    Joints(JointMove),
+}
+
+/// What a piece of motion says at one instant.
+// It lives on the stack for one look; a box would allocate four times a cycle.
+#[allow(clippy::large_enum_variant)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reference {
+    /// Where the tool shall be; the joints follow from it.
+    Tool(ToolMotion),
+    /// Where the joints shall be; the tool follows from them.
+    Joints(JointsAt, JointMove),
 }
 
 /// A change of the laser.
@@ -79,6 +97,8 @@ pub struct Trajectory {
     pub outputs: Vec<(f64, u64)>,
     /// Stream times at which to wait for a person [s].
     pub pauses: Vec<f64>,
+    /// How the tool is turned where it leads.
+    pub attitude: AttitudeLaw,
 }
 
 /// A stroke shorter than the laser source can switch.
@@ -97,6 +117,18 @@ impl Trajectory {
         laser: &LaserSource,
         speeds: &[f64],
     ) -> Result<Self, TooShort> {
+        Self::lay(Course::Rest(start), limits, laser, |sink| {
+            travel(start, stops, limits, |stroke| speeds[stroke], sink);
+        })
+    }
+
+    /// Lays the legs that `legs` hands to its sink end to end, after a rest at `first`.
+    pub(crate) fn lay<'a>(
+        first: Course,
+        limits: &PathLimits,
+        laser: &LaserSource,
+        legs: impl FnOnce(&mut dyn FnMut(Leg<'a>)),
+    ) -> Result<Self, TooShort> {
         let mut before = BEFORE;
         while before < laser.on_delay + BEFORE {
             before += signals::time::CYCLE_TIME;
@@ -113,11 +145,11 @@ impl Trajectory {
         builder.trajectory.pieces.push(Piece {
             start: 0.0,
             duration: before,
-            course: Course::Rest(start),
+            course: first,
             line: 0,
             stroke: 0,
         });
-        travel(start, stops, limits, |stroke| speeds[stroke], |leg| builder.add(leg));
+        legs(&mut |leg| builder.add(leg));
         match builder.refused {
             Some(refused) => Err(refused),
             None => Ok(builder.trajectory),
@@ -134,9 +166,9 @@ impl Trajectory {
         self.end() - self.pieces.first().map_or(0.0, |piece| piece.duration)
     }
 
-    /// The tool's motion at `time` [s]; at rest before the start and after the end. `cursor` is the
-    /// piece to look at first: searching goes on from there in either direction.
-    pub fn at(&self, time: f64, cursor: &mut usize) -> ToolMotion {
+    /// The motion at `time` [s]; at rest before the start and after the end. `cursor` is the piece to
+    /// look at first: searching goes on from there in either direction.
+    pub fn at(&self, time: f64, cursor: &mut usize) -> Reference {
         let last = self.pieces.len() - 1;
         let mut index = (*cursor).min(last);
         while index > 0 && time < self.pieces[index].start {
@@ -149,7 +181,10 @@ impl Trajectory {
         let piece = &self.pieces[index];
         let since = time - piece.start;
         if index == last && since >= piece.duration {
-            return rest(piece.course.at(piece.duration).position);
+            return match piece.course.at(piece.duration) {
+                Reference::Tool(tool) => Reference::Tool(rest(tool.position)),
+                joints @ Reference::Joints(..) => joints,
+            };
         }
         piece.course.at(since.max(0.0))
     }
@@ -165,17 +200,34 @@ fn rest(position: Vector3<f64>) -> ToolMotion {
     ToolMotion::rest(&Pose::at(position))
 }
 
-impl Course {
-    /// The tool's motion at `time` since the start of the piece [s].
-    pub fn at(&self, time: f64) -> ToolMotion {
+impl Reference {
+    /// The tool's motion, where it is what is said.
+    pub fn tool(&self) -> Option<&ToolMotion> {
         match self {
+            Self::Tool(tool) => Some(tool),
+            Self::Joints(..) => None,
+        }
+    }
+}
+
+impl Course {
+    /// The motion at `time` since the start of the piece [s].
+    pub fn at(&self, time: f64) -> Reference {
+        Reference::Tool(match self {
             Self::Rest(place) => rest(*place),
             Self::Straight(straight) => straight.at(time),
             Self::Feed(feed) => feed.at(time),
             Self::RunIn(run_in) => run_in.at(time),
-            Self::Stroke { path, speed } => path.at(time * speed).motion(*speed, 0.0, 0.0),
+            Self::Stroke { path, speed, law: None } => {
+                path.at(time * speed).motion(*speed, 0.0, 0.0)
+            }
+            Self::Stroke { path, law: Some(law), .. } => {
+                let along = law.at(time);
+                path.at(along.position).motion(along.velocity, along.acceleration, along.jerk)
+            }
             Self::RunOut(run_out) => run_out.at(time),
-        }
+            Self::Joints(joints) => return Reference::Joints(joints.at(time), *joints),
+        })
     }
 }
 
@@ -192,22 +244,31 @@ struct Builder {
 
 impl Builder {
     fn add(&mut self, leg: Leg<'_>) {
-        let Leg { line, duration, way } = leg;
+        let Leg { line, duration, way, standing } = leg;
         let start = self.time;
         let mut stroke = 0;
+        let resting = |place| standing.map_or(Course::Rest(place), Course::Joints);
         let course = match way {
-            Way::Rest(place) => Course::Rest(place),
+            Way::Rest(place) => resting(place),
+            Way::Joints(joints) => Course::Joints(joints),
             Way::Straight(straight) => Course::Straight(straight),
-            Way::Feed(feed) => Course::Feed(Box::new(feed.clone())),
+            Way::Feed(feed) => Course::Feed(Box::new(feed.into_owned())),
             Way::RunIn(run_in) => {
                 stroke = self.stroke + 1;
                 Course::RunIn(Box::new(run_in))
             }
-            Way::Stroke { outline, speed } => {
+            Way::Stroke { outline, speed, law } => {
                 self.stroke += 1;
                 stroke = self.stroke;
-                self.light(line, start, duration, exposures(outline, speed));
-                Course::Stroke { path: Arc::new(outline.trace(speed, &self.limits)), speed }
+                match &law {
+                    None => self.light(line, start, duration, exposures(outline, speed)),
+                    Some(law) => {
+                        let exposures = slowed_exposures(outline, speed, law);
+                        self.light(line, start, duration, exposures.into_iter());
+                    }
+                }
+                let path = Arc::new(outline.trace(speed, &self.limits));
+                Course::Stroke { path, speed, law }
             }
             Way::RunOut(run_out) => {
                 stroke = self.stroke;
@@ -217,18 +278,18 @@ impl Builder {
                 self.stroke += 1;
                 stroke = self.stroke;
                 self.light(line, start, duration, dot.exposures.iter().copied());
-                Course::Rest(dot.at)
+                resting(dot.at)
             }
             Way::Output { at, bit, on } => {
                 let mask = 1_u64.checked_shl(bit).unwrap_or(0);
                 self.outputs = if on { self.outputs | mask } else { self.outputs & !mask };
                 self.trajectory.outputs.push((start + OUTPUT_REST, self.outputs));
-                Course::Rest(at)
+                resting(at)
             }
             Way::Pause(place) => {
                 // One cycle before the end, so that the sample that pauses is at rest.
                 self.trajectory.pauses.push(start + duration - signals::time::CYCLE_TIME);
-                Course::Rest(place)
+                resting(place)
             }
         };
         self.trajectory.pieces.push(Piece { start, duration, course, line, stroke });
@@ -276,4 +337,31 @@ fn exposures(outline: &Outline, speed: f64) -> impl Iterator<Item = (f64, f64)> 
             if power.follows_speed { asked.map_or(1.0, |asked| speed / asked) } else { 1.0 };
         (track.length() / speed, (power.level * share).min(1.0))
     })
+}
+
+/// Times and powers along a stroke that is slowed by `law` from `speed`. Power that follows the speed
+/// does so in steps.
+fn slowed_exposures(outline: &Outline, speed: f64, law: &SpeedLaw) -> Vec<(f64, f64)> {
+    let asked = outline.speed.unwrap_or(speed);
+    let instants = law.instants(speed);
+    let mut exposures = Vec::with_capacity(outline.tracks().len());
+    let (mut since, mut way) = (0.0, 0.0);
+    for (track, power) in outline.tracks().iter().zip(&outline.powers) {
+        way += track.length();
+        let until = law.time_at(way);
+        if power.follows_speed {
+            let inside = instants.iter().filter(|instant| **instant > since && **instant < until);
+            let mut marks = vec![since];
+            marks.extend(inside);
+            marks.push(until);
+            for pair in marks.windows(2) {
+                let share = law.at((pair[0] + pair[1]) / 2.0).velocity / asked;
+                exposures.push((pair[1] - pair[0], (power.level * share).min(1.0)));
+            }
+        } else {
+            exposures.push((until - since, power.level));
+        }
+        since = until;
+    }
+    exposures
 }

@@ -45,7 +45,16 @@ fn job(steps: Vec<Step>, machine: &Machine) -> Job {
         steps,
         notes: Vec::new(),
     };
-    Job { drawing, marking: Marking::default(), rapid: None, program: None, ideal_only: None }
+    Job {
+        drawing,
+        marking: Marking::default(),
+        rapid: None,
+        program: None,
+        ideal_only: None,
+        standing: None,
+        surface: None,
+        attitude: planner::attitude::AttitudeLaw::Level,
+    }
 }
 
 /// An arc that starts at `from` with the direction `heading`, and the point and heading it ends with.
@@ -136,6 +145,11 @@ fn random_drawing(random: &mut Random, machine: &Machine) -> Job {
     job(steps, machine)
 }
 
+/// The tool's motion in a piece of a machine that is planned by its tool.
+fn tool(course: &Course, time: f64) -> ToolMotion {
+    *course.at(time).tool().unwrap()
+}
+
 fn machine_of_any_size() -> Machine {
     let mut machine = Machine::builtin();
     machine.area.lower = [-10.0; 3];
@@ -153,7 +167,7 @@ fn check_motion(trajectory: &Trajectory, machine: &Machine, case: &str) {
     let mut before: Option<ToolMotion> = None;
     for (index, piece) in trajectory.pieces.iter().enumerate() {
         let name = format!("{case}, piece {index} of line {}", piece.line);
-        let first = piece.course.at(0.0);
+        let first = tool(&piece.course, 0.0);
         if let Some(before) = before {
             let jump = first.position - before.position;
             assert!(jump.norm() < 1e-8, "{name}: jumps by {jump}");
@@ -162,9 +176,9 @@ fn check_motion(trajectory: &Trajectory, machine: &Machine, case: &str) {
             let jump = first.acceleration - before.acceleration;
             assert!(jump.norm() < 1e-5, "{name}: acceleration jumps by {jump}");
         }
-        before = Some(piece.course.at(piece.duration));
+        before = Some(tool(&piece.course, piece.duration));
         let mut instants = vec![0.0, piece.duration];
-        if let Course::Stroke { path, speed } = &piece.course {
+        if let Course::Stroke { path, speed, .. } = &piece.course {
             for seam in path.seams() {
                 let (left, right) = (path.at(seam * (1.0 - 1e-14)), path.at(seam));
                 assert!((left.point - right.point).norm() < 1e-8, "{name}");
@@ -178,7 +192,7 @@ fn check_motion(trajectory: &Trajectory, machine: &Machine, case: &str) {
         let count = 200;
         for sample in 0..=count {
             let time = piece.duration * f64::from(sample) / f64::from(count);
-            let now = piece.course.at(time);
+            let now = tool(&piece.course, time);
             let over = now.acceleration.norm() / limits.acceleration;
             assert!(over <= 1.0005, "{name}: acceleration {over} of the limit at {time}");
             let over = now.jerk.norm() / limits.jerk;
@@ -192,8 +206,8 @@ fn check_motion(trajectory: &Trajectory, machine: &Machine, case: &str) {
             // Simpson over a short step; its error is a third derivative of bounded functions.
             let step = 1e-6_f64.min(piece.duration / 4.0);
             if time + 2.0 * step <= piece.duration && step > 0.0 {
-                let middle = piece.course.at(time + step);
-                let end = piece.course.at(time + 2.0 * step);
+                let middle = tool(&piece.course, time + step);
+                let end = tool(&piece.course, time + 2.0 * step);
                 let mean = (now.velocity + middle.velocity * 4.0 + end.velocity) / 6.0;
                 let off = (end.position - now.position) / (2.0 * step) - mean;
                 assert!(off.norm() < 1e-8, "{name}: velocity is off by {off} at {time}");

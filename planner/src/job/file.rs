@@ -10,19 +10,29 @@ use machine::{DocumentError, Machine, Override, table};
 use nalgebra::Vector3;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
+use super::cloud_table::{self, CloudTable};
 use super::letters::{self, Letter, Style};
+use super::workpiece_table::{self, AttitudeTable, SurfaceTable};
 use super::{Job, JobError, Marking, MarkingSpeed, gcode, points};
+use crate::attitude::AttitudeLaw;
 use crate::drawing::{Drawing, Power};
 
 table! {
-    /// What to mark, and how: exactly one of `letters`, `points` and `gcode`.
+    /// What to mark, and how: exactly one of `letters`, `points`, `cloud` and `gcode`.
     pub struct JobTable {
         /// Letters of the thesis.
         pub letters: Option<LettersTable>,
         /// A list of points, each marked by a dwell.
         pub points: Option<PointsTable>,
+        /// Points inside glass.
+        pub cloud: Option<CloudTable>,
         /// A G-code program.
         pub gcode: Option<GcodeTable>,
+        /// The surface that the drawing is put on, around the middle of its height instead of
+        /// the machine's home.
+        pub surface: Option<SurfaceTable>,
+        /// How the tool is turned, where not by the surface.
+        pub attitude: Option<AttitudeTable>,
         /// How to mark; what is left out, the machine file's `[path]` table rules.
         pub marking: MarkingTable,
     }
@@ -121,33 +131,67 @@ pub fn schema() -> String {
 /// Reads a job file whose text is in `document`; `folder` is where its relative paths start.
 pub(super) fn job(document: Document, folder: &Path, machine: &Machine) -> Result<Job, JobError> {
     let (table, mut findings) = document.decode::<JobTable>()?;
-    let JobTable { letters, points, gcode, marking, place } = table;
-    match (letters, points, gcode) {
-        (Some(letters), None, None) => Ok(of_letters(&letters, &marking, findings, machine)?),
-        (None, Some(points), None) => Ok(of_points(&points, &marking, findings, machine)?),
-        (None, None, Some(program)) => {
-            let path: PathBuf = folder.join(&program.file.value);
-            of_program(&path, &marking, findings, machine)
+    let JobTable { letters, points, cloud, gcode, surface, attitude, marking, place } = table;
+    let surface = surface.and_then(|table| workpiece_table::surface(&table, &mut findings));
+    let on_surface;
+    let machine = match surface {
+        // The machine's home is no place of the flat drawing.
+        Some(surface) => {
+            let home = workpiece_table::middle(&surface);
+            on_surface = Machine { home, ..machine.clone() };
+            &on_surface
         }
-        (None, None, None) => {
+        None => machine,
+    };
+    let job =
+        of_tables((letters, points, cloud, gcode), &marking, place, findings, folder, machine)?;
+    Ok(workpiece_table::place(job, surface, attitude.as_ref()))
+}
+
+/// What a job marks: one of these.
+type Kinds = (Option<LettersTable>, Option<PointsTable>, Option<CloudTable>, Option<GcodeTable>);
+
+/// Reads the one kind that there is.
+fn of_tables(
+    kinds: Kinds,
+    marking: &MarkingTable,
+    place: machine::document::Place,
+    mut findings: Findings,
+    folder: &Path,
+    machine: &Machine,
+) -> Result<Job, JobError> {
+    match kinds {
+        (Some(letters), None, None, None) => Ok(of_letters(&letters, marking, findings, machine)?),
+        (None, Some(points), None, None) => Ok(of_points(&points, marking, findings, machine)?),
+        (None, None, Some(cloud), None) => {
+            let power = power(marking);
+            let drawing = cloud_table::draw(&cloud, folder, power, &mut findings, machine)?;
+            Ok(findings.finish(job_of(drawing, marking))?)
+        }
+        (None, None, None, Some(program)) => {
+            let path: PathBuf = folder.join(&program.file.value);
+            of_program(&path, marking, findings, machine)
+        }
+        (None, None, None, None) => {
             findings.contradict(
                 place,
                 "nothing to mark".to_owned(),
-                "add one of the tables [letters], [points] and [gcode]",
+                "add one of the tables [letters], [points], [cloud] and [gcode]",
             );
             Ok(findings.fail()?)
         }
-        (letters, points, gcode) => {
+        (letters, points, cloud, gcode) => {
             let places = [
                 letters.map(|table| table.place),
                 points.map(|table| table.place),
+                cloud.map(|table| table.place),
                 gcode.map(|table| table.place),
             ];
             for place in places.into_iter().flatten().skip(1) {
                 findings.contradict(
                     place,
                     "a job marks one thing".to_owned(),
-                    "keep one of the tables [letters], [points] and [gcode]",
+                    "keep one of the tables [letters], [points], [cloud] and [gcode]",
                 );
             }
             Ok(findings.fail()?)
@@ -196,7 +240,7 @@ fn of_letters(
         Style::H1 => (Some(H1_RAPID), None),
         Style::H2 => (Some(f64::INFINITY), Some(REPLICA)),
     };
-    findings.finish(Job { drawing, marking: how(marking), rapid, program: None, ideal_only })
+    findings.finish(Job { rapid, ideal_only, ..job_of(drawing, marking) })
 }
 
 fn of_points(
@@ -239,7 +283,16 @@ fn of_program(
 }
 
 fn job_of(drawing: Drawing, marking: &MarkingTable) -> Job {
-    Job { drawing, marking: how(marking), rapid: None, program: None, ideal_only: None }
+    Job {
+        drawing,
+        marking: how(marking),
+        rapid: None,
+        program: None,
+        ideal_only: None,
+        standing: None,
+        surface: None,
+        attitude: AttitudeLaw::Level,
+    }
 }
 
 fn how(table: &MarkingTable) -> Marking {

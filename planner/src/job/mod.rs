@@ -1,9 +1,12 @@
 //! Job readers: each turns one kind of file into a drawing.
 
+pub mod cloud;
+pub mod cloud_table;
 pub mod file;
 pub mod gcode;
 pub mod letters;
 pub mod points;
+pub mod workpiece_table;
 
 use std::path::{Path, PathBuf};
 
@@ -28,6 +31,13 @@ pub struct Job {
     pub program: Option<gcode::ProgramFacts>,
     /// Why this job can be planned but not run on a machine, if so.
     pub ideal_only: Option<&'static str>,
+    /// How the joints stand before the job, load side [m or rad], on a machine that is planned by
+    /// its joints; `None` where they are at home.
+    pub standing: Option<signals::AxisArray>,
+    /// The surface that the drawing is put on; `None` where it lies as it is drawn.
+    pub surface: Option<machine::surface::Surface>,
+    /// How the tool is turned.
+    pub attitude: crate::attitude::AttitudeLaw,
 }
 
 /// How a job wants its lines marked; what is `None` the machine file's `[path]` table rules.

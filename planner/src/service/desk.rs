@@ -2,6 +2,7 @@
 
 use crate::Plan;
 use crate::job::Job;
+use crate::joint_plan::IsLinear;
 use crate::plan::plan_unless;
 use crate::request::{ARTWORK_FILE, JobRequest, PLAN_FILE, REFUSAL_FILE, REQUEST_FILE, Refusal};
 use machine::kinematics::{Joints, KinematicsError};
@@ -71,8 +72,13 @@ fn write_plan(folder: &Path, plan: &Plan) -> std::io::Result<()> {
     write(PLAN_FILE, serde_json::to_vec_pretty(&plan.facts))
 }
 
-/// Lets the job begin where the axes stand, with a rapid to where it wants to begin.
+/// Lets the job begin where the axes stand, with a rapid to where it wants to begin. A machine that
+/// is planned by its joints goes from there straight to where the job begins to mark.
 fn approach(job: &mut Job, machine: &Machine, standing: &AxisArray) -> Result<(), KinematicsError> {
+    if !machine.mechanism.visit(IsLinear) {
+        job.standing = Some(*standing);
+        return Ok(());
+    }
     let wanted = job.drawing.start;
     let Machine { mechanism, axes, area, .. } = machine;
     if let Some(from) = mechanism.visit(Departure { standing, axes, area, wanted })? {

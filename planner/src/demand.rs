@@ -1,0 +1,183 @@
+//! What a motion of the joints asks of axes, motors and path, against what they can give.
+
+use machine::kinematics::{JointMotion, Joints, KinematicsError, ToolMotion};
+use machine::{Axis, Mechanism, PathLimits};
+use signals::math;
+
+use crate::attitude::AttitudeLaw;
+
+/// Share of a motor's current and voltage that is planned with; the rest is for what a look at one
+/// instant does not know, above all the springs of the transmission.
+const MOTOR_SHARE: f64 = 0.95;
+
+/// Share of a motor's torque that the first guess at a joint move's acceleration takes.
+const TORQUE_SHARE: f64 = 0.8;
+
+/// Share of the supply's voltage that the first guess at a joint move's jerk leaves to the
+/// inductance.
+const VOLTAGE_SHARE: f64 = 0.25;
+
+/// Limits of a machine's axes and path, asked about one motion after the other.
+#[derive(Debug, Clone)]
+pub(crate) struct Demands<'a, const N: usize, M: Mechanism<N>> {
+    pub(crate) mechanism: &'a M,
+    pub(crate) axes: &'a [Axis],
+    pub(crate) path: PathLimits,
+    pub(crate) branches: Vec<M::Branch>,
+    pub(crate) attitude: AttitudeLaw,
+}
+
+impl<'a, const N: usize, M: Mechanism<N>> Demands<'a, N, M> {
+    /// For a machine whose joints stand near `near`.
+    pub(crate) fn new(
+        mechanism: &'a M,
+        axes: &'a [Axis],
+        path: PathLimits,
+        near: &Joints<N>,
+        attitude: AttitudeLaw,
+    ) -> Self {
+        let branches = crate::posture::branches(mechanism, near);
+        Self { mechanism, axes, path, branches, attitude }
+    }
+
+    /// The joints' motion for `tool`, turned as the job asks, continuous with `previous`.
+    pub(crate) fn follow(
+        &self,
+        tool: &ToolMotion,
+        branch: &mut usize,
+        previous: &Joints<N>,
+    ) -> Result<JointMotion<N>, KinematicsError> {
+        let tool = self.attitude.apply(tool)?;
+        crate::posture::follow(self.mechanism, &self.branches, &tool, branch, previous)
+    }
+
+    /// The mechanism with the joints at `joints` on the branch with this number.
+    pub(crate) fn assemble(
+        &self,
+        joints: &Joints<N>,
+        branch: usize,
+        near: Option<&M::Assembly>,
+    ) -> Result<M::Assembly, KinematicsError> {
+        self.mechanism.assemble(joints, self.branches[branch], near)
+    }
+
+    /// Largest speed, acceleration and jerk along `change`, by the share of it, as far as they can
+    /// be told before the motion is known: from the axes' limits, from the motors standing at
+    /// `from`, and from the longest |p′| of the tool [m].
+    pub(crate) fn along(
+        &self,
+        change: &Joints<N>,
+        from: &Joints<N>,
+        branch: usize,
+        longest: f64,
+    ) -> Result<[f64; 3], KinematicsError> {
+        let assembly = self.assemble(from, branch, None)?;
+        let mass = self.mechanism.mass_matrix(&assembly);
+        let path = &self.path;
+        let mut most = [path.rapid, path.acceleration, path.jerk].map(|limit| limit / longest);
+        for (index, axis) in self.axes.iter().enumerate().take(N) {
+            let way = change[index].abs();
+            if way <= 0.0 {
+                continue;
+            }
+            let motor = &axis.motor;
+            let inertia = motor.rotor_inertia / axis.ratio + axis.ratio * mass[(index, index)];
+            let acceleration = TORQUE_SHARE * motor.current * motor.torque_constant / inertia;
+            let slew = VOLTAGE_SHARE * motor.voltage / motor.inductance;
+            let jerk = slew * motor.torque_constant / inertia;
+            let limits = &axis.limits;
+            most[0] = most[0].min(limits.velocity / way);
+            most[1] = most[1].min(limits.acceleration.min(acceleration) / way);
+            most[2] = most[2].min(limits.jerk.min(jerk) / way);
+        }
+        Ok(most)
+    }
+
+    /// How many times slower a motion in the dark must be for every limit to hold; played c times
+    /// slower, speed falls by c, acceleration by c² and jerk by c³.
+    ///
+    /// # Errors
+    /// Where a motor cannot even hold the load.
+    pub(crate) fn pace(
+        &self,
+        motion: &JointMotion<N>,
+        tool: &ToolMotion,
+        assembly: &M::Assembly,
+    ) -> Result<f64, KinematicsError> {
+        let path = &self.path;
+        let pace = (tool.velocity.norm() / path.rapid.max(path.speed))
+            .max((tool.acceleration.norm() / path.acceleration).sqrt())
+            .max(math::cbrt(tool.jerk.norm() / path.jerk));
+        self.pace_of_axes(pace, motion, assembly)
+    }
+
+    /// As [`Self::pace`] for the axes and motors alone; at least `pace`.
+    pub(crate) fn pace_of_axes(
+        &self,
+        pace: f64,
+        motion: &JointMotion<N>,
+        assembly: &M::Assembly,
+    ) -> Result<f64, KinematicsError> {
+        let mut pace = pace;
+        for (index, axis) in self.axes.iter().enumerate().take(N) {
+            let limits = &axis.limits;
+            pace = pace
+                .max(motion.velocity[index].abs() / limits.velocity)
+                .max((motion.acceleration[index].abs() / limits.acceleration).sqrt())
+                .max(math::cbrt(motion.jerk[index].abs() / limits.jerk));
+        }
+        let most = self.motor_rate(1.0 / pace.max(1.0), motion, assembly)?;
+        Ok(pace.max(1.0 / most))
+    }
+
+    /// The largest rate up to `rate` at which the motors can play `motion`.
+    pub(crate) fn motor_rate(
+        &self,
+        rate: f64,
+        motion: &JointMotion<N>,
+        assembly: &M::Assembly,
+    ) -> Result<f64, KinematicsError> {
+        let gravity = self.mechanism.gravity(assembly);
+        let mass = self.mechanism.mass_matrix(assembly);
+        // What of the effort goes with the square of the rate.
+        let bias = self.mechanism.bias(assembly, &motion.velocity) - gravity;
+        let moving = mass * motion.acceleration + bias;
+        let slew = mass * motion.jerk;
+        let worst = |rate: f64| {
+            let mut worst: f64 = 0.0;
+            for (index, axis) in self.axes.iter().enumerate().take(N) {
+                let (motor, ratio) = (&axis.motor, axis.ratio);
+                let speed = motion.velocity[index] * rate / ratio;
+                let rotor = motor.rotor_inertia / ratio;
+                let square = rate * rate;
+                let torque = ratio * gravity[index]
+                    + (rotor * motion.acceleration[index] + ratio * moving[index]) * square;
+                let slew = (rotor * motion.jerk[index] + ratio * slew[index]) * square * rate;
+                let side = if speed.abs() > 1e-9 { speed.signum() } else { 0.0 };
+                let friction = axis.friction.coulomb * side + axis.friction.viscous * speed;
+                let current = (torque + friction) / motor.torque_constant;
+                let voltage = motor.resistance * current
+                    + motor.inductance * slew / motor.torque_constant
+                    + motor.torque_constant * speed;
+                worst = worst
+                    .max(current.abs() / (motor.current * MOTOR_SHARE))
+                    .max(voltage.abs() / (motor.voltage * MOTOR_SHARE));
+            }
+            worst
+        };
+        let mut rate = rate;
+        for _ in 0..400 {
+            if worst(rate) <= 1.0 {
+                return Ok(rate);
+            }
+            rate /= 1.05;
+        }
+        Err(KinematicsError {
+            code: "overload",
+            axis: None,
+            value: worst(0.0),
+            limit: 1.0,
+            detail: "the motors cannot hold the load here",
+        })
+    }
+}

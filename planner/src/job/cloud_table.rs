@@ -1,0 +1,148 @@
+//! The job file's table of a cloud of points.
+
+use std::path::Path;
+
+use machine::document::{Findings, Located, NonNegative, Number, Point, Positive, Quantity};
+use machine::quantity::{Angle, AngularSpeed, Duration, Length};
+use machine::{DocumentError, Machine, table};
+use nalgebra::Vector3;
+use signals::math;
+
+use super::cloud::{self, Cloud};
+use crate::drawing::Drawing;
+
+table! {
+    /// Points inside glass, deepest first: a file of them, or a sphere of so many.
+    pub struct CloudTable {
+        /// File of lines x, y, z in metres, or in the unit that its first line names, relative to
+        /// this file.
+        pub file: Option<Located<String>>,
+        /// A sample: points at random inside a sphere.
+        pub sphere: Option<SphereTable>,
+        /// Where the file's origin lies.
+        pub at: Option<Point>,
+        /// Thickness of a layer.
+        pub layer: Quantity<Length, Positive> = "0.2 mm",
+        /// Width of a ring about the table's axis, inside which the points follow each other round.
+        pub ring: Quantity<Length, Positive> = "1 mm",
+        /// The least distance of two points across the beam; nearer ones are left out.
+        pub spacing: Quantity<Length, NonNegative> = "0.1 mm",
+        /// The same along the beam.
+        pub depth_spacing: Quantity<Length, NonNegative> = "0.2 mm",
+        /// The largest distance from the table's axis that a point may have.
+        pub radius: Option<Quantity<Length, Positive>>,
+        /// The lowest and the highest z that a point may have.
+        pub heights: Option<[Quantity<Length>; 2]>,
+        /// Height of the glass's face; with it z is the depth as seen from outside of the glass.
+        pub face: Option<Quantity<Length>>,
+        /// Refractive index of the glass.
+        pub index: Number<Positive> = 1.52,
+        /// Half of the angle of the beam's cone in air; near-axis rays when left out.
+        pub half_angle: Option<Quantity<Angle, Positive>>,
+        /// How long each point is lit.
+        pub dwell: Option<Quantity<Duration, Positive>>,
+        /// How many pulses mark a point, instead of a time.
+        pub pulses: Option<Number<Positive>>,
+        /// How often the source pulses.
+        pub pulse_rate: Option<Quantity<AngularSpeed, Positive>>,
+        /// The point to go on from, in the order of marking, from 0.
+        pub from: Number<NonNegative> = 0.0,
+    }
+}
+
+table! {
+    /// Points at random inside a sphere, the same for the same seed.
+    pub struct SphereTable {
+        /// Its centre.
+        pub center: Point,
+        /// Its radius.
+        pub radius: Quantity<Length, Positive>,
+        /// How many points.
+        pub count: Number<Positive> = 1000.0,
+        /// Which of all such clouds.
+        pub seed: Number<NonNegative> = 1.0,
+    }
+}
+
+/// The drawing of a cloud; what is wrong with the table goes to `findings`.
+pub(super) fn draw(
+    table: &CloudTable,
+    folder: &Path,
+    power: f64,
+    findings: &mut Findings,
+    machine: &Machine,
+) -> Result<Drawing, DocumentError> {
+    let line = findings.position(table.place).map_or(0, |(line, _)| line as u64);
+    let points = points(table, folder, findings);
+    let dwell = dwell(table, findings);
+    let cloud = Cloud {
+        layer: table.layer.value,
+        ring: table.ring.value,
+        spacing: [table.spacing.value, table.depth_spacing.value],
+        radius: table.radius.as_ref().map_or(f64::INFINITY, |radius| radius.value),
+        heights: table
+            .heights
+            .as_ref()
+            .map_or([f64::NEG_INFINITY, f64::INFINITY], |[low, high]| [low.value, high.value]),
+        glass: table.face.as_ref().map(|face| (face.value, table.index.value)),
+        half_angle: table.half_angle.as_ref().map_or(0.0, |angle| angle.value),
+        dwell,
+        from: table.from.value as usize,
+    };
+    let stem = Path::new(findings.file()).file_stem().and_then(|stem| stem.to_str());
+    let name = stem.unwrap_or("cloud").to_owned();
+    Ok(cloud.draw(&name, &points, power, Vector3::from(machine.home), line))
+}
+
+fn points(table: &CloudTable, folder: &Path, findings: &mut Findings) -> Vec<Vector3<f64>> {
+    let at = table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
+    match (&table.file, &table.sphere) {
+        (Some(file), None) => {
+            let path = folder.join(&file.value);
+            let read = std::fs::read_to_string(&path).map_err(|error| error.to_string());
+            let points = read.and_then(|text| {
+                cloud::parse(&text).map_err(|line| format!("line {line} is no point x, y, z"))
+            });
+            match points {
+                Ok(points) => points.into_iter().map(|point| point + at).collect(),
+                Err(cause) => {
+                    let help = "give lines of x, y, z, and the unit in the first line";
+                    let text = format!("{}: {cause}", path.display());
+                    findings.contradict(file.place, text, help);
+                    Vec::new()
+                }
+            }
+        }
+        (None, Some(sphere)) => cloud::sphere(
+            Vector3::from(sphere.center.value) + at,
+            sphere.radius.value,
+            sphere.count.value as usize,
+            sphere.seed.value as u64,
+        ),
+        (Some(file), Some(_)) => {
+            let help = "keep one of `file` and `sphere`";
+            findings.contradict(file.place, "a cloud has one source".to_owned(), help);
+            Vec::new()
+        }
+        (None, None) => {
+            let help = "add `file` or a table [cloud.sphere]";
+            findings.contradict(table.place, "there is no point to mark".to_owned(), help);
+            Vec::new()
+        }
+    }
+}
+
+/// How long a point is lit [s].
+fn dwell(table: &CloudTable, findings: &mut Findings) -> f64 {
+    match (&table.dwell, &table.pulses, &table.pulse_rate) {
+        (Some(dwell), None, _) => dwell.value,
+        // A rate is told in turns, which are pulses here.
+        (None, Some(pulses), Some(rate)) => pulses.value * math::TURN / rate.value,
+        _ => {
+            let help = "write `dwell`, or `pulses` and `pulse_rate`";
+            let text = "how long a point is lit is not clear".to_owned();
+            findings.contradict(table.place, text, help);
+            1.0
+        }
+    }
+}

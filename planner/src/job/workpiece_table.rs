@@ -1,0 +1,142 @@
+//! The job file's tables of the surface that is marked and of how the tool is turned.
+
+use machine::document::{Findings, Keyword, Located, Point, Positive, Quantity};
+use machine::quantity::{Angle, Length};
+use machine::surface::{Cone, Placement, Projection, Shape, Surface};
+use machine::table;
+use nalgebra::Vector3;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+
+use super::Job;
+use crate::attitude::{AttitudeLaw, turned};
+
+table! {
+    /// The surface that the flat drawing is put on; the beam is against its normal. Exactly one of
+    /// `cone` and `cylinder`.
+    pub struct SurfaceTable {
+        /// A frustum of a cone about its own y.
+        pub cone: Option<ConeTable>,
+        /// A cylinder about its own y.
+        pub cylinder: Option<CylinderTable>,
+        /// Where its own origin lies, the middle of the bottom.
+        pub position: Option<Point>,
+        /// How its own frame is turned: about x, then y, then z.
+        pub rotation: Option<[Quantity<Angle>; 3]>,
+    }
+}
+
+table! {
+    /// A frustum of a cone.
+    pub struct ConeTable {
+        /// Radius at the bottom, where y is 0.
+        pub bottom_radius: Quantity<Length, Positive>,
+        /// Radius at the top.
+        pub top_radius: Quantity<Length, Positive>,
+        /// From the bottom to the top along the axis.
+        pub height: Quantity<Length, Positive>,
+        /// develop: unrolled, lengths stay; arc: x along the circle; central: seen from the axis;
+        /// ortho: seen from above.
+        pub projection: Located<ProjectionWord> = "develop",
+    }
+}
+
+table! {
+    /// A cylinder.
+    pub struct CylinderTable {
+        /// Its radius.
+        pub radius: Quantity<Length, Positive>,
+        /// Its length along its axis.
+        pub height: Quantity<Length, Positive>,
+        /// As for a cone.
+        pub projection: Located<ProjectionWord> = "develop",
+    }
+}
+
+table! {
+    /// How the tool is turned all the time: about x, then y, then z of the machine.
+    pub struct AttitudeTable {
+        /// About x.
+        pub roll: Quantity<Angle> = "0 deg",
+        /// About y.
+        pub pitch: Quantity<Angle> = "0 deg",
+        /// About z.
+        pub yaw: Quantity<Angle> = "0 deg",
+    }
+}
+
+/// How a drawing is put on a cone, as a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ProjectionWord(Projection);
+
+impl Keyword for ProjectionWord {
+    const NAME: &'static str = "a projection";
+    const WORDS: &'static [(&'static str, Self)] = &[
+        ("develop", Self(Projection::Developed)),
+        ("arc", Self(Projection::Arc)),
+        ("central", Self(Projection::Central)),
+        ("ortho", Self(Projection::Orthographic)),
+    ];
+}
+
+impl JsonSchema for ProjectionWord {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Projection".into()
+    }
+
+    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
+        let words: Vec<&str> = Self::WORDS.iter().map(|(word, _)| *word).collect();
+        json_schema!({ "enum": words })
+    }
+}
+
+/// The surface of a table; what is wrong with it goes to `findings`.
+pub(super) fn surface(table: &SurfaceTable, findings: &mut Findings) -> Option<Surface> {
+    let cone = match (&table.cone, &table.cylinder) {
+        (Some(cone), None) => Cone {
+            bottom: cone.bottom_radius.value,
+            top: cone.top_radius.value,
+            length: cone.height.value,
+            projection: cone.projection.value.0,
+        },
+        (None, Some(cylinder)) => Cone {
+            bottom: cylinder.radius.value,
+            top: cylinder.radius.value,
+            length: cylinder.height.value,
+            projection: cylinder.projection.value.0,
+        },
+        _ => {
+            let help = "write one table [surface.cone] or [surface.cylinder]";
+            findings.contradict(table.place, "which surface is not clear".to_owned(), help);
+            return None;
+        }
+    };
+    let [roll, pitch, yaw] =
+        table.rotation.as_ref().map_or([0.0; 3], |angles| angles.each_ref().map(|a| a.value));
+    let translation = table.position.as_ref().map_or(Vector3::zeros(), |at| at.value.into());
+    let placement = Placement { rotation: turned(roll, pitch, yaw), translation };
+    Some(Surface { shape: Shape::Cone(cone), placement })
+}
+
+/// The flat point in the middle of a surface, around which a drawing lies [m].
+pub(super) fn middle(surface: &Surface) -> [f64; 3] {
+    match surface.shape {
+        Shape::Cone(cone) => [0.0, cone.length / 2.0, 0.0],
+        Shape::Plane | Shape::Sphere(_) => [0.0; 3],
+    }
+}
+
+/// Puts the job on its surface and turns its tool.
+pub(super) fn place(job: Job, surface: Option<Surface>, attitude: Option<&AttitudeTable>) -> Job {
+    let law = match (attitude, surface) {
+        (Some(fixed), _) => {
+            AttitudeLaw::Fixed(turned(fixed.roll.value, fixed.pitch.value, fixed.yaw.value))
+        }
+        (None, Some(surface)) => AttitudeLaw::Normal(surface),
+        (None, None) => AttitudeLaw::Level,
+    };
+    Job { surface, attitude: law, ..job }
+}

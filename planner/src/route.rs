@@ -1,0 +1,500 @@
+//! The way of a job through the joints, for mechanisms on which the tool's straight line is no
+//! straight line of theirs.
+//!
+//! Between strokes and dots the joints go together from where they are to the posture in which the
+//! next can be gone whole: run-in, stroke and run-out within the soft limits and without a jump.
+//! That takes the nearest turn of a table, unwinds it in the dark where its travel ends, and changes
+//! the branch where it must. Along a stroke the speed is what the axes can follow.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use machine::kinematics::{KinematicsError, Pose, ToolMotion};
+use machine::{Mechanism, WorkArea};
+use nalgebra::Vector3;
+
+use crate::demand::Demands;
+use crate::itinerary::{Dot, Feed, Item, Stop};
+use crate::jet::Jet;
+use crate::joint_move::JointMove;
+use crate::law::SpeedLaw;
+use crate::outline::Outline;
+use crate::posture::{Part, Posture, Refused, candidates, keeps_margins, walk};
+use crate::reach::reach;
+use crate::run_in::{RunIn, RunOut};
+use crate::timing::{Leg, OUTPUT_REST, PAUSE_REST, Straight, Way};
+
+/// Postures tried for one stroke, the nearest first.
+const TRIED: usize = 6;
+
+/// Rounding allowed at the edge of the area [m].
+const ROUNDING: f64 = 1e-9;
+
+/// A way that cannot be gone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NoWay {
+    pub(crate) line: u64,
+    /// The stroke that it leads to, from 1; 0 for none.
+    pub(crate) stroke: u64,
+    /// Time since the first motion [s].
+    pub(crate) time: f64,
+    pub(crate) cause: Refused,
+}
+
+/// A stroke that the axes slow down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Slowed {
+    pub(crate) line: u64,
+    pub(crate) asked: f64,
+    pub(crate) speed: f64,
+    pub(crate) place: Vector3<f64>,
+}
+
+/// The way of a job.
+#[derive(Debug, Clone)]
+pub(crate) struct Route<'a> {
+    pub(crate) first: JointMove,
+    pub(crate) legs: Vec<Leg<'a>>,
+    pub(crate) slowed: Vec<Slowed>,
+    /// The largest speed of a stroke [m/s].
+    pub(crate) speed: f64,
+}
+
+/// How fast a job is gone.
+#[derive(Debug, Clone)]
+pub(crate) struct Speeds {
+    /// Of each stroke as asked for and allowed by its path [m/s].
+    pub(crate) strokes: Vec<f64>,
+    /// Of each stroke, the share of what the axes seem to allow [1].
+    pub(crate) shares: Vec<f64>,
+    /// The share of its speed at which a joint move is made [1].
+    pub(crate) moves: f64,
+}
+
+/// Goes through `stops` from `start`.
+pub(crate) fn route<'a, const N: usize, M: Mechanism<N>>(
+    demands: &Demands<'_, N, M>,
+    area: &WorkArea,
+    start: Posture<N>,
+    stops: &'a [Stop],
+    speeds: &Speeds,
+) -> Result<Route<'a>, NoWay> {
+    let first = JointMove::standing(&start.joints, start.branch);
+    let mut router = Router {
+        demands,
+        area,
+        speeds,
+        now: start,
+        time: 0.0,
+        line: 0,
+        stroke: 0,
+        towards: 0,
+        route: Route { first, legs: Vec::new(), slowed: Vec::new(), speed: 0.0 },
+    };
+    for stop in stops {
+        router.line = stop.line;
+        router.stop(stop).map_err(|cause| NoWay {
+            line: stop.line,
+            stroke: router.towards,
+            time: router.time,
+            cause,
+        })?;
+    }
+    Ok(router.route)
+}
+
+struct Router<'a, 'd, const N: usize, M: Mechanism<N>> {
+    demands: &'d Demands<'d, N, M>,
+    area: &'d WorkArea,
+    speeds: &'d Speeds,
+    now: Posture<N>,
+    time: f64,
+    line: u64,
+    /// Strokes without dots so far, and strokes and dots begun so far.
+    stroke: usize,
+    towards: u64,
+    route: Route<'a>,
+}
+
+/// The way into a stroke or out of it, within shares of the path's limits that the axes can follow.
+struct Lead {
+    speed: f64,
+    slower: f64,
+}
+
+impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
+    fn stop(&mut self, stop: &'a Stop) -> Result<(), Refused> {
+        self.towards = match stop.item {
+            Item::Stroke(_) | Item::Dot(_) => self.towards + 1,
+            _ => self.towards,
+        };
+        match &stop.item {
+            Item::Stroke(outline) => self.mark(outline)?,
+            Item::Rapid(to) => self.go_to(&still(*to), &[])?,
+            Item::Feed(feed) => self.feed(feed)?,
+            Item::Dot(dot) => self.dot(dot)?,
+            Item::Rest(time) if *time <= 0.0 => {}
+            Item::Rest(time) => self.stand(*time, Way::Rest)?,
+            Item::Output { bit, on } => {
+                let (bit, on) = (*bit, *on);
+                self.stand(2.0 * OUTPUT_REST, |at| Way::Output { at, bit, on })?;
+            }
+            Item::Pause => self.stand(PAUSE_REST, Way::Pause)?,
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, duration: f64, way: Way<'a>) {
+        self.time += duration;
+        self.route.legs.push(Leg::new(self.line, duration, way));
+    }
+
+    /// Stands where the joints are.
+    fn stand(
+        &mut self,
+        duration: f64,
+        way: impl FnOnce(Vector3<f64>) -> Way<'a>,
+    ) -> Result<(), Refused> {
+        let standing = Some(JointMove::standing(&self.now.joints, self.now.branch));
+        let way = way(self.tool()?.position);
+        self.time += duration;
+        self.route.legs.push(Leg { line: self.line, duration, way, standing });
+        Ok(())
+    }
+
+    fn tool(&self) -> Result<Pose, KinematicsError> {
+        let assembly = self.demands.assemble(&self.now.joints, self.now.branch, None)?;
+        Ok(self.demands.mechanism.pose(&assembly))
+    }
+
+    fn dot(&mut self, dot: &'a Dot) -> Result<(), Refused> {
+        self.go_to(&still(dot.at), &[])?;
+        let time = dot.exposures.iter().map(|(time, _)| time).sum();
+        self.stand(time, |_| Way::Dot(dot))
+    }
+
+    fn feed(&mut self, feed: &'a Feed) -> Result<(), Refused> {
+        let mut feed = feed.clone();
+        let first = feed.at(0.0);
+        let start = {
+            let part = |share: f64| along(&feed.track, share);
+            self.approach(&first, &[&part], None)?
+        };
+        let duration = feed.duration();
+        let pace = self.pace(start, duration, &|time| feed.at(time))?;
+        feed.pace *= if pace > 1.0 { pace * 1.01 } else { 1.0 };
+        self.push(feed.duration(), Way::Feed(Cow::Owned(feed)));
+        Ok(())
+    }
+
+    /// Goes to where `first` is and on along `parts`, which the caller then adds.
+    fn go_to(&mut self, first: &ToolMotion, parts: &[&Part<'_>]) -> Result<(), Refused> {
+        self.approach(first, parts, None).map(|_| ())
+    }
+
+    /// Goes to a posture from which `parts` can be gone, if it can be to one like `wanted`, and counts
+    /// `parts` as gone. Gives the posture.
+    fn approach(
+        &mut self,
+        first: &ToolMotion,
+        parts: &[&Part<'_>],
+        wanted: Option<&Posture<N>>,
+    ) -> Result<Posture<N>, Refused> {
+        let mut found = candidates(self.demands, &self.now, first, parts)?;
+        if let Some(wanted) = wanted {
+            /// A posture differs from another by a branch or a turn, which is more than this [rad].
+            const SAME: f64 = 1.0;
+            let like = |start: &Posture<N>| {
+                start.branch == wanted.branch && (start.joints - wanted.joints).amax() <= SAME
+            };
+            // Stable, so that the nearer ones stay before.
+            found.sort_by_key(|(start, _)| !like(start));
+        }
+        let mut refused = None;
+        for (start, end) in found.into_iter().take(TRIED) {
+            match self.joint_move(&start) {
+                Ok(step) => {
+                    if let Some(step) = step {
+                        self.push(step.duration(), Way::Joints(step));
+                    }
+                    self.now = end;
+                    return Ok(start);
+                }
+                Err(cause) => {
+                    refused.get_or_insert(cause);
+                }
+            }
+        }
+        self.straight(first, parts).map_err(|cause| refused.map_or(cause, Refused::Kinematics))
+    }
+
+    /// The joint move to `to`, if it stays inside the area and away from collisions.
+    fn joint_move(&self, to: &Posture<N>) -> Result<Option<JointMove>, KinematicsError> {
+        let demands = self.demands;
+        // The chain must be closed in the same way before and after.
+        let branch = to.branch;
+        let here = demands.mechanism.pose(&demands.assemble(&self.now.joints, branch, None)?);
+        let off = (here.position - self.tool()?.position).norm();
+        if off > ROUNDING {
+            return Err(KinematicsError {
+                code: "assembly_mode",
+                axis: None,
+                value: off,
+                limit: ROUNDING,
+                detail: "the chain would have to be taken apart to close in the other way",
+            });
+        }
+        let Some(mut step) = JointMove::new(demands, &self.now.joints, &to.joints, branch)? else {
+            return Ok(None);
+        };
+        step.slow(self.speeds.moves);
+        self.check(&step)?;
+        Ok(Some(step))
+    }
+
+    /// That the tool stays inside the area during `step`, and the mechanism away from collisions.
+    fn check(&self, step: &JointMove) -> Result<(), KinematicsError> {
+        const LOOKS: u32 = 32;
+        let way = step.way::<N>();
+        let mut near = None;
+        for index in 0..=LOOKS {
+            let joints = way.from + way.change * (f64::from(index) / f64::from(LOOKS));
+            let assembly = self.demands.assemble(&joints, step.branch, near.as_ref())?;
+            let tool = self.demands.mechanism.pose(&assembly).position;
+            for row in 0..3 {
+                let inside = tool[row].clamp(self.area.lower[row], self.area.upper[row]);
+                if (tool[row] - inside).abs() > ROUNDING {
+                    return Err(KinematicsError {
+                        code: "area",
+                        axis: None,
+                        value: tool[row],
+                        limit: inside,
+                        detail: "on the way of the joints the tool leaves the area",
+                    });
+                }
+            }
+            keeps_margins(self.demands.mechanism, &assembly)?;
+            near = Some(assembly);
+        }
+        Ok(())
+    }
+
+    /// Goes straight with the tool, and counts `parts` as gone.
+    fn straight(&mut self, first: &ToolMotion, parts: &[&Part<'_>]) -> Result<Posture<N>, Refused> {
+        const SLOWER: f64 = 1.3;
+        const TRIALS: u32 = 20;
+        let from = self.tool()?.position;
+        let to = first.position;
+        let line =
+            |share: f64| ToolMotion { velocity: to - from, ..still(from + (to - from) * share) };
+        let start = walk(self.demands, self.now, &[&line])?.end;
+        let whole = walk(self.demands, start, parts)?;
+        whole.within(self.demands)?;
+        let mut limits = self.demands.path;
+        for _ in 0..TRIALS {
+            let Some(straight) = Straight::new(from, to, &limits) else { break };
+            let duration = straight.profile.duration();
+            if self.pace(self.now, duration, &|time| straight.at(time))? <= 1.0 {
+                self.push(duration, Way::Straight(straight));
+                break;
+            }
+            limits = slower(&limits, SLOWER);
+        }
+        self.now = whole.end;
+        Ok(start)
+    }
+
+    /// How many times slower a motion of the tool must be for the axes.
+    fn pace(
+        &self,
+        start: Posture<N>,
+        duration: f64,
+        tool: &dyn Fn(f64) -> ToolMotion,
+    ) -> Result<f64, KinematicsError> {
+        /// Time between two looks [s], and their bounds.
+        const LOOK: f64 = 1e-3;
+        let count = (duration / LOOK).ceil().clamp(32.0, 4000.0) as usize;
+        let Posture { mut joints, mut branch } = start;
+        let mut pace: f64 = 0.0;
+        for index in 0..=count {
+            let tool = tool(duration * index as f64 / count as f64);
+            let demands = self.demands;
+            let motion = demands.follow(&tool, &mut branch, &joints)?;
+            let assembly = demands.assemble(&motion.position, branch, None)?;
+            pace = demands.pace_of_axes(pace, &motion, &assembly)?;
+            joints = motion.position;
+        }
+        Ok(pace)
+    }
+
+    /// Marks a stroke with the ways into it and out of it.
+    fn mark(&mut self, outline: &'a Outline) -> Result<(), Refused> {
+        let top = self.speeds.strokes[self.stroke];
+        let share = self.speeds.shares[self.stroke];
+        self.stroke += 1;
+        let path = outline.trace(top, &self.demands.path);
+        let length = path.length();
+        let ends = [outline.start(), outline.end()];
+        let middle = |share: f64| path.at(length * share).motion(1.0, 0.0, 0.0);
+
+        // A posture for the whole; with shorter ways in and out where long ones leave the reach.
+        let mut leads = [top, top].map(|speed| Lead { speed, slower: 1.0 });
+        let wanted = self.posture_for(&ends, &middle, &mut leads)?;
+
+        let limits = self.demands.path;
+        for _ in 0..12 {
+            let (run_in, run_out) = ways(&ends, &leads, &limits);
+            let into = |share: f64| run_in.at(run_in.duration() * share);
+            let entered = walk(self.demands, wanted_start(self, &run_in, &wanted)?, &[&into])?.end;
+            let reach = reach(self.demands, &path, &entered, top)?;
+            let law = if share >= 1.0 && reach.steady >= top && leads.iter().all(|l| l.speed >= top)
+            {
+                None
+            } else {
+                let mut cells = reach.cells;
+                for cell in &mut cells {
+                    cell.speed *= share;
+                    cell.ramp = cell.ramp.map(|limit| limit * share);
+                }
+                let most = cells.iter().map(|cell| cell.speed).fold(0.0, f64::max).min(top);
+                Some(SpeedLaw::below(&cells, most, [leads[0].speed, leads[1].speed]))
+            };
+            let (first, last) = law.as_ref().map_or((top, top), |law| (law.first(), law.last()));
+            leads[0].speed = first;
+            leads[1].speed = last;
+            let (run_in, run_out) =
+                if law.is_some() { ways(&ends, &leads, &limits) } else { (run_in, run_out) };
+            let start = wanted_start(self, &run_in, &wanted)?;
+            let left = walk(self.demands, entered, &[&middle])?.end;
+            let paces = [
+                self.pace(start, run_in.duration(), &|time| run_in.at(time))?,
+                self.pace(left, run_out.duration(), &|time| run_out.at(time))?,
+            ];
+            let mut fits = true;
+            for (index, pace) in paces.into_iter().enumerate() {
+                // On the way in and out nothing is retried by itself: a little is left for the springs.
+                let pace = pace / share.min(1.0);
+                if pace > 1.0 {
+                    fits = false;
+                    let lead = &mut leads[index];
+                    lead.slower *= pace * 1.02;
+                    let bend = ends[index].second.norm();
+                    let most = 0.7 * limits.acceleration / (lead.slower * lead.slower * bend);
+                    lead.speed = lead.speed.min(most.sqrt());
+                }
+            }
+            if fits {
+                return self.add_stroke(outline, &path, law, top, (run_in, run_out), &wanted);
+            }
+        }
+        Err(Refused::Kinematics(KinematicsError {
+            code: "singular",
+            axis: None,
+            value: leads[0].slower.max(leads[1].slower),
+            limit: 1.0,
+            detail: "the axes cannot follow the way into the stroke or out of it",
+        }))
+    }
+
+    /// The nearest posture from which a stroke can be gone.
+    fn posture_for(
+        &self,
+        ends: &[Jet; 2],
+        middle: &Part<'_>,
+        leads: &mut [Lead; 2],
+    ) -> Result<Posture<N>, Refused> {
+        let mut refused = None;
+        for _ in 0..8 {
+            let (run_in, run_out) = ways(ends, leads, &self.demands.path);
+            let into = |share: f64| run_in.at(run_in.duration() * share);
+            let out = |share: f64| run_out.at(run_out.duration() * share);
+            let found =
+                candidates(self.demands, &self.now, &run_in.at(0.0), &[&into, middle, &out]);
+            match found {
+                Ok(found) => {
+                    if let Some((start, _)) = found.first() {
+                        return Ok(*start);
+                    }
+                }
+                Err(cause) => {
+                    refused.get_or_insert(cause);
+                }
+            }
+            for lead in leads.iter_mut() {
+                lead.speed /= 2.0;
+            }
+        }
+        Err(refused.unwrap_or(Refused::Position { axis: 0, value: f64::NAN, limit: 0.0 }))
+    }
+
+    fn add_stroke(
+        &mut self,
+        outline: &'a Outline,
+        path: &crate::stroke::StrokePath,
+        law: Option<SpeedLaw>,
+        top: f64,
+        (run_in, run_out): (RunIn, RunOut),
+        wanted: &Posture<N>,
+    ) -> Result<(), Refused> {
+        let length = path.length();
+        let into = |share: f64| run_in.at(run_in.duration() * share);
+        let middle = |share: f64| path.at(length * share).motion(1.0, 0.0, 0.0);
+        let out = |share: f64| run_out.at(run_out.duration() * share);
+        self.approach(&run_in.at(0.0), &[&into, &middle, &out], Some(wanted))?;
+        let duration = law.as_ref().map_or(outline.length() / top, SpeedLaw::duration);
+        if let Some(law) = &law {
+            let (speed, at) = law.slowest();
+            let place = path.at(at).point;
+            self.route.slowed.push(Slowed { line: outline.line, asked: top, speed, place });
+            let most = law.instants(top).into_iter().map(|time| law.at(time).velocity);
+            self.route.speed = most.fold(self.route.speed, f64::max);
+        } else {
+            self.route.speed = self.route.speed.max(top);
+        }
+        self.push(run_in.duration(), Way::RunIn(run_in));
+        self.push(duration, Way::Stroke { outline, speed: top, law: law.map(Arc::new) });
+        self.push(run_out.duration(), Way::RunOut(run_out));
+        Ok(())
+    }
+}
+
+/// The posture at the start of `run_in` that goes on into the one that is `wanted` a little farther
+/// away or nearer.
+fn wanted_start<const N: usize, M: Mechanism<N>>(
+    router: &Router<'_, '_, N, M>,
+    run_in: &RunIn,
+    wanted: &Posture<N>,
+) -> Result<Posture<N>, KinematicsError> {
+    let demands = router.demands;
+    let tool = run_in.at(0.0);
+    let mut branch = wanted.branch;
+    let motion = demands.follow(&tool, &mut branch, &wanted.joints)?;
+    Ok(Posture { joints: motion.position, branch })
+}
+
+/// The ways into a stroke and out of it.
+fn ways(ends: &[Jet; 2], leads: &[Lead; 2], limits: &machine::PathLimits) -> (RunIn, RunOut) {
+    let [into, out] = leads;
+    (
+        RunIn::new(&ends[0], into.speed, &slower(limits, into.slower)),
+        RunOut::new(&ends[1], out.speed, &slower(limits, out.slower)),
+    )
+}
+
+/// Limits of a motion that is `factor` times slower.
+fn slower(limits: &machine::PathLimits, factor: f64) -> machine::PathLimits {
+    machine::PathLimits {
+        rapid: limits.rapid / factor,
+        acceleration: limits.acceleration / (factor * factor),
+        jerk: limits.jerk / (factor * factor * factor),
+        ..*limits
+    }
+}
+
+fn still(place: Vector3<f64>) -> ToolMotion {
+    ToolMotion::rest(&Pose::at(place))
+}
+
+fn along(track: &crate::track::Track, share: f64) -> ToolMotion {
+    track.at(track.length() * share).motion(1.0, 0.0, 0.0)
+}
