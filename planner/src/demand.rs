@@ -1,7 +1,7 @@
 //! What a motion of the joints asks of axes, motors and path, against what they can give.
 
 use machine::kinematics::{JointMotion, Joints, KinematicsError, ToolMotion};
-use machine::{Axis, Mechanism, PathLimits};
+use machine::{Axis, Mechanism, Motor, PathLimits};
 use signals::math;
 
 use crate::attitude::AttitudeLaw;
@@ -81,10 +81,10 @@ impl<'a, const N: usize, M: Mechanism<N>> Demands<'a, N, M> {
                 continue;
             }
             let motor = &axis.motor;
-            let inertia = motor.rotor_inertia / axis.ratio + axis.ratio * mass[(index, index)];
-            let acceleration = TORQUE_SHARE * motor.current * motor.torque_constant / inertia;
-            let slew = VOLTAGE_SHARE * motor.voltage / motor.inductance;
-            let jerk = slew * motor.torque_constant / inertia;
+            let [torque, slew] = torque_and_slew(motor);
+            let inertia = motor.rotor_inertia() / axis.ratio + axis.ratio * mass[(index, index)];
+            let acceleration = TORQUE_SHARE * torque / inertia;
+            let jerk = VOLTAGE_SHARE * slew / inertia;
             let limits = &axis.limits;
             most[0] = most[0].min(limits.velocity / way);
             most[1] = most[1].min(limits.acceleration.min(acceleration) / way);
@@ -148,20 +148,30 @@ impl<'a, const N: usize, M: Mechanism<N>> Demands<'a, N, M> {
             for (index, axis) in self.axes.iter().enumerate().take(N) {
                 let (motor, ratio) = (&axis.motor, axis.ratio);
                 let speed = motion.velocity[index] * rate / ratio;
-                let rotor = motor.rotor_inertia / ratio;
+                let rotor = motor.rotor_inertia() / ratio;
                 let square = rate * rate;
                 let torque = ratio * gravity[index]
                     + (rotor * motion.acceleration[index] + ratio * moving[index]) * square;
                 let slew = (rotor * motion.jerk[index] + ratio * slew[index]) * square * rate;
                 let side = if speed.abs() > 1e-9 { speed.signum() } else { 0.0 };
                 let friction = axis.friction.coulomb * side + axis.friction.viscous * speed;
-                let current = (torque + friction) / motor.torque_constant;
-                let voltage = motor.resistance * current
-                    + motor.inductance * slew / motor.torque_constant
-                    + motor.torque_constant * speed;
-                worst = worst
-                    .max(current.abs() / (motor.current * MOTOR_SHARE))
-                    .max(voltage.abs() / (motor.voltage * MOTOR_SHARE));
+                let torque = torque + friction;
+                worst = worst.max(match motor {
+                    Motor::Dc(motor) => {
+                        let current = torque / motor.torque_constant;
+                        let voltage = motor.resistance * current
+                            + motor.inductance * slew / motor.torque_constant
+                            + motor.torque_constant * speed;
+                        let current = current.abs() / (motor.current * MOTOR_SHARE);
+                        current.max(voltage.abs() / (motor.voltage * MOTOR_SHARE))
+                    }
+                    Motor::Stepper(motor) => {
+                        let rate = speed.abs() * motor.pulses_per_radian() / motor.pulse_rate;
+                        let most = motor.pull_out_torque(speed) * MOTOR_SHARE;
+                        // Beyond its fastest a stepper has no torque at all.
+                        if most > 0.0 { rate.max(torque.abs() / most) } else { f64::INFINITY }
+                    }
+                });
             }
             worst
         };
@@ -179,5 +189,21 @@ impl<'a, const N: usize, M: Mechanism<N>> Demands<'a, N, M> {
             limit: 1.0,
             detail: "the motors cannot hold the load here",
         })
+    }
+}
+
+/// A motor's largest torque from rest [N·m], and how fast it can change [N·m/s].
+pub(crate) fn torque_and_slew(motor: &Motor) -> [f64; 2] {
+    /// A stepper's torque is there after so many seconds.
+    const SOON: f64 = 1e-3;
+    match motor {
+        Motor::Dc(motor) => [
+            motor.current * motor.torque_constant,
+            motor.voltage / motor.inductance * motor.torque_constant,
+        ],
+        Motor::Stepper(motor) => {
+            let torque = motor.pull_out_torque(0.0);
+            [torque, torque / SOON]
+        }
     }
 }

@@ -4,7 +4,7 @@ use machine::Mechanism;
 use machine::kinematics::{JointMotion, Joints, KinematicsError};
 use signals::math;
 
-use crate::demand::Demands;
+use crate::demand::{Demands, torque_and_slew};
 use crate::jet::Jet;
 use crate::law::Cell;
 use crate::posture::Posture;
@@ -176,15 +176,13 @@ impl<const N: usize, M: Mechanism<N>> Walk<'_, N, M> {
         for (index, axis) in self.demands.axes.iter().enumerate().take(N) {
             let (limits, motor) = (&axis.limits, &axis.motor);
             let first = by_length.velocity[index].abs();
-            let load = motor.rotor_inertia / axis.ratio + axis.ratio * inertia[index];
-            let torque = motor.torque_constant / load;
+            let load = motor.rotor_inertia() / axis.ratio + axis.ratio * inertia[index];
+            let [torque, slew] = torque_and_slew(motor).map(|most| most / load);
             acceleration = acceleration
                 .min(ACCELERATION[1] * limits.acceleration / first)
-                .min(MOTOR[0] * motor.current * torque / first)
+                .min(MOTOR[0] * torque / first)
                 .min(bend(limits.jerk, by_length.acceleration[index].abs()));
-            jerk = jerk
-                .min(JERK[2] * limits.jerk / first)
-                .min(MOTOR[1] * motor.voltage / motor.inductance * torque / first);
+            jerk = jerk.min(JERK[2] * limits.jerk / first).min(MOTOR[1] * slew / first);
         }
         [acceleration, jerk]
     }
