@@ -33,9 +33,6 @@ const LEAD_STEP: f64 = 0.25;
 /// Share of the largest following error that an axis may move in a cycle at a planned rest.
 const CREEP: f64 = 0.001;
 
-/// Time over which the heating of a winding is averaged [s]; short against a real winding's.
-const HEATING_TIME: f64 = 5.0;
-
 /// Encoder counts per cycle within which an axis counts as standing.
 const STANDING_COUNTS: f64 = 1.5;
 
@@ -212,7 +209,7 @@ impl Supervision {
             if let Some(continuous) = axis.motor.dc().and_then(|motor| motor.continuous_current) {
                 let current = feedback.current[index];
                 let heating = &mut self.heating[index];
-                *heating = DcMotor::heated(*heating, current, CYCLE_TIME, HEATING_TIME);
+                *heating = DcMotor::heated(*heating, current, CYCLE_TIME, DcMotor::HEATING_TIME);
                 if *heating > continuous * continuous {
                     let (code, value) = (FaultCode::Overload, heating.sqrt());
                     return Err(Finding::on(index, code, value, continuous, Tracking::Sound));

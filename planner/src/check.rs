@@ -1,6 +1,6 @@
 //! Every sample of a plan against every limit of path, area and axes, before the first one is sent.
 
-use machine::{Axis, Machine, Motor, PathLimits};
+use machine::{Axis, DcMotor, Machine, Motor, PathLimits};
 use signals::Setpoint;
 use signals::time::CYCLE_TIME;
 
@@ -42,6 +42,8 @@ pub(crate) struct Checker<'a> {
     axes: &'a [Axis],
     /// The motors at the sample before: angle [rad] and current [A].
     before: Option<Vec<(f64, f64)>>,
+    /// Mean square of each motor's current, as the controller's watch averages it [A²].
+    heating: Vec<f64>,
     uses: Uses,
 }
 
@@ -56,12 +58,14 @@ impl<'a> Checker<'a> {
             area: (!ideal).then_some(&machine.area),
             axes,
             before: None,
+            heating: none(),
             uses: Uses {
                 velocity: none(),
                 acceleration: none(),
                 jerk: none(),
                 current: none(),
                 voltage: none(),
+                heat: none(),
                 ..Uses::default()
             },
         }
@@ -167,6 +171,14 @@ impl<'a> Checker<'a> {
             self.uses.current[index] = self.uses.current[index].max(share);
             let share = below(voltage.abs(), motor.voltage, 1.0, time, name, "motor voltage", "V")?;
             self.uses.voltage[index] = self.uses.voltage[index].max(share);
+            if let Some(continuous) = motor.continuous_current {
+                let heating = &mut self.heating[index];
+                *heating = DcMotor::heated(*heating, current, CYCLE_TIME, DcMotor::HEATING_TIME);
+                let value = heating.sqrt();
+                let share =
+                    below(value, continuous, 1.0, time, name, "root mean square of current", "A")?;
+                self.uses.heat[index] = self.uses.heat[index].max(share);
+            }
             now.push((angle, current));
         }
         self.before = Some(now);

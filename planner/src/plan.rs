@@ -71,6 +71,9 @@ pub struct Uses {
     pub current: Vec<f64>,
     /// Motor voltage, per axis.
     pub voltage: Vec<f64>,
+    /// Heating of each DC motor's winding, the root mean square of its current against what it
+    /// bears for ever; 0 where the machine file does not say that.
+    pub heat: Vec<f64>,
     /// Speed of the tool.
     pub path_speed: f64,
     /// Acceleration along and across the path.

@@ -140,6 +140,7 @@ fn print_text(report: &CheckReport) {
     eprintln!("velocity  {} % of each axis's limit", percent(&job.uses.velocity));
     eprintln!("current   {} % of each power stage's limit", percent(&job.uses.current));
     eprintln!("voltage   {} % of each supply", percent(&job.uses.voltage));
+    eprintln!("heat      {} % of what each winding bears for ever", percent(&job.uses.heat));
     eprintln!(
         "path      acceleration {:.0} %, jerk {:.0} %",
         job.uses.path_acceleration * 100.0,

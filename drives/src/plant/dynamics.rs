@@ -201,22 +201,32 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// For `s² + d·s + w²` with matrix norms `d` and `w²`, `|s| ≤ (d + √(d² + 4w²))/2`.
     pub fn fastest(&self) -> f64 {
         let motors = &self.motors;
+        let row_sum = |matrix: SMatrix<f64, N, N>| {
+            matrix.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
+        };
+        let Transmission::Elastic { stiffness, damping } = &self.transmission else {
+            // Motors and load are one inertia: what acts at the shafts acts on all of it.
+            let mobility = self.coupling.middle().mobility;
+            let square = motors.ratio.component_mul(&motors.ratio);
+            let seen = |at_shaft: &SVector<f64, N>| {
+                row_sum(mobility * SMatrix::from_diagonal(&at_shaft.component_div(&square)))
+            };
+            let drag = seen(&motors.viscous);
+            return match &self.field {
+                Some(field) => bound(drag + seen(&field.damping()), seen(&field.stiffness())),
+                None => drag,
+            };
+        };
         let mut drag = motors.viscous.component_div(&motors.inertia).amax();
         let mut spring = 0.0;
         if let Some(field) = &self.field {
             drag += field.damping().component_div(&motors.inertia).amax();
             spring = field.stiffness().component_div(&motors.inertia).amax();
         }
-        let Transmission::Elastic { stiffness, damping } = &self.transmission else {
-            return if spring > 0.0 { bound(drag, spring) } else { drag };
-        };
         let admittance = self.coupling.middle().mobility
             + SMatrix::from_diagonal(
                 &motors.ratio.component_mul(&motors.ratio).component_div(&motors.inertia),
             );
-        let row_sum = |matrix: SMatrix<f64, N, N>| {
-            matrix.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
-        };
         let square = row_sum(admittance * stiffness) + spring;
         let linear = row_sum(admittance * damping) + drag;
         bound(linear, square)

@@ -49,6 +49,9 @@ impl DcMotor {
         self.torque_constant * self.current.min(left / self.resistance)
     }
 
+    /// Time over which the heating of a winding is averaged [s]; short against a real winding's.
+    pub const HEATING_TIME: f64 = 5.0;
+
     /// The winding's mean square current [A²] after `step` [s] at `current` [A], from `mean_square`
     /// before it, averaged over `time` [s]: the I²t measure of its heating.
     pub fn heated(mean_square: f64, current: f64, step: f64, time: f64) -> f64 {
