@@ -15,7 +15,8 @@
 //!   [`PlantOptions::current_resolution`].
 //! - The light follows the gate after the delays of the laser source; gate edges fall where they
 //!   are asked, to the nanosecond.
-//! - There is no holding brake, no backlash, no measurement noise and no thermal model.
+//! - A brake holds the shaft of an unpowered motor as friction does; it opens and closes at once.
+//! - There is no backlash, no measurement noise and no thermal model.
 //!
 //! Integration: fourth order at a fixed substep of 50 µs or finer ([`dynamics`], [`winding`]),
 //! with friction's events located inside it ([`friction`]), and third order in what a varying mass
@@ -259,6 +260,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
 
     /// Moves one cycle on under `actuation`.
     fn advance(&mut self, actuation: &Actuation) {
+        self.dynamics.power(actuation.mode != CommandMode::Disabled);
         let motors = *self.dynamics.motors();
         let step = self.weights.step;
         for index in 0..self.substeps {

@@ -53,6 +53,8 @@ pub struct Axis {
     pub motor: Motor,
     /// Friction at its shaft.
     pub friction: Friction,
+    /// Torque of the brake that holds its shaft while it is unpowered, 0 for none [N·m].
+    pub brake: f64,
     /// Its encoder, or the pulses that take its place.
     pub encoder: Encoder,
     /// Gains of its cascade.

@@ -57,8 +57,12 @@ pub struct Motors<const N: usize> {
     pub windings: Windings<N>,
     /// Inertia at the shaft [kg·m²].
     pub inertia: SVector<f64, N>,
-    /// Coulomb friction torque [N·m].
+    /// Coulomb friction torque in force: that of the shaft, with its brake while that is closed [N·m].
     pub coulomb: SVector<f64, N>,
+    /// Coulomb friction torque of the shaft [N·m].
+    sliding: SVector<f64, N>,
+    /// Torque of the brake [N·m].
+    brake: SVector<f64, N>,
     /// Viscous friction [N·m·s/rad].
     pub viscous: SVector<f64, N>,
     /// Joint units per radian.
@@ -81,6 +85,8 @@ impl<const N: usize> Motors<N> {
             ),
             inertia: each(|axis| axis.motor.rotor_inertia()),
             coulomb: each(|axis| axis.friction.coulomb),
+            sliding: each(|axis| axis.friction.coulomb),
+            brake: each(|axis| axis.brake),
             viscous: each(|axis| axis.friction.viscous),
             ratio: each(|axis| axis.ratio),
             voltage: each(|axis| dc(axis, 0.0, |motor| motor.voltage)),
@@ -181,6 +187,12 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// What turns steppers, to be moved on.
     pub(super) fn field_mut(&mut self) -> Option<&mut Field<N>> {
         self.field.as_mut()
+    }
+
+    /// Closes the brakes of motors that are not powered, and opens those of motors that are.
+    pub(super) fn power(&mut self, powered: bool) {
+        let motors = &mut self.motors;
+        motors.coulomb = if powered { motors.sliding } else { motors.sliding + motors.brake };
     }
 
     /// The motors.

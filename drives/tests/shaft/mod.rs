@@ -111,6 +111,7 @@ pub(crate) fn axis(inertia: f64, friction: Friction) -> machine::Axis {
             continuous_current: None,
         }),
         friction,
+        brake: 0.0,
         encoder: Encoder { counts: 4096.0 },
         gains: LoopGains { position: 40.0, velocity: 160.0, current: 349.0, inertia },
         limits: AxisLimits {

@@ -102,6 +102,7 @@ pub(super) fn axis(table: &AxisTable, joint: &Joint, findings: &mut Findings) ->
             coulomb: table.friction.coulomb.value,
             viscous: table.friction.viscous.value,
         },
+        brake: table.friction.brake.value,
         encoder: counts(table, &motor, findings)?,
         gains: match motor {
             Motor::Dc(_) => gains(table, inertia, findings)?,

@@ -249,6 +249,9 @@ table! {
         pub coulomb: AtLeastZero<unit::Torque>,
         /// Viscous friction.
         pub viscous: AtLeastZero<unit::TorsionalDamping>,
+        /// Torque of a brake that holds the shaft while the motor is unpowered, or of a planar motor's
+        /// magnets that clamp it while its air is off.
+        pub brake: AtLeastZero<unit::Torque> = "0 N m",
     }
 }
 
