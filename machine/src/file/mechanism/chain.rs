@@ -101,13 +101,16 @@ pub(super) fn damping_ratio(axis: &AxisTable) -> Option<&Number<Positive>> {
     output(axis).into_iter().find_map(|output| output.spring).map(|spring| spring.damping_ratio)
 }
 
-/// The joints of `mechanism`, the springs behind them, and its tool at rest.
+/// The joints of a mechanism, the springs behind them, and its tool at rest [m].
+type Standing<const N: usize> = (Vec<Joint>, Option<[Elasticity; N]>, [f64; 3]);
+
+/// How `mechanism` stands at home.
 pub(super) fn joints<const N: usize, M: Mechanism<N>>(
     mechanism: &M,
     names: [Named; N],
     site: &Site<'_>,
     findings: &mut Findings,
-) -> Option<(Vec<Joint>, Option<[Elasticity; N]>, [f64; 3])> {
+) -> Option<Standing<N>> {
     let Site { table, home } = *site;
     let (standing, assembly) = standing(mechanism, &names, table, home, findings)?;
     let mass = mechanism.mass_matrix(&assembly);
