@@ -6,9 +6,11 @@ use crate::joint_plan::IsLinear;
 use crate::plan::plan_unless;
 use crate::request::{ARTWORK_FILE, JobRequest, PLAN_FILE, REFUSAL_FILE, REQUEST_FILE, Refusal};
 use machine::kinematics::{Joints, KinematicsError};
+use machine::motor::StepperMotor;
 use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea};
 use nalgebra::Vector3;
 use signals::AxisArray;
+use signals::axis::axis_array;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -76,7 +78,7 @@ fn write_plan(folder: &Path, plan: &Plan) -> std::io::Result<()> {
 /// is planned by its joints goes from there straight to where the job begins to mark.
 fn approach(job: &mut Job, machine: &Machine, standing: &AxisArray) -> Result<(), KinematicsError> {
     if !machine.mechanism.visit(IsLinear) {
-        job.standing = Some(*standing);
+        job.standing = Some(machine.mechanism.visit(Standing { motors: standing, machine })?);
         return Ok(());
     }
     let wanted = job.drawing.start;
@@ -85,6 +87,45 @@ fn approach(job: &mut Job, machine: &Machine, standing: &AxisArray) -> Result<()
         job.approach_from(from);
     }
     Ok(())
+}
+
+/// Where the joints stand behind motors at rest: short of them by what gravity stretches springs and
+/// turns steppers. Home itself where that is within what rounding makes of it, so that a job plans
+/// alike from every start there.
+struct Standing<'a> {
+    motors: &'a AxisArray,
+    machine: &'a Machine,
+}
+
+impl MechanismVisitor for Standing<'_> {
+    type Output = Result<AxisArray, KinematicsError>;
+
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
+        let Self { motors, machine: Machine { axes, home_joints, .. } } = self;
+        let sag = |joints: &Joints<N>| -> Result<Joints<N>, KinematicsError> {
+            let assembly = mechanism.assemble(joints, mechanism.branch(), None)?;
+            let gravity = mechanism.gravity(&assembly);
+            let compliance = mechanism.stiffness().and_then(|stiffness| stiffness.try_inverse());
+            let springs = compliance.map_or_else(Joints::zeros, |compliance| compliance * gravity);
+            let rotors = Joints::from_fn(|index, _| {
+                let ratio = axes[index].ratio;
+                let angle = |motor: &StepperMotor| motor.load_angle(ratio * gravity[index], 0.0);
+                axes[index].motor.stepper().map_or(0.0, |motor| angle(motor).unwrap_or(0.0) * ratio)
+            });
+            Ok(springs + rotors)
+        };
+        let motors = Joints::<N>::from_fn(|axis, _| motors[axis]);
+        let home = Joints::<N>::from_fn(|axis, _| home_joints[axis]);
+        let near = |off: Joints<N>| {
+            axes.iter().enumerate().take(N).all(|(index, axis)| {
+                off[index].abs() <= COUNTS * axis.encoder.resolution() * axis.ratio.abs()
+            })
+        };
+        // Steppers that were powered at home stand there: their rotors sag, their fields do not.
+        let is_home = near(motors - home) || near(motors - home - sag(&home)?);
+        let joints = if is_home { home } else { motors - sag(&motors)? };
+        Ok(axis_array(joints.as_slice()))
+    }
 }
 
 /// Where a job departs from; `None` where the drawing's own start is as good.
