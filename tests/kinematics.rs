@@ -17,12 +17,16 @@ const TOLERANCE: f64 = 1e-9;
 
 /// Runs a verb on these lines of input.
 fn kinematics(place: &Place, machine: &Path, motor: bool, verb: &str, input: &str) -> Ended {
+    let more: &[&str] = if motor { &["--motor"] } else { &[] };
+    kinematics_with(place, machine, more, verb, input)
+}
+
+/// Runs a verb on these lines of input, with more arguments.
+fn kinematics_with(place: &Place, machine: &Path, more: &[&str], verb: &str, input: &str) -> Ended {
     let input = place.file(&format!("{verb}.jsonl"), input);
     let (output, error) = (place.path("output"), place.path("error"));
     let mut arguments = vec!["kinematics", "--machine", machine.to_str().unwrap()];
-    if motor {
-        arguments.push("--motor");
-    }
+    arguments.extend(more);
     arguments.push(verb);
     let status = place
         .command(&arguments)
@@ -143,6 +147,312 @@ fn every_verb_gives_the_golden_vectors_in_motor_angles() {
             let force = &ellipse[index]["force"];
             assert_close(&force["axes"], &json!(inverses), &what("force ellipse"));
         }
+    }
+}
+
+/// A machine file with the dimensions of the golden vectors.
+struct Golden {
+    name: &'static str,
+    arguments: Vec<String>,
+    place: Place,
+}
+
+impl Golden {
+    fn new(name: &'static str, changes: &[String]) -> Self {
+        let set = |change: &String| ["--set".to_owned(), format!("machine.{change}")];
+        let arguments = changes.iter().flat_map(set).collect();
+        Self { name, arguments, place: Place::new() }
+    }
+
+    fn in_motor_angles(mut self) -> Self {
+        self.arguments.push("--motor".to_owned());
+        self
+    }
+
+    fn ask(&self, verb: &str, cases: &[Value], request: impl Fn(&Value) -> Value) -> Vec<Value> {
+        let input: String = cases.iter().map(|case| request(case).to_string() + "\n").collect();
+        let machine = support::source("machines").join(format!("{}.toml", self.name));
+        let more: Vec<&str> = self.arguments.iter().map(String::as_str).collect();
+        let replies = replies(&kinematics_with(&self.place, &machine, &more, verb, &input));
+        assert_eq!(replies.len(), cases.len());
+        replies
+    }
+
+    /// Asserts what each case expects, by pointers into the reply and into the case.
+    fn check(
+        &self,
+        verb: &str,
+        cases: &[Value],
+        request: impl Fn(&Value) -> Value,
+        expected: &[(&str, &str)],
+    ) {
+        for (index, (reply, case)) in self.ask(verb, cases, request).iter().zip(cases).enumerate() {
+            for (found, wanted) in expected {
+                let what = format!("{} {verb} {index} {found}: {reply}", self.name);
+                let found = reply.pointer(found).unwrap_or_else(|| panic!("{what}"));
+                assert_close(found, case.pointer(wanted).unwrap(), &what);
+            }
+        }
+    }
+
+    /// Asserts that a pose is refused with the golden code; a limit names its axis and both numbers.
+    fn refuses(&self, case: &Value, request: &Value) {
+        let reply = &self.ask("inverse", &[request.clone()], Value::clone)[0];
+        let code = case["expect"].as_str().unwrap();
+        assert_eq!(reply["error"]["code"], code, "{case}: {reply}");
+        let (value, limit) = (number(reply, "/error/value"), number(reply, "/error/limit"));
+        assert!(value != limit, "{reply}");
+        if let Some(axis) = code.strip_prefix("limit_") {
+            assert_eq!(reply["error"]["axis"], axis, "{reply}");
+        }
+    }
+}
+
+fn cases<'a>(golden: &'a Value, key: &str) -> &'a [Value] {
+    golden[key].as_array().unwrap()
+}
+
+/// The linkages of source 003: what their golden files have in common.
+#[test]
+fn the_linkages_give_their_golden_vectors() {
+    let rail = ["-600 mm", "600 mm"].map(|end| format!("\"{end}\"")).join(", ");
+    let wide = ["p1", "p2"].map(|axis| format!("axis.{axis}.limits.position=[{rail}]"));
+    let machines = [
+        (Golden::new("five_bar", &[]), 0.0),
+        (Golden::new("prrrp", &wide).in_motor_angles(), ROTOR_INERTIA),
+    ];
+    for (machine, rotor) in machines {
+        let golden = golden(machine.name);
+        let mut poses = cases(&golden, "poses").to_vec();
+        for pose in &mut poses {
+            // Motor angles count the rotors too, which the golden vectors leave out.
+            let effort = [0, 1].map(|axis| {
+                number(pose, &format!("/tau/{axis}"))
+                    + rotor * number(pose, &format!("/qdd/{axis}"))
+            });
+            pose["tau"] = json!(effort);
+        }
+        let joints = |pose: &Value| json!({ "q": pose["q"] });
+        let place = |pose: &Value| json!({ "pose": { "position": pose["x"] } });
+        machine.check("inverse", &poses, place, &[("/q", "/q")]);
+        machine.check("forward", &poses, joints, &[("/pose/position", "/x")]);
+        let matrix = [("/j", "/J"), ("/det", "/det_J"), ("/singular_values", "/singular_values")];
+        machine.check("jacobian", &poses, joints, &matrix);
+        let motion = |pose: &Value| json!({ "q": pose["q"], "qd": pose["qd"], "qdd": pose["qdd"] });
+        machine.check("dynamics", &poses, motion, &[("/effort", "/tau")]);
+        machine.check("ellipse", &poses, joints, &[("/velocity/axes", "/singular_values")]);
+        for (reply, pose) in machine.ask("ellipse", &poses, joints).iter().zip(&poses) {
+            let turned = number(reply, "/velocity/angle") - number(pose, "/manip_major_axis_angle");
+            // A line has no sense.
+            let halves = turned / core::f64::consts::PI;
+            assert!((halves - halves.round()).abs() < TOLERANCE, "{}: {turned}", machine.name);
+        }
+    }
+}
+
+#[test]
+fn every_mode_of_the_five_bar_gives_its_golden_vector() {
+    let golden = golden("five_bar");
+    let wide = ["th1", "th2"].map(|axis| format!("axis.{axis}.limits.position=unlimited"));
+    let machine = Golden::new("five_bar", &wide);
+    for mode in cases(&golden["modes_at"], "modes") {
+        let signs: Vec<i32> =
+            cases(mode, "working_mode").iter().map(|sign| sign.as_f64().unwrap() as i32).collect();
+        let assembly = mode["reproduced_by_assembly"].as_f64().unwrap() as i32;
+        let request = |assembly: i32| {
+            json!({
+                "pose": { "position": golden["modes_at"]["x"] },
+                "branch": { "working_mode": signs, "assembly_mode": assembly },
+            })
+        };
+        machine.check("inverse", &[mode.clone()], |_| request(assembly), &[("/q", "/q")]);
+        machine.refuses(&json!({ "expect": "wrong_assembly_mode" }), &request(-assembly));
+    }
+}
+
+/// The friction of a golden joint as that of its motor, `ratio` joint units per turn of the motor.
+fn friction(axis: &str, ratio: f64, golden: &Value, index: usize) -> [String; 2] {
+    let coulomb = number(golden, &format!("/coul/{index}")) * ratio;
+    let viscous = number(golden, &format!("/visc/{index}")) * ratio * ratio;
+    [
+        format!("axis.{axis}.friction.coulomb={coulomb} N m"),
+        format!("axis.{axis}.friction.viscous={viscous} N m s/rad"),
+    ]
+}
+
+#[test]
+fn the_polar_machine_gives_its_golden_vectors() {
+    let golden = golden("polar");
+    let inverse = |case: &Value| {
+        json!({
+            "pose": { "position": case["input"]["p"] },
+            "branch": { "side": case["input"]["branch"] },
+            "previous": [0, case["input"]["prev_th2"], 0],
+        })
+    };
+    let joints = |case: &Value| json!({ "q": case["output"]["q"] });
+    let lead = 0.005 / (2.0 * core::f64::consts::PI);
+    let changes: Vec<String> = [("th1", 1.0 / 50.0), ("th2", 1.0 / 20.0), ("d", lead)]
+        .iter()
+        .enumerate()
+        .flat_map(|(index, (axis, ratio))| friction(axis, *ratio, &golden["params"], index))
+        .collect();
+    let reference = Golden::new("polar", &changes);
+    // With the arm longer than the table is far, the centre is out of reach.
+    let blind = Golden::new(
+        "polar",
+        &[
+            "mechanism.polar.center_distance=240 mm".to_owned(),
+            "axis.th1.limits.position=[\"-0.7 rad\", \"0.7 rad\"]".to_owned(),
+            "axis.th2.limits.position=[\"-2 rev\", \"2 rev\"]".to_owned(),
+        ],
+    );
+    for (machine, key) in [(&reference, "cases"), (&blind, "cases_b")] {
+        let cases = cases(&golden, key);
+        machine.check("inverse", cases, inverse, &[("/q", "/output/q")]);
+        machine.check("forward", cases, joints, &[("/pose/position", "/output/fk")]);
+        machine.check("jacobian", cases, joints, &[("/j", "/output/jacobian")]);
+    }
+    let motion = |case: &Value| {
+        let input = &case["input"];
+        json!({ "q": case["output"]["q"], "qd": input["qd"], "qdd": input["qdd"] })
+    };
+    reference.check("dynamics", cases(&golden, "cases"), motion, &[("/effort", "/output/tau")]);
+    for case in cases(&golden, "failing") {
+        assert_eq!(case["params"], "params");
+        reference.refuses(case, &inverse(case));
+    }
+    // Each line stays near the line before it, here to the other side of the centre.
+    let crossing = |knot: &Value| {
+        let mut request = json!({ "pose": { "position": [knot["x"], knot["y"], 0.05] } });
+        if number(knot, "/x") == -0.05 {
+            request["previous"] = json!([-0.2, 1.47, 0.05]);
+        }
+        request
+    };
+    let knots = cases(&golden, "center_crossing");
+    reference.check("inverse", knots, crossing, &[("/q", "/q"), ("/branch/side", "/branch")]);
+}
+
+#[test]
+fn the_mcm_gives_its_golden_vectors() {
+    let golden = golden("mcm");
+    let machine = Golden::new("mcm", &[]);
+    let joints = |case: &Value| json!({ "q": case["output"]["q"] });
+    // The tool's attitude in the angles of the machine, or as the direction of the beam.
+    let inverse = |case: &Value| {
+        let input = &case["input"];
+        let mut pose = json!({ "position": input["p"] });
+        for key in ["a", "r"].into_iter().filter(|key| input.get(*key).is_some()) {
+            pose[key] = input[key].clone();
+        }
+        if let Some(axis) = input.get("tool_axis") {
+            pose["axis"] = axis.clone();
+        }
+        let side = input.get("sign").or(input.get("sign_X")).cloned().unwrap_or(json!(1));
+        let turned = input.get("prev_d").cloned().unwrap_or(json!(0));
+        let previous = input.get("prev_q").cloned().unwrap_or(json!([0.3, 0, turned, 0, 0]));
+        json!({ "pose": pose, "branch": { "side": side }, "previous": previous })
+    };
+    for (key, place, axis) in [
+        ("cases_ik_ar", "/input/p", "/output/tool_axis_workpiece"),
+        ("cases_ik_dir", "/output/fk_p", "/output/fk_t"),
+    ] {
+        let cases = cases(&golden, key);
+        machine.check("inverse", cases, inverse, &[("/q", "/output/q")]);
+        let pose = [("/pose/position", place), ("/pose/axis", axis)];
+        machine.check("forward", cases, joints, &pose);
+        machine.check("jacobian", cases, joints, &[("/j", "/output/jacobian")]);
+    }
+    for case in cases(&golden, "failing").iter().filter(|case| case["kind"] != "cone") {
+        machine.refuses(case, &inverse(case));
+    }
+}
+
+/// Rz(yaw)·Ry(pitch)·Rx(roll), row by row.
+fn rotation(angles: &Value) -> Value {
+    let [(sr, cr), (sp, cp), (sy, cy)] =
+        [0, 1, 2].map(|index| signals::math::sin_cos(number(angles, &format!("/{index}"))));
+    json!([
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ])
+}
+
+/// The product of two square matrices, row by row.
+fn product(one: &Value, other: &Value) -> Value {
+    let size = one.as_array().unwrap().len();
+    let entry = |row: usize, column: usize| -> f64 {
+        (0..size)
+            .map(|index| {
+                number(one, &format!("/{row}/{index}"))
+                    * number(other, &format!("/{index}/{column}"))
+            })
+            .sum()
+    };
+    let row = |row| (0..size).map(|column| entry(row, column)).collect::<Vec<_>>();
+    json!((0..size).map(row).collect::<Vec<_>>())
+}
+
+#[test]
+fn the_tri_planar_platform_gives_its_golden_vectors() {
+    let golden = golden("tri_planar");
+    let machine = Golden::new("tri_planar", &[]);
+    let legs = |case: &Value| json!({ "legs": case["input"]["modes"] });
+    let joints = |case: &Value| json!({ "q": case["output"]["motors"], "branch": legs(case) });
+    let inverse = |case: &Value| {
+        let input = &case["input"];
+        let pose = json!({ "position": input["t"], "rotation": rotation(&input["rpy"]) });
+        json!({ "pose": pose, "branch": legs(case) })
+    };
+    for key in ["cases", "cases_inward"] {
+        let cases = cases(&golden, key);
+        machine.check("inverse", cases, inverse, &[("/q", "/output/motors")]);
+        let identity: Vec<Vec<f64>> = (0..6)
+            .map(|row| (0..6).map(|column| f64::from(u8::from(row == column))).collect())
+            .collect();
+        for (reply, case) in machine.ask("jacobian", cases, joints).iter().zip(cases) {
+            let product = product(&reply["j"], &case["output"]["jinv"]);
+            assert_close(&product, &json!(identity), "the golden matrix is the inverse");
+        }
+        // Each on its own, because poses that lie far apart give no start for each other.
+        for case in cases {
+            let pose = [("/pose/position", "/input/t"), ("/pose/rotation", "/input/R")];
+            machine.check("forward", core::slice::from_ref(case), joints, &pose);
+        }
+    }
+    let path = |knot: &Value| json!({ "pose": { "position": knot["t"], "rotation": rotation(&knot["rpy"]) } });
+    machine.check("inverse", cases(&golden, "trajectory"), path, &[("/q", "/motors")]);
+    for case in cases(&golden, "failing") {
+        let changes: Vec<String> = case["override"]
+            .as_object()
+            .unwrap()
+            .iter()
+            .map(|(key, value)| format!("mechanism.tri_planar.{key}={value} m"))
+            .collect();
+        Golden::new("tri_planar", &changes).refuses(case, &inverse(case));
+    }
+}
+
+#[test]
+fn the_twin_actuator_gives_its_golden_vectors() {
+    let golden = golden("twin_actuator");
+    let machine = Golden::new("twin_actuator", &[]);
+    let inverse = |case: &Value| json!({ "pose": { "position": case["input"]["P"] } });
+    let joints = |case: &Value| json!({ "q": case["output"]["L_total"] });
+    let poses = cases(&golden, "cases");
+    machine.check("inverse", poses, inverse, &[("/q", "/output/L_total")]);
+    machine.check("forward", poses, joints, &[("/pose/position", "/output/fk_P")]);
+    let matrix = [("/j", "/output/jacobian"), ("/det", "/output/det")];
+    machine.check("jacobian", poses, joints, &matrix);
+    // The product of the semi-axes is the determinant.
+    for (reply, case) in machine.ask("ellipse", poses, joints).iter().zip(poses) {
+        let area = number(reply, "/velocity/axes/0") * number(reply, "/velocity/axes/1");
+        assert_close(&json!(area), &json!(number(case, "/output/det").abs()), "ellipse");
+    }
+    for case in cases(&golden, "failing").iter().filter(|case| case["kind"] == "ik") {
+        machine.refuses(case, &inverse(case));
     }
 }
 
