@@ -5,6 +5,7 @@
 
 use crate::feedforward::Planned;
 use machine::Machine;
+use machine::motor::StepperMotor;
 use signals::{AxisArray, FaultCode, MAX_AXES};
 
 use crate::supervision::{Finding, Tracking};
@@ -31,7 +32,9 @@ impl Alignment {
         let mut offset = [0.0; MAX_AXES];
         for (index, axis) in machine.axes.iter().enumerate().take(MAX_AXES) {
             offset[index] = standing.angle[index] - start.angle[index];
-            let limit = TOLERANCE * axis.encoder.resolution();
+            // A stepper is powered where its rotor stands, and leads it by what gravity asks.
+            let load_angle = axis.motor.stepper().map_or(0.0, StepperMotor::largest_load_angle);
+            let limit = (TOLERANCE * axis.encoder.resolution()).max(load_angle);
             if offset[index].abs() > limit || offset[index].is_nan() {
                 let (value, limit) = (offset[index].abs() * axis.ratio, limit * axis.ratio);
                 let code = FaultCode::StreamStart;

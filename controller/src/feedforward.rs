@@ -116,12 +116,16 @@ impl Feedforward {
         let mut planned = Planned { tool: from.tool, ..Planned::default() };
         if fraction == 0.0 {
             for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
-                let lead_speed = (to.lead[index] - earlier.lead[index]) / (2.0 * CYCLE_TIME);
+                let slope = |from: f64, to: f64| (to - from) / (2.0 * CYCLE_TIME);
+                let lead_speed = slope(earlier.lead[index], to.lead[index]);
+                let static_speed = slope(earlier.static_lead[index], to.static_lead[index]);
                 let joint = Joint {
                     position: from.position[index],
                     velocity: from.velocity[index],
                     lead: from.lead[index],
                     lead_speed,
+                    static_lead: from.static_lead[index],
+                    static_speed,
                     lead_momentum: from.lead_momentum[index],
                     effort: from.effort[index],
                     standing: from.static_effort[index],
@@ -148,11 +152,20 @@ impl Feedforward {
                 (later.lead[index] - from.lead[index]) / 2.0,
                 fraction,
             );
+            let (static_lead, static_speed) = hermite(
+                from.static_lead[index],
+                (to.static_lead[index] - earlier.static_lead[index]) / 2.0,
+                to.static_lead[index],
+                (later.static_lead[index] - from.static_lead[index]) / 2.0,
+                fraction,
+            );
             let joint = Joint {
                 position,
                 velocity: velocity / CYCLE_TIME,
                 lead,
                 lead_speed: lead_speed / CYCLE_TIME,
+                static_lead,
+                static_speed: static_speed / CYCLE_TIME,
                 lead_momentum: linear(from.lead_momentum[index], to.lead_momentum[index]),
                 effort: linear(from.effort[index], to.effort[index]),
                 standing: linear(from.static_effort[index], to.static_effort[index]),
@@ -238,6 +251,8 @@ struct Joint {
     velocity: f64,
     lead: f64,
     lead_speed: f64,
+    static_lead: f64,
+    static_speed: f64,
     lead_momentum: f64,
     effort: f64,
     standing: f64,
@@ -248,8 +263,11 @@ impl Planned {
     /// Joint to motor, at `rate` and its `change`.
     fn put(&mut self, index: usize, axis: &Axis, joint: &Joint, rate: f64, change: f64) {
         let square = rate * rate;
-        let lead = joint.lead * square + joint.lead_momentum * change;
-        let speed = (joint.velocity + joint.lead_speed * square) * rate / axis.ratio;
+        let lead = joint.static_lead
+            + (joint.lead - joint.static_lead) * square
+            + joint.lead_momentum * change;
+        let lead_speed = joint.static_speed + (joint.lead_speed - joint.static_speed) * square;
+        let speed = (joint.velocity + lead_speed) * rate / axis.ratio;
         self.angle[index] = (joint.position + lead) / axis.ratio;
         self.speed[index] = speed;
         self.torque[index] = joint.standing

@@ -65,6 +65,9 @@ impl Segment {
     /// What comes after this one, slowing down by `deceleration` [rad/s²] or to rest.
     pub fn brake(&self, deceleration: f64) -> Self {
         let speed = self.to_speed;
+        if speed == 0.0 {
+            return self.then(self.to, 0.0);
+        }
         let left = speed.abs() - deceleration * CYCLE_TIME;
         if left > 0.0 {
             let end = left * speed.signum();
@@ -89,6 +92,11 @@ impl Segment {
         let (_, square, cube) = self.coefficients();
         let turn = -square / (3.0 * cube);
         let inside = if turn > 0.0 && turn < 1.0 { self.at(turn).1.abs() } else { 0.0 };
+        let ends = [self.from_speed, self.to_speed, self.from, self.to];
+        // `max` would drop what is not a number.
+        if ends.iter().any(|end| end.is_nan()) {
+            return f64::NAN;
+        }
         self.from_speed.abs().max(self.to_speed.abs()).max(inside)
     }
 

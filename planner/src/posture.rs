@@ -94,7 +94,7 @@ fn periodic<const N: usize, M: Mechanism<N>>(
 /// Margins that only the inverse kinematics needs: the joints may pass there, and a path has the
 /// rates that it needs, which the limits of the axes judge.
 fn is_serial(name: &str) -> bool {
-    const HARD: [&str; 4] = ["type_2", "collision", "clear", "gap"];
+    const HARD: [&str; 7] = ["type_2", "collision", "clear", "gap", "baseline", "near_a", "stator"];
     !HARD.iter().any(|hard| name.contains(hard))
 }
 

@@ -291,8 +291,16 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         let whole = walk(self.demands, start, parts)?;
         whole.within(self.demands)?;
         let mut limits = self.demands.path;
-        for _ in 0..TRIALS {
-            let Some(straight) = Straight::new(from, to, &limits) else { break };
+        let mut trials = 0;
+        while let Some(straight) = Straight::new(from, to, &limits) {
+            trials += 1;
+            if trials > TRIALS {
+                let detail = "the axes cannot follow a straight move to here, however slow";
+                let code = "overload";
+                return Err(
+                    KinematicsError { code, axis: None, value: 1.0, limit: 0.0, detail }.into()
+                );
+            }
             let duration = straight.profile.duration();
             if self.pace(self.now, duration, &|time| straight.at(time))? <= 1.0 {
                 self.push(duration, Way::Straight(straight));

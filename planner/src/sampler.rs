@@ -96,6 +96,8 @@ impl Drive {
             .load_angle(torque, speed)
             .unwrap_or_else(|_| stepper.largest_load_angle().copysign(torque));
         setpoint.lead[axis] += self.ratio * angle;
+        let standing = stepper.load_angle(setpoint.static_effort[axis], 0.0);
+        setpoint.static_lead[axis] += self.ratio * standing.unwrap_or(0.0);
         setpoint.lead_momentum[axis] += self.ratio * setpoint.momentum[axis] / stepper.stiffness();
     }
 }
@@ -275,6 +277,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             acceleration: axis_array(motion.acceleration.as_slice()),
             jerk: axis_array(motion.jerk.as_slice()),
             lead: axis_array(lead.as_slice()),
+            static_lead: axis_array(self.lead.settled(&gravity).as_slice()),
             effort: per_axis(&|axis, drive| {
                 drive.inertia * acceleration[axis] / drive.ratio + drive.ratio * mean[axis]
             }),

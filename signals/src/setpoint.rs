@@ -20,8 +20,9 @@ sample! {
     ///
     /// Played at rate `r` (1 is as planned) and rate change `ṙ` [1/s], the effort is
     /// `static_effort + (effort − static_effort)·r² + momentum·ṙ`, and the lead is
-    /// `lead·r² + lead_momentum·ṙ` up to the small part of the transmission's damping.
-    Setpoint = "graver.Setpoint.v1" {
+    /// `static_lead + (lead − static_lead)·r² + lead_momentum·ṙ` up to the small part of the
+    /// transmission's damping.
+    Setpoint = "graver.Setpoint.v2" {
         /// The stream this sample belongs to; one job is one stream. Never 0.
         stream: u64,
         /// Position in the stream, from 0 without gaps.
@@ -50,9 +51,11 @@ sample! {
         acceleration: AxisArray,
         /// Joint jerk, load side [m/s³ or rad/s³].
         jerk: AxisArray,
-        /// How far the motor side is ahead of the load side through the elastic transmission, in
-        /// joint units [m or rad].
+        /// How far the motor side is ahead of the load side through the elastic transmission, and a
+        /// stepper's field ahead of its rotor, in joint units [m or rad].
         lead: AxisArray,
+        /// The part of `lead` that does not move with the rate: what gravity stretches and turns.
+        static_lead: AxisArray,
         /// The lead per unit of rate change [m·s or rad·s].
         lead_momentum: AxisArray,
         /// Torque of the motor for this motion, rotor included, friction excluded [N·m].

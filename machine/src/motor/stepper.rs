@@ -78,9 +78,28 @@ impl StepperMotor {
         self.full_steps * self.microsteps
     }
 
-    /// Speed at the largest pulse rate [rad/s].
+    /// Speed at the largest pulse rate, or where the pull-out torque has fallen to a tenth of the
+    /// holding torque, whichever is lower [rad/s]: beyond it nothing is left to brake with.
     pub fn largest_speed(&self) -> f64 {
-        self.pulse_rate / self.pulses_per_radian()
+        /// Share of the holding torque that an axis must keep.
+        const LEAST: f64 = 0.1;
+        /// Bisections, to a part in 10¹² of the range.
+        const BISECTIONS: u32 = 40;
+        let most = self.pulse_rate / self.pulses_per_radian();
+        let holds = |speed: f64| self.pull_out_torque(speed) >= LEAST * self.holding_torque;
+        if holds(most) {
+            return most;
+        }
+        let (mut low, mut high) = (0.0, most);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if holds(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
     }
 
     /// Angle between rotor and magnetic axis from which the rotor falls out of step [rad].

@@ -94,6 +94,13 @@ pub(super) fn draw(
     Ok(cloud.draw(&name, &points, power, Vector3::from(machine.home), line))
 }
 
+/// Whether so many points can be made.
+fn is_count(number: f64) -> bool {
+    /// More would not fit into the week that a job may last.
+    const MOST: f64 = 1e7;
+    (1.0..=MOST).contains(&number) && number.fract() == 0.0
+}
+
 fn points(table: &CloudTable, folder: &Path, findings: &mut Findings) -> Vec<Vector3<f64>> {
     let at = table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
     match (&table.file, &table.sphere) {
@@ -112,6 +119,12 @@ fn points(table: &CloudTable, folder: &Path, findings: &mut Findings) -> Vec<Vec
                     Vec::new()
                 }
             }
+        }
+        (None, Some(sphere)) if !is_count(sphere.count.value) => {
+            let text = format!("a cloud of {} points cannot be made", sphere.count.value);
+            let help = "write a whole number from 1 to 10,000,000";
+            findings.contradict(sphere.count.place, text, help);
+            Vec::new()
         }
         (None, Some(sphere)) => cloud::sphere(
             Vector3::from(sphere.center.value) + at,
