@@ -12,18 +12,21 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use super::cloud_table::{self, CloudTable};
 use super::letters::{self, Letter, Style};
+use super::path_table::{self, PathTable};
 use super::workpiece_table::{self, AttitudeTable, SurfaceTable};
 use super::{Job, JobError, Marking, MarkingSpeed, gcode, points};
 use crate::attitude::AttitudeLaw;
 use crate::drawing::{Drawing, Power};
 
 table! {
-    /// What to mark, and how: exactly one of `letters`, `points`, `cloud` and `gcode`.
+    /// What to mark, and how: exactly one of `letters`, `points`, `path`, `cloud` and `gcode`.
     pub struct JobTable {
         /// Letters of the thesis.
         pub letters: Option<LettersTable>,
         /// A list of points, each marked by a dwell.
         pub points: Option<PointsTable>,
+        /// A path in space.
+        pub path: Option<PathTable>,
         /// Points inside glass.
         pub cloud: Option<CloudTable>,
         /// A G-code program.
@@ -55,6 +58,8 @@ table! {
         pub height: Quantity<Length, Positive> = "20 mm",
         /// curves: no stop on a curve; h1, h2: chord by chord, the thesis's conventions.
         pub style: Located<Style> = "curves",
+        /// Where the middle of the row lies as seen from the machine's home.
+        pub at: Option<Point>,
     }
 }
 
@@ -131,7 +136,8 @@ pub fn schema() -> String {
 /// Reads a job file whose text is in `document`; `folder` is where its relative paths start.
 pub(super) fn job(document: Document, folder: &Path, machine: &Machine) -> Result<Job, JobError> {
     let (table, mut findings) = document.decode::<JobTable>()?;
-    let JobTable { letters, points, cloud, gcode, surface, attitude, marking, place } = table;
+    let JobTable { letters, points, path, cloud, gcode, surface, attitude, marking, place } = table;
+    let home = Vector3::from(machine.home);
     let surface = surface.and_then(|table| workpiece_table::surface(&table, &mut findings));
     let on_surface;
     let machine = match surface {
@@ -143,13 +149,19 @@ pub(super) fn job(document: Document, folder: &Path, machine: &Machine) -> Resul
         }
         None => machine,
     };
-    let job =
-        of_tables((letters, points, cloud, gcode), &marking, place, findings, folder, machine)?;
-    Ok(workpiece_table::place(job, surface, attitude.as_ref()))
+    let kinds = Kinds { letters, points, path, cloud, gcode };
+    let job = of_tables(kinds, &marking, place, findings, folder, machine)?;
+    Ok(workpiece_table::place(job, surface, attitude.as_ref(), home))
 }
 
 /// What a job marks: one of these.
-type Kinds = (Option<LettersTable>, Option<PointsTable>, Option<CloudTable>, Option<GcodeTable>);
+struct Kinds {
+    letters: Option<LettersTable>,
+    points: Option<PointsTable>,
+    path: Option<PathTable>,
+    cloud: Option<CloudTable>,
+    gcode: Option<GcodeTable>,
+}
 
 /// Reads the one kind that there is.
 fn of_tables(
@@ -160,43 +172,51 @@ fn of_tables(
     folder: &Path,
     machine: &Machine,
 ) -> Result<Job, JobError> {
-    match kinds {
-        (Some(letters), None, None, None) => Ok(of_letters(&letters, marking, findings, machine)?),
-        (None, Some(points), None, None) => Ok(of_points(&points, marking, findings, machine)?),
-        (None, None, Some(cloud), None) => {
-            let power = power(marking);
-            let drawing = cloud_table::draw(&cloud, folder, power, &mut findings, machine)?;
-            Ok(findings.finish(job_of(drawing, marking))?)
-        }
-        (None, None, None, Some(program)) => {
-            let path: PathBuf = folder.join(&program.file.value);
-            of_program(&path, marking, findings, machine)
-        }
-        (None, None, None, None) => {
-            findings.contradict(
-                place,
-                "nothing to mark".to_owned(),
-                "add one of the tables [letters], [points], [cloud] and [gcode]",
-            );
-            Ok(findings.fail()?)
-        }
-        (letters, points, cloud, gcode) => {
-            let places = [
-                letters.map(|table| table.place),
-                points.map(|table| table.place),
-                cloud.map(|table| table.place),
-                gcode.map(|table| table.place),
-            ];
-            for place in places.into_iter().flatten().skip(1) {
-                findings.contradict(
-                    place,
-                    "a job marks one thing".to_owned(),
-                    "keep one of the tables [letters], [points], [cloud] and [gcode]",
-                );
-            }
-            Ok(findings.fail()?)
-        }
+    const HELP: &str = "keep one of the tables [letters], [points], [path], [cloud] and [gcode]";
+    let Kinds { letters, points, path, cloud, gcode } = kinds;
+    let places = [
+        letters.as_ref().map(|table| table.place),
+        points.as_ref().map(|table| table.place),
+        path.as_ref().map(|table| table.place),
+        cloud.as_ref().map(|table| table.place),
+        gcode.as_ref().map(|table| table.place),
+    ];
+    for place in places.into_iter().flatten().skip(1) {
+        findings.contradict(place, "a job marks one thing".to_owned(), HELP);
     }
+    let power = power(marking);
+    if places.iter().flatten().count() > 1 {
+        Ok(findings.fail()?)
+    } else if let Some(letters) = letters {
+        Ok(of_letters(&letters, marking, findings, machine)?)
+    } else if let Some(points) = points {
+        Ok(of_points(&points, marking, findings, machine)?)
+    } else if let Some(path) = path {
+        let line = line(&findings, path.place);
+        let name = stem(&findings, "path");
+        let home = Vector3::from(machine.home);
+        let drawing = path_table::draw(&path, &name, power, home, line, &mut findings);
+        Ok(findings.finish(job_of(drawing, marking))?)
+    } else if let Some(cloud) = cloud {
+        let drawing = cloud_table::draw(&cloud, folder, power, &mut findings, machine)?;
+        Ok(findings.finish(job_of(drawing, marking))?)
+    } else if let Some(program) = gcode {
+        let path: PathBuf = folder.join(&program.file.value);
+        of_program(&path, marking, findings, machine)
+    } else {
+        findings.contradict(
+            place,
+            "nothing to mark".to_owned(),
+            "add one of the tables [letters], [points], [path], [cloud] and [gcode]",
+        );
+        Ok(findings.fail()?)
+    }
+}
+
+/// The name of the job file without its extension; `other` where it has none.
+fn stem(findings: &Findings, other: &str) -> String {
+    let stem = Path::new(findings.file()).file_stem().and_then(|stem| stem.to_str());
+    stem.unwrap_or(other).to_owned()
 }
 
 /// Reads the G-code program at `path` as a job of its own, with `overrides` of `[marking]`.
@@ -234,7 +254,12 @@ fn of_letters(
     let line = line(&findings, table.text.place);
     let (style, home) = (table.style.value, Vector3::from(machine.home));
     let power = Power { level: power(marking), follows_speed: false };
-    let drawing = letters::draw(&text, table.height.value, style, power, home, line);
+    let middle = home + table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
+    let mut drawing = letters::draw(&text, table.height.value, style, power, middle, line);
+    // Style h2 begins beside its letters, wherever they are.
+    if style != Style::H2 {
+        drawing.start = home;
+    }
     let (rapid, ideal_only) = match style {
         Style::Curves => (None, None),
         Style::H1 => (Some(H1_RAPID), None),
@@ -257,9 +282,8 @@ fn of_points(
     let places: Vec<Vector3<f64>> =
         table.points.iter().map(|point| home + Vector3::from(point.value)).collect();
     let line = line(&findings, table.place);
-    let stem = Path::new(findings.file()).file_stem().and_then(|stem| stem.to_str());
-    let name = stem.unwrap_or("points");
-    let drawing = points::draw(name, &places, table.dwell.value, power(marking), home, line);
+    let name = stem(&findings, "points");
+    let drawing = points::draw(&name, &places, table.dwell.value, power(marking), home, line);
     findings.finish(job_of(drawing, marking))
 }
 

@@ -5,6 +5,7 @@ pub mod cloud_table;
 pub mod file;
 pub mod gcode;
 pub mod letters;
+pub mod path_table;
 pub mod points;
 pub mod workpiece_table;
 

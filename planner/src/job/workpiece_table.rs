@@ -53,7 +53,7 @@ table! {
 }
 
 table! {
-    /// How the tool is turned all the time: about x, then y, then z of the machine.
+    /// How the tool is turned: about x, then y, then z of the machine.
     pub struct AttitudeTable {
         /// About x.
         pub roll: Quantity<Angle> = "0 deg",
@@ -61,6 +61,21 @@ table! {
         pub pitch: Quantity<Angle> = "0 deg",
         /// About z.
         pub yaw: Quantity<Angle> = "0 deg",
+        /// A lean besides, which follows the tool's position.
+        pub follow: Option<FollowTable>,
+    }
+}
+
+table! {
+    /// A lean in proportion to the distance from a centre, across z: `tilt` at `radius`, twice that
+    /// at twice the radius.
+    pub struct FollowTable {
+        /// Where there is no lean, as seen from the machine's home.
+        pub center: Option<Point>,
+        /// The lean at `radius`: the tool's z away from the centre, towards it where negative.
+        pub tilt: Quantity<Angle>,
+        /// Where the lean is `tilt`.
+        pub radius: Quantity<Length, Positive>,
     }
 }
 
@@ -129,11 +144,24 @@ pub(super) fn middle(surface: &Surface) -> [f64; 3] {
     }
 }
 
-/// Puts the job on its surface and turns its tool.
-pub(super) fn place(job: Job, surface: Option<Surface>, attitude: Option<&AttitudeTable>) -> Job {
+/// Puts the job on its surface and turns its tool, on a machine with this `home` [m].
+pub(super) fn place(
+    job: Job,
+    surface: Option<Surface>,
+    attitude: Option<&AttitudeTable>,
+    home: Vector3<f64>,
+) -> Job {
     let law = match (attitude, surface) {
-        (Some(fixed), _) => {
-            AttitudeLaw::Fixed(turned(fixed.roll.value, fixed.pitch.value, fixed.yaw.value))
+        (Some(table), _) => {
+            let base = turned(table.roll.value, table.pitch.value, table.yaw.value);
+            table.follow.as_ref().map_or(AttitudeLaw::Fixed(base), |follow| {
+                let center = follow.center.as_ref().map_or([0.0; 3], |center| center.value);
+                AttitudeLaw::Following {
+                    center: home + Vector3::from(center),
+                    gradient: follow.tilt.value / follow.radius.value,
+                    base,
+                }
+            })
         }
         (None, Some(surface)) => AttitudeLaw::Normal(surface),
         (None, None) => AttitudeLaw::Level,
