@@ -36,11 +36,37 @@ pub struct LoopGains {
     pub inertia: f64,
 }
 
+/// What a joint is measured in. Its number is the form of a quantity of a joint's travel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JointUnit {
+    /// [m].
+    Length = 0,
+    /// [rad].
+    Angle = 1,
+}
+
+impl JointUnit {
+    /// The symbol of the joint's position.
+    pub fn name(self) -> &'static str {
+        self.names()[0]
+    }
+
+    /// The symbols of the joint's position and its first three derivatives by time.
+    pub fn names(self) -> [&'static str; 4] {
+        match self {
+            Self::Length => ["m", "m/s", "m/s²", "m/s³"],
+            Self::Angle => ["rad", "rad/s", "rad/s²", "rad/s³"],
+        }
+    }
+}
+
 /// One actuated axis, in the order of the joints of the mechanism.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// The name in the machine file.
     pub name: String,
+    /// What its joint is measured in.
+    pub unit: JointUnit,
     /// Joint units moved per radian of the motor, gear and screw or pulley included; positive
     /// [m/rad or rad/rad].
     pub ratio: f64,

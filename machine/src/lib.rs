@@ -23,7 +23,7 @@ pub mod quantity;
 pub mod surface;
 pub mod taylor;
 
-pub use actuator::{Axis, Encoder, Friction, LoopGains};
+pub use actuator::{Axis, Encoder, Friction, JointUnit, LoopGains};
 pub use document::{DocumentError, Override};
 pub use kinematics::{Mechanism, Pose};
 pub use limits::{AxisLimits, PathLimits, WorkArea};

@@ -118,11 +118,17 @@ impl<'a> Checker<'a> {
             let name = Some(axis.name.as_str());
             let position = setpoint.position[index];
             let nearest = position.clamp(limits.position[0], limits.position[1]);
-            within(position, nearest, time, name, "joint position", "m or rad")?;
+            let [place, speed, acceleration, jerk] = axis.unit.names();
+            within(position, nearest, time, name, "joint position", place)?;
             let demands = [
-                (setpoint.velocity[index], limits.velocity, "joint velocity", "1/s"),
-                (setpoint.acceleration[index], limits.acceleration, "joint acceleration", "1/s²"),
-                (setpoint.jerk[index], limits.jerk, "joint jerk", "1/s³"),
+                (setpoint.velocity[index], limits.velocity, "joint velocity", speed),
+                (
+                    setpoint.acceleration[index],
+                    limits.acceleration,
+                    "joint acceleration",
+                    acceleration,
+                ),
+                (setpoint.jerk[index], limits.jerk, "joint jerk", jerk),
             ];
             let most =
                 [&mut uses.velocity[index], &mut uses.acceleration[index], &mut uses.jerk[index]];

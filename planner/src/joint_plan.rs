@@ -132,9 +132,11 @@ fn refusal(machine: &Machine, found: NoWay) -> PlanError {
     match cause {
         Refused::Kinematics(cause) => PlanError::Unreachable { line, place, cause },
         Refused::Position { axis, value, limit } => {
-            let axis = machine.axes.get(axis).map(|axis| axis.name.clone());
+            let axis = machine.axes.get(axis);
+            let unit = axis.map_or("", |axis| axis.unit.name());
+            let axis = axis.map(|axis| axis.name.clone());
             let quantity = "joint position";
-            let breach = Breach { time, axis, quantity, value, limit, unit: "m or rad" };
+            let breach = Breach { time, axis, quantity, value, limit, unit };
             PlanError::Limit { line, place, breach }
         }
     }

@@ -99,6 +99,7 @@ impl Mechanism<1> for Shaft {
 pub(crate) fn axis(inertia: f64, friction: Friction) -> machine::Axis {
     machine::Axis {
         name: "shaft".to_owned(),
+        unit: machine::JointUnit::Angle,
         ratio: 1.0,
         efficiency: 1.0,
         motor: Motor::Dc(DcMotor {

@@ -8,6 +8,8 @@ use crate::limits::AxisLimits;
 use crate::motor::Motor;
 use crate::quantity::Kind;
 
+pub(super) use crate::actuator::JointUnit;
+
 /// Share of the motor's no-load speed that an axis may use where the file sets no limit: what is
 /// left of the voltage there drives the current that friction takes.
 const SPEED_SHARE: f64 = 0.9;
@@ -32,23 +34,7 @@ pub(super) struct Joint {
     pub(super) worst_speed: f64,
 }
 
-/// What a joint is measured in. Its number is the form of a quantity of a joint's travel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum JointUnit {
-    /// [m].
-    Length = 0,
-    /// [rad].
-    Angle = 1,
-}
-
 impl JointUnit {
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Length => "m",
-            Self::Angle => "rad",
-        }
-    }
-
     /// The following error that stops the machine where the file names none.
     fn following_error(self) -> f64 {
         match self {
@@ -95,6 +81,7 @@ pub(super) fn axis(table: &AxisTable, joint: &Joint, findings: &mut Findings) ->
     let inertia = motor.rotor_inertia() + ratio * ratio * joint.load;
     Some(Axis {
         name: joint.name.to_owned(),
+        unit: joint.unit,
         ratio,
         efficiency: table.efficiency.value,
         motor,
