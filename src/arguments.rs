@@ -239,6 +239,9 @@ pub struct CheckArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub machine: MachineArguments,
+    /// Draw what the machine reaches, and the job's strokes over it, as an SVG.
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
     /// Print one JSON object on stdout.
     #[arg(long)]
     pub json: bool,

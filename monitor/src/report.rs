@@ -3,6 +3,7 @@
 pub mod chart;
 pub mod page;
 pub mod path;
+pub mod workspace;
 
 use crate::latency::HopHistograms;
 use crate::run_folder::{self, RunFolder};

@@ -17,6 +17,7 @@ pub mod joint_move;
 mod joint_plan;
 pub mod law;
 mod lead;
+pub mod margins;
 mod outline;
 pub mod plan;
 mod posture;

@@ -318,12 +318,9 @@ impl MechanismVisitor for CheckAll<'_> {
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
         let Self { trajectory, axes, mut checker, abandoned } = self;
-        let unreachable = |found: Unreachable| {
-            let (line, place) = place(trajectory, found.time);
-            PlanError::Unreachable { line, place, cause: found.cause }
-        };
+        let refuse = |found| unreachable(trajectory, found);
         let mut sampler =
-            Sampler::new(mechanism, axes, Arc::clone(trajectory), 1).map_err(unreachable)?;
+            Sampler::new(mechanism, axes, Arc::clone(trajectory), 1).map_err(refuse)?;
         let mut samples: u64 = 0;
         for setpoint in sampler.by_ref() {
             samples += 1;
@@ -336,7 +333,7 @@ impl MechanismVisitor for CheckAll<'_> {
             })?;
         }
         match sampler.broken() {
-            Some(found) => Err(unreachable(found)),
+            Some(found) => Err(refuse(found)),
             None => Ok((samples, checker.uses())),
         }
     }
@@ -367,13 +364,23 @@ impl Plan {
         self.visit(Stream { plan: self, stream })
     }
 
-    fn visit<V: MechanismVisitor>(&self, visitor: V) -> V::Output {
+    pub(crate) fn axes(&self) -> &[Axis] {
+        &self.axes
+    }
+
+    pub(crate) fn visit<V: MechanismVisitor>(&self, visitor: V) -> V::Output {
         self.mechanism.visit(visitor)
     }
 }
 
+/// What a sample that cannot be made means for the job.
+pub(crate) fn unreachable(trajectory: &Trajectory, found: Unreachable) -> PlanError {
+    let (line, place) = place(trajectory, found.time);
+    PlanError::Unreachable { line, place, cause: found.cause }
+}
+
 /// Line and place in the job at `time` [s].
-fn place(trajectory: &Trajectory, time: f64) -> (u64, Place) {
+pub(crate) fn place(trajectory: &Trajectory, time: f64) -> (u64, Place) {
     let piece = trajectory.piece_at(time);
     let stroke = piece.map_or(0, |piece| piece.stroke);
     (piece.map_or(0, |piece| piece.line), Place { stroke, time })

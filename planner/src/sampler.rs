@@ -194,6 +194,11 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         }
     }
 
+    /// The mechanism with the joints at `joints` [m or rad], near the last sample and on its branch.
+    pub(crate) fn assemble(&self, joints: &Joints<N>) -> Result<M::Assembly, KinematicsError> {
+        self.mechanism.assemble(joints, self.branches[self.branch], Some(&self.assembly))
+    }
+
     /// Goes on to the next look.
     fn advance(&mut self) -> Result<Look<N, M::Assembly>, KinematicsError> {
         self.look += 1;

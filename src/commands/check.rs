@@ -1,13 +1,26 @@
-//! `graver check`: is the machine file sound, and can the machine do the job?
+//! `graver check`: is the machine file sound, what can the machine reach, and can it do the job?
 
+pub mod axes;
+pub mod job;
+pub mod reach;
+mod text;
+
+use self::axes::AxisReport;
+use self::job::JobReport;
+use self::reach::{ReachReport, Surveyed};
 use crate::arguments::CheckArguments;
 use crate::exit::{Exit, Failure};
+use crate::inputs::MachineInput;
 use crate::{inputs, output};
 use machine::Machine;
 use monitor::conclusion::machine_summary;
+use monitor::report::workspace::Workspace;
 use monitor::summary::MachineSummary;
-use planner::PlanFacts;
+use planner::Plan;
+use planner::request::JobRequest;
 use serde::Serialize;
+use signals::artwork::Artwork;
+use std::path::Path;
 
 /// What `check --json` prints.
 #[derive(Debug, Serialize, schemars::JsonSchema)]
@@ -16,27 +29,14 @@ pub struct CheckReport {
     pub machine: MachineSummary,
     /// Its axes, in order.
     pub axes: Vec<AxisReport>,
+    /// Which part of its area it reaches.
+    pub reach: ReachReport,
     /// Doubts about the machine file, with the numbers.
     pub warnings: Vec<CheckWarning>,
+    /// The job that the machine file names as its sample; null where it names none.
+    pub sample_job: Option<String>,
     /// What the job comes to on it; null without a job.
-    pub job: Option<PlanFacts>,
-}
-
-/// One axis and what its motor can do.
-#[derive(Debug, Serialize, schemars::JsonSchema)]
-pub struct AxisReport {
-    /// Its name.
-    pub name: String,
-    /// Soft limits [m or rad].
-    pub position: [f64; 2],
-    /// Speed limit [m/s or rad/s].
-    pub velocity: f64,
-    /// Speed at which the supply is used up without load [m/s or rad/s].
-    pub no_load_velocity: f64,
-    /// Torque at standstill with the supply or the current limit used up [N·m at the motor].
-    pub stall_torque: f64,
-    /// Angle of one encoder count, seen at the joint [m or rad].
-    pub resolution: f64,
+    pub job: Option<JobReport>,
 }
 
 /// A doubt and its place.
@@ -53,101 +53,75 @@ pub struct CheckWarning {
 /// Runs the command.
 ///
 /// # Errors
-/// A machine or job that does not hold.
+/// A machine or job that does not hold, or a picture that cannot be written.
 pub fn run(arguments: &CheckArguments) -> Result<Exit, Failure> {
     let input = inputs::machine(&arguments.machine)?;
-    let job = match &arguments.job {
+    let machine = &input.machine;
+    let planned = match &arguments.job {
         None => None,
-        Some(path) => {
-            let request =
-                inputs::job_request(Some(path), &input.machine, None, &input.job_overrides);
-            Some(request.plan(&input.machine)?.facts)
-        }
+        Some(path) => Some(plan(&input, path)?),
     };
+    let surveyed = reach::survey(machine)
+        .map_err(|error| Failure::bad_input(format!("the machine at home: {error}")))?;
+    if let Some(path) = &arguments.picture {
+        let artwork = planned.as_ref().map(|(_, plan)| &plan.artwork);
+        draw(path, machine, &surveyed, artwork)?;
+    }
+    let job = planned.map(|(request, plan)| JobReport::new(machine, &request, plan)).transpose()?;
     let report = CheckReport {
-        machine: machine_summary(&input.machine),
-        axes: axes(&input.machine),
-        warnings: input
-            .machine
-            .warnings
-            .iter()
-            .map(|warning| CheckWarning {
-                line: warning.line as u64,
-                column: warning.column as u64,
-                message: warning.text.clone(),
-            })
-            .collect(),
+        machine: machine_summary(machine),
+        axes: axes::axes(machine),
+        reach: surveyed.report,
+        warnings: warnings(machine),
+        sample_job: sample_job(&input),
         job,
     };
     if arguments.json {
         output::json(&report)?;
     } else {
-        print_text(&report);
+        text::print(&report);
     }
     Ok(Exit::Done)
 }
 
-fn axes(machine: &Machine) -> Vec<AxisReport> {
-    machine
-        .axes
-        .iter()
-        .map(|axis| {
-            let motor = &axis.motor;
-            AxisReport {
-                name: axis.name.clone(),
-                position: axis.limits.position,
-                velocity: axis.limits.velocity,
-                no_load_velocity: motor.largest_speed() * axis.ratio,
-                stall_torque: motor.stall_torque(),
-                resolution: axis.encoder.resolution() * axis.ratio,
-            }
-        })
-        .collect()
+fn plan(input: &MachineInput, path: &Path) -> Result<(JobRequest, Plan), Failure> {
+    let request = inputs::job_request(Some(path), &input.machine, None, &input.job_overrides);
+    let plan = request.plan(&input.machine)?;
+    Ok((request, plan))
 }
 
-fn print_text(report: &CheckReport) {
-    let MachineSummary { name, mechanism, .. } = &report.machine;
-    eprintln!("machine   {name} ({mechanism})");
-    for axis in &report.axes {
-        let [lower, upper] = axis.position;
-        eprintln!(
-            "axis {:<4} {:.1} to {:.1} mm, {:.3} of {:.3} m/s, {:.1} mN·m at standstill, {:.2} µm a count",
-            axis.name,
-            lower * 1e3,
-            upper * 1e3,
-            axis.velocity,
-            axis.no_load_velocity,
-            axis.stall_torque * 1e3,
-            axis.resolution * 1e6
-        );
-    }
-    for warning in &report.warnings {
-        match warning.line {
-            0 => eprintln!("warning   {}", warning.message),
-            line => {
-                eprintln!("warning   line {line}, column {}: {}", warning.column, warning.message)
-            }
-        }
-    }
-    let Some(job) = &report.job else {
-        eprintln!("the machine file is sound");
-        return;
+/// The sample job, by a path that holds from here.
+fn sample_job(input: &MachineInput) -> Option<String> {
+    let sample = input.machine.sample_job.as_ref()?;
+    let path = input.folder.as_ref().map_or(sample.clone(), |folder| folder.join(sample));
+    Some(path.display().to_string())
+}
+
+fn warnings(machine: &Machine) -> Vec<CheckWarning> {
+    let warnings = machine.warnings.iter().map(|warning| CheckWarning {
+        line: warning.line as u64,
+        column: warning.column as u64,
+        message: warning.text.clone(),
+    });
+    warnings.collect()
+}
+
+/// Writes the picture of the workspace.
+fn draw(
+    path: &Path,
+    machine: &Machine,
+    surveyed: &Surveyed,
+    artwork: Option<&Artwork>,
+) -> Result<(), Failure> {
+    let (lower, upper) = (machine.area.lower, machine.area.upper);
+    let workspace = Workspace {
+        area: [[lower[0], upper[0]], [lower[1], upper[1]]],
+        columns: reach::GRID,
+        ground: &surveyed.ground,
+        home: [machine.home[0], machine.home[1]],
+        artwork,
     };
-    let percent = |values: &[f64]| -> String {
-        values.iter().map(|value| format!("{:.0}", value * 100.0)).collect::<Vec<_>>().join(", ")
-    };
-    eprintln!("job       {}: {} strokes, {:.3} s", job.name, job.strokes, job.duration);
-    eprintln!("velocity  {} % of each axis's limit", percent(&job.uses.velocity));
-    eprintln!("current   {} % of each power stage's limit", percent(&job.uses.current));
-    eprintln!("voltage   {} % of each supply", percent(&job.uses.voltage));
-    eprintln!("heat      {} % of what each winding bears for ever", percent(&job.uses.heat));
-    eprintln!(
-        "path      acceleration {:.0} %, jerk {:.0} %",
-        job.uses.path_acceleration * 100.0,
-        job.uses.path_jerk * 100.0
-    );
-    for note in &job.notes {
-        eprintln!("note      line {}: {}", note.line, note.text);
-    }
-    eprintln!("the machine file is sound, and the machine can do the job");
+    let picture = workspace.picture().map_err(Failure::bad_input)?;
+    std::fs::write(path, picture)
+        .map_err(|error| Failure::bad_input(format!("cannot write {}: {error}", path.display())))
 }

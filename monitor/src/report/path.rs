@@ -8,9 +8,10 @@ use super::{PictureError, Report};
 use crate::trace::outline::OutlinePoint;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+use signals::artwork::Artwork;
 
 /// Metres to millimetres, the unit of the picture.
-const MILLIMETRES: f64 = 1e3;
+pub(super) const MILLIMETRES: f64 = 1e3;
 
 /// The most points of the plan drawn; more are thinned evenly.
 const PLAN_POINTS: usize = 40_000;
@@ -70,36 +71,15 @@ impl Report<'_> {
 
     fn draw_path(&self, title: &str, gain: Option<f64>) -> Result<String, PictureError> {
         let (x, y) = self.extent();
-        let size = (x[1] - x[0]).max(y[1] - y[0]);
-        let air = 0.08 * size;
-        let (x, y) = ([x[0] - air, x[1] + air], [y[0] - air, y[1] + air]);
-        // Equal scales: what the margins leave.
-        let [left, right, above, below] = MARGINS.map(f64::from);
-        let (inner_width, margin_up) = (f64::from(WIDTH) - left - right, above + below);
-        let scale = inner_width / (x[1] - x[0]);
-        let inner = (scale * (y[1] - y[0])).clamp(120.0, 720.0);
-        let (x, y) = widened(x, y, inner_width / inner);
-        let height = (inner + margin_up).round() as u32;
-        let plan = self.plan();
+        let sheet = Sheet::around(x, y);
+        let Sheet { x, y, height, .. } = sheet;
+        let plan = thinned(self.artwork);
         draw(title, height, |area| {
             let mut chart = frame(area).build_cartesian_2d(
                 x[0] * MILLIMETRES..x[1] * MILLIMETRES,
                 y[0] * MILLIMETRES..y[1] * MILLIMETRES,
             )?;
-            chart
-                .configure_mesh()
-                .x_desc("x [mm]")
-                .y_desc("y [mm]")
-                .x_labels(11)
-                .y_labels(((inner / 60.0) as usize).max(3))
-                .x_label_formatter(&|value| short(value))
-                .y_label_formatter(&|value| short(value))
-                .label_style(text_style())
-                .axis_desc_style(text_style())
-                .axis_style(INK.stroke_width(FINE))
-                .bold_line_style(GRID.stroke_width(FINE))
-                .light_line_style(TRANSPARENT)
-                .draw()?;
+            sheet.axes(&mut chart)?;
             // Magnified, the way in the dark would only be in the way.
             let dark = CURVES[7].mix(0.7).stroke_width(FINE);
             if gain.is_none() {
@@ -127,24 +107,75 @@ impl Report<'_> {
             legend(area, &[(&name, marked), ("planned", planned), dark])
         })
     }
+}
 
-    /// The strokes of the plan [mm], thinned evenly where they have too many points.
-    fn plan(&self) -> Vec<Vec<(f64, f64)>> {
-        let count: usize = self.artwork.strokes.iter().map(|stroke| stroke.points.len()).sum();
-        let every = count.div_ceil(PLAN_POINTS).max(1);
-        let thinned = |points: &[[f64; 3]]| {
-            let last = points.len().saturating_sub(1);
-            (points.iter().enumerate())
-                .filter(|(index, _)| index % every == 0 || *index == last)
-                .map(|(_, [x, y, _])| (x * MILLIMETRES, y * MILLIMETRES))
-                .collect()
-        };
-        self.artwork.strokes.iter().map(|stroke| thinned(&stroke.points)).collect()
+/// A piece of the plane as a picture shows it: equal scales, air around what matters.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sheet {
+    /// From and to [m].
+    pub(super) x: [f64; 2],
+    /// From and to [m].
+    pub(super) y: [f64; 2],
+    /// Height of the picture, in page units.
+    pub(super) height: u32,
+    /// Height without the margins, in page units.
+    inner: f64,
+}
+
+impl Sheet {
+    /// Around these ranges [m].
+    pub(super) fn around(x: [f64; 2], y: [f64; 2]) -> Self {
+        let size = (x[1] - x[0]).max(y[1] - y[0]);
+        let air = 0.08 * size;
+        let (x, y) = ([x[0] - air, x[1] + air], [y[0] - air, y[1] + air]);
+        // Equal scales: what the margins leave.
+        let [left, right, above, below] = MARGINS.map(f64::from);
+        let (inner_width, margin_up) = (f64::from(WIDTH) - left - right, above + below);
+        let scale = inner_width / (x[1] - x[0]);
+        let inner = (scale * (y[1] - y[0])).clamp(120.0, 720.0);
+        let (x, y) = widened(x, y, inner_width / inner);
+        Self { x, y, height: (inner + margin_up).round() as u32, inner }
+    }
+
+    /// Draws grid, numbers and names of the axes.
+    pub(super) fn axes<'b>(
+        &self,
+        chart: &mut ChartContext<'b, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
+    ) -> Result<(), Failure<'b>> {
+        chart
+            .configure_mesh()
+            .x_desc("x [mm]")
+            .y_desc("y [mm]")
+            .x_labels(11)
+            .y_labels(((self.inner / 60.0) as usize).max(3))
+            .x_label_formatter(&|value| short(value))
+            .y_label_formatter(&|value| short(value))
+            .label_style(text_style())
+            .axis_desc_style(text_style())
+            .axis_style(INK.stroke_width(FINE))
+            .bold_line_style(GRID.stroke_width(FINE))
+            .light_line_style(TRANSPARENT)
+            .draw()?;
+        Ok(())
     }
 }
 
+/// The strokes of a plan [mm], thinned evenly where they have too many points.
+pub(super) fn thinned(artwork: &Artwork) -> Vec<Vec<(f64, f64)>> {
+    let count: usize = artwork.strokes.iter().map(|stroke| stroke.points.len()).sum();
+    let every = count.div_ceil(PLAN_POINTS).max(1);
+    let thinned = |points: &[[f64; 3]]| {
+        let last = points.len().saturating_sub(1);
+        (points.iter().enumerate())
+            .filter(|(index, _)| index % every == 0 || *index == last)
+            .map(|(_, [x, y, _])| (x * MILLIMETRES, y * MILLIMETRES))
+            .collect()
+    };
+    artwork.strokes.iter().map(|stroke| thinned(&stroke.points)).collect()
+}
+
 /// Draws one line; a line that stands still becomes a dot.
-fn curve<'b>(
+pub(super) fn curve<'b>(
     chart: &mut ChartContext<'b, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
     style: ShapeStyle,
     line: Vec<(f64, f64)>,

@@ -1,0 +1,62 @@
+//! The axes of a machine and what their motors can do.
+
+use machine::{Axis, JointUnit, Machine};
+use serde::Serialize;
+
+/// One axis and what its motor can do.
+#[derive(Debug, Serialize, schemars::JsonSchema)]
+pub struct AxisReport {
+    /// Its name.
+    pub name: String,
+    /// What its joint is measured in.
+    pub unit: Unit,
+    /// Soft limits [m or rad]; null where the joint may turn without end.
+    pub position: [Option<f64>; 2],
+    /// Speed limit [m/s or rad/s].
+    pub velocity: f64,
+    /// Speed at which the supply is used up without load, or a stepper's at its largest pulse rate
+    /// [m/s or rad/s].
+    pub no_load_velocity: f64,
+    /// Torque at standstill with the supply or the current limit used up [N·m at the motor].
+    pub stall_torque: f64,
+    /// Angle of one encoder count or pulse, seen at the joint [m or rad].
+    pub resolution: f64,
+}
+
+/// The unit of a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
+pub enum Unit {
+    /// It moves along a line.
+    #[serde(rename = "m")]
+    Metre,
+    /// It turns.
+    #[serde(rename = "rad")]
+    Radian,
+}
+
+impl From<JointUnit> for Unit {
+    fn from(unit: JointUnit) -> Self {
+        match unit {
+            JointUnit::Length => Self::Metre,
+            JointUnit::Angle => Self::Radian,
+        }
+    }
+}
+
+/// The axes of `machine`, in order.
+pub fn axes(machine: &Machine) -> Vec<AxisReport> {
+    machine.axes.iter().map(report).collect()
+}
+
+fn report(axis: &Axis) -> AxisReport {
+    let motor = &axis.motor;
+    AxisReport {
+        name: axis.name.clone(),
+        unit: axis.unit.into(),
+        position: axis.limits.position.map(|limit| limit.is_finite().then_some(limit)),
+        velocity: axis.limits.velocity,
+        no_load_velocity: motor.largest_speed() * axis.ratio,
+        stall_torque: motor.stall_torque(),
+        resolution: axis.encoder.resolution() * axis.ratio,
+    }
+}

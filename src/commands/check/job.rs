@@ -1,0 +1,76 @@
+//! What a job asks of a machine: its plan, its margins to singularities, and the use of its motors.
+
+use crate::exit::Failure;
+use machine::{Machine, Motor};
+use planner::margins::LeastMargin;
+use planner::plan::Uses;
+use planner::request::JobRequest;
+use planner::{Plan, PlanFacts};
+use serde::Serialize;
+
+/// What a job comes to on a machine.
+#[derive(Debug, Serialize, schemars::JsonSchema)]
+pub struct JobReport {
+    /// The plan.
+    #[serde(flatten)]
+    pub facts: PlanFacts,
+    /// Every margin of the mechanism where it is least over the job; empty where it has none.
+    pub margins: Vec<LeastMargin>,
+    /// How much of each motor the job uses, in the order of the axes.
+    pub motors: Vec<MotorUse>,
+}
+
+/// The largest share of what an axis and its motor can do; 1 is all.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct MotorUse {
+    /// The axis.
+    pub axis: String,
+    /// Joint speed against its limit.
+    pub speed: f64,
+    /// Torque: current against the power stage's limit, or against a stepper's pull-out torque at
+    /// its speed.
+    pub torque: f64,
+    /// Voltage against the supply; null for steppers.
+    pub voltage: Option<f64>,
+    /// Root mean square of the current against what the winding bears for ever; null for steppers
+    /// and where the machine file does not say that.
+    pub heat: Option<f64>,
+    /// Pulse rate against the driver's largest; null for DC motors.
+    pub pulse_rate: Option<f64>,
+}
+
+impl JobReport {
+    /// Of a job that was planned.
+    ///
+    /// # Errors
+    /// A place that the tool cannot reach.
+    pub fn new(machine: &Machine, request: &JobRequest, plan: Plan) -> Result<Self, Failure> {
+        let margins = plan.least_margins().map_err(|error| request.refuse(&error))?;
+        Ok(Self { margins, motors: motors(machine, &plan.facts.uses), facts: plan.facts })
+    }
+}
+
+/// The checker's uses by axis; for a stepper it keeps pull-out torque and pulse rate where a DC motor
+/// has current and voltage.
+fn motors(machine: &Machine, uses: &Uses) -> Vec<MotorUse> {
+    let at = |list: &[f64], index: usize| list.get(index).copied().unwrap_or_default();
+    let motor = |(index, axis): (usize, &machine::Axis)| {
+        let second = at(&uses.voltage, index);
+        let (voltage, heat, pulse_rate) = match &axis.motor {
+            Motor::Dc(motor) => {
+                let heat = motor.continuous_current.map(|_| at(&uses.heat, index));
+                (Some(second), heat, None)
+            }
+            Motor::Stepper(_) => (None, None, Some(second)),
+        };
+        MotorUse {
+            axis: axis.name.clone(),
+            speed: at(&uses.velocity, index),
+            torque: at(&uses.current, index),
+            voltage,
+            heat,
+            pulse_rate,
+        }
+    };
+    machine.axes.iter().enumerate().map(motor).collect()
+}
