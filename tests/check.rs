@@ -71,7 +71,7 @@ fn a_five_bar_reaches_what_its_triangles_allow() {
 fn a_polar_machine_is_nearest_to_its_center_there() {
     // Two lines, one of them 2 mm beside the centre of the table.
     let place = Place::new();
-    let text = "G21 G90 G53\nG54\nM3 S800 F3000\nG0 X30 Y2\nG1 X-30\nM5\nM2\n";
+    let text = "G21 G90 G54\nG0 X30 Y2\nM3 S800 F3000\nG1 X-30\nM5\nM2\n";
     let job = place.file("beside.ngc", text);
     let report = check("polar", &[job.to_str().unwrap()]);
     let margins = report["job"]["margins"].as_array().unwrap();

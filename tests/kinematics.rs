@@ -197,7 +197,7 @@ impl Golden {
 
     /// Asserts that a pose is refused with the golden code; a limit names its axis and both numbers.
     fn refuses(&self, case: &Value, request: &Value) {
-        let reply = &self.ask("inverse", &[request.clone()], Value::clone)[0];
+        let reply = &self.ask("inverse", std::slice::from_ref(request), Value::clone)[0];
         let code = case["expect"].as_str().unwrap();
         assert_eq!(reply["error"]["code"], code, "{case}: {reply}");
         let (value, limit) = (number(reply, "/error/value"), number(reply, "/error/limit"));
@@ -265,7 +265,12 @@ fn every_mode_of_the_five_bar_gives_its_golden_vector() {
                 "branch": { "working_mode": signs, "assembly_mode": assembly },
             })
         };
-        machine.check("inverse", &[mode.clone()], |_| request(assembly), &[("/q", "/q")]);
+        machine.check(
+            "inverse",
+            std::slice::from_ref(mode),
+            |_| request(assembly),
+            &[("/q", "/q")],
+        );
         machine.refuses(&json!({ "expect": "wrong_assembly_mode" }), &request(-assembly));
     }
 }
