@@ -5,6 +5,7 @@
 mod support;
 
 use serde_json::{Value, json};
+use signals::math;
 use support::{Place, assert_valid, number};
 
 /// What `check --json` says of a machine in the source tree, with these further arguments.
@@ -30,16 +31,16 @@ fn five_bar_reaches(x: f64, y: f64) -> bool {
         if inner.abs() > 1.0 {
             return false;
         }
-        let angle = f64::atan2(dy, dx) + side * f64::acos(inner);
+        let angle = math::atan2(dy, dx) + side * math::acos(inner);
         let limits = [[60.0, 170.0], [10.0, 120.0]][arm];
         if !(limits[0]..=limits[1]).contains(&angle.to_degrees()) {
             return false;
         }
-        elbows[arm] = [-side * base + proximal * angle.cos(), proximal * angle.sin()];
+        elbows[arm] = [-side * base + proximal * math::cos(angle), proximal * math::sin(angle)];
     }
     let distals = elbows.map(|[ex, ey]| [x - ex, y - ey]);
     let sine = |[ax, ay]: [f64; 2], [bx, by]: [f64; 2]| {
-        (ax * by - ay * bx).abs() / (f64::hypot(ax, ay) * f64::hypot(bx, by))
+        (ax * by - ay * bx).abs() / (math::hypot(ax, ay) * math::hypot(bx, by))
     };
     let proximals = [[elbows[0][0] + base, elbows[0][1]], [elbows[1][0] - base, elbows[1][1]]];
     let limit = 0.1;
@@ -131,7 +132,7 @@ fn steppers_are_told_by_pulses_and_a_picture_is_drawn() {
     for motor in report["job"]["motors"].as_array().unwrap() {
         assert!(motor["voltage"].is_null() && motor["heat"].is_null(), "{motor}");
         let share = number(motor, "/pulse_rate");
-        assert!(share >= 0.0 && share < 1.0, "{motor}");
+        assert!((0.0..1.0).contains(&share), "{motor}");
     }
     let svg = std::fs::read_to_string(picture).unwrap();
     for word in ["<svg", "x [mm]", "reached", "home", "job"] {

@@ -6,7 +6,7 @@
 //! of the table: `p = Rz(−θ₂)·(a₁·(cos θ₁, sin θ₁) − (c, 0))`, `z = z₀ + d`.
 //!
 //! An arm that is as long as the table is far, a₁ = c, reaches the centre of the table, and a path
-//! may cross it; [`center`] tells how. Another arm leaves a blind disc of radius |a₁ − c|.
+//! may cross it; `center` tells how. Another arm leaves a blind disc of radius |a₁ − c|.
 
 mod center;
 mod dynamics;
