@@ -70,5 +70,5 @@ fn an_axis_has_one_motor_and_all_axes_the_same_kind() {
     let found = errors(&FILE[begin..end], &format!("[axis.y.{dc}{encoder}"));
     assert_eq!(found, ["axes `x` and `y` have motors of different kinds"]);
     let found = errors(&FILE[begin..end], &format!("[axis.y.{dc}"));
-    assert_eq!(found, ["`encoder` is missing in the table `axis.y`"]);
+    assert_eq!(found, ["`encoder` is missing in the table `y`"]);
 }
