@@ -113,6 +113,29 @@ fn the_processes_do_what_simulate_does() {
     }
 }
 
+#[test]
+fn a_backlash_that_the_machine_file_knows_of_does_little_harm() {
+    let place = Place::new();
+    let marks = |who: &str| {
+        let mut job = vec!["--set".to_owned(), "letters.text=S".to_owned()];
+        for axis in ["x", "y"] {
+            job.push("--set".to_owned());
+            job.push(format!("{who}.axis.{axis}.backlash=\"50 um\""));
+        }
+        let mut arguments = vec!["simulate", "--json", "--machine"];
+        let machine = support::source("machines").join("cartesian.toml");
+        arguments.push(machine.to_str().unwrap());
+        arguments.extend(job.iter().map(String::as_str));
+        let summary = place.graver(&arguments).json(0);
+        assert_eq!(summary["outcome"], "completed", "{who}: {summary:#}");
+        number(&summary, "/marks/error_rms")
+    };
+    // Of the plant alone, the carriages lie half a gap to either side of where they should.
+    let (unknown, known) = (marks("plant"), marks("machine"));
+    assert!((15e-6..35e-6).contains(&unknown), "{unknown:e}");
+    assert!(known < unknown / 5.0, "{known:e} of {unknown:e}");
+}
+
 /// A line of 40 mm along x, `beside` the centre of the table [mm].
 fn line(beside: f64) -> String {
     format!("G21 G90 G54\nG0 X-20 Y{beside}\nM3 S800\nF1200\nG1 X20\nM5\nG0 X60 Y0\nM2\n")

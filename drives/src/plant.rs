@@ -16,7 +16,8 @@
 //! - The light follows the gate after the delays of the laser source; gate edges fall where they
 //!   are asked, to the nanosecond.
 //! - A brake holds the shaft of an unpowered motor as friction does; it opens and closes at once.
-//! - There is no backlash, no measurement noise and no thermal model.
+//! - Backlash is a gap without friction between motor and spring: in it the load coasts.
+//! - There is no measurement noise and no thermal model.
 //!
 //! Integration: fourth order at a fixed substep of 50 µs or finer ([`dynamics`], [`winding`]),
 //! with friction's events located inside it ([`friction`]), and third order in what a varying mass
@@ -33,6 +34,7 @@ pub mod winding;
 
 use machine::kinematics::{Joints, KinematicsError};
 use machine::motor::BeyondTorque;
+use machine::transmission::rest;
 use machine::{Axis, LaserSource, Machine, Mechanism, MechanismVisitor};
 use nalgebra::SVector;
 use signals::time::CYCLE_TIME;
@@ -190,21 +192,14 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         let load = Joints::from_fn(|row, _| home.get(row).copied().unwrap_or(f64::NAN));
         let assembly = mechanism.assemble(&load, branch, None).map_err(PlantError::Home)?;
 
-        // At rest, the motors stand ahead by what gravity stretches the transmission.
         let gravity = mechanism.gravity(&assembly);
-        let sag = mechanism
-            .stiffness()
-            .and_then(|stiffness| stiffness.try_inverse())
-            .map_or_else(Joints::zeros, |compliance| compliance * gravity);
         let motors = Motors::of(&axes);
-        let angle = (load + sag).component_div(&motors.ratio);
-        // A stepper's magnetic axis stands ahead again, by the load angle.
+        let ahead = rest::rotors_ahead(&mechanism, &axes, &gravity);
+        let angle = (load + ahead).component_div(&motors.ratio);
         let mut origin = angle;
         for (row, axis) in axes.iter().enumerate() {
-            if let Some(stepper) = axis.motor.stepper() {
-                let torque = axis.ratio * gravity[row];
-                origin[row] += stepper.load_angle(torque, 0.0).map_err(PlantError::Hold)?;
-            }
+            let ahead = rest::field_ahead(axis, gravity[row]).map_err(PlantError::Hold)?;
+            origin[row] += ahead / axis.ratio;
         }
         let stepping = Stepping::of(&axes, origin);
         let field = stepping.as_ref().map(|stepping| stepping.field(angle));

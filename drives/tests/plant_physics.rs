@@ -7,7 +7,7 @@ mod shaft;
 use drives::plant::dynamics::{Dynamics, Motors, Phases, State};
 use drives::plant::{Plant, PlantOptions, friction};
 use drives::{Actuation, Freshness, Measurement, Port};
-use machine::mechanisms::Elasticity;
+use machine::transmission::Elasticity;
 use machine::{Axis, CoreXy, Friction, LaserSource, Machine, MechanismKind};
 use nalgebra::{Vector1, Vector2};
 use shaft::Shaft;

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use drives::{Actuation, Freshness, Measurement, PlantOptions, Port, Power, SimulatedPlant};
-use machine::mechanisms::Elasticity;
+use machine::transmission::{Elasticity, screw::at_nut};
 use machine::{Cartesian, Machine, MechanismKind};
 use signals::laser::{GateEdge, MAX_EDGES};
 use signals::time::CYCLE_PERIOD;
@@ -33,7 +33,7 @@ fn cartesian() -> Machine {
     let mass = [1.93, 0.33];
     machine.mechanism = MechanismKind::Cartesian(Cartesian {
         mass,
-        elasticity: Some(mass.map(|mass| Elasticity::of_screw(600.0, lead, mass, 0.9))),
+        elasticity: Some(mass.map(|mass| Elasticity::damped(at_nut(600.0, lead), mass, 0.9))),
     });
     for axis in &mut machine.axes {
         axis.ratio = lead / 3.0;

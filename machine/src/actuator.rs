@@ -2,6 +2,7 @@
 
 use crate::limits::AxisLimits;
 use crate::motor::Motor;
+use crate::transmission::gear::Efficiency;
 
 /// Friction at the motor shaft.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,11 +71,13 @@ pub struct Axis {
     /// Joint units moved per radian of the motor, gear and screw or pulley included; positive
     /// [m/rad or rad/rad].
     pub ratio: f64,
-    /// Share of the motor's torque that reaches the joint when it drives, above 0 and up to 1.
+    /// How far the joint moves freely while the motor stands, from stop to stop [m or rad].
+    pub backlash: f64,
+    /// What of the motor's torque reaches the joint.
     ///
     /// For sizing only. In motion the losses are [`Friction`], for the plant and for the
     /// feedforward alike; counting them here as well would count them twice.
-    pub efficiency: f64,
+    pub efficiency: Efficiency,
     /// The motor.
     pub motor: Motor,
     /// Friction at its shaft.

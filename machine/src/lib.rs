@@ -22,6 +22,7 @@ pub mod pulses;
 pub mod quantity;
 pub mod surface;
 pub mod taylor;
+pub mod transmission;
 
 pub use actuator::{Axis, Encoder, Friction, JointUnit, LoopGains};
 pub use document::{DocumentError, Override};

@@ -66,6 +66,7 @@ impl<'a> Checker<'a> {
                 current: none(),
                 voltage: none(),
                 heat: none(),
+                sizing: none(),
                 ..Uses::default()
             },
         }
@@ -154,6 +155,8 @@ impl<'a> Checker<'a> {
             let side = if speed.abs() > 1e-9 { speed.signum() } else { 0.0 };
             let friction = axis.friction.coulomb * side + axis.friction.viscous * speed;
             let torque = setpoint.effort[index] + friction;
+            let size = sizing(axis, setpoint.effort[index], setpoint.acceleration[index], speed);
+            self.uses.sizing[index] = self.uses.sizing[index].max(size);
             let name = Some(axis.name.as_str());
             let motor = match &axis.motor {
                 Motor::Dc(motor) => motor,
@@ -190,6 +193,20 @@ impl<'a> Checker<'a> {
         self.before = Some(now);
         Ok(())
     }
+}
+
+/// The share of its torque that the motor of `axis` needs at `speed` [rad/s] by the efficiencies of
+/// its gear, which data sheets give in place of friction: its rotor's part of `effort` [N·m] reaches
+/// no gear.
+fn sizing(axis: &Axis, effort: f64, acceleration: f64, speed: f64) -> f64 {
+    let rotor = axis.motor.rotor_inertia() * acceleration / axis.ratio;
+    let speed = if speed.abs() > 1e-9 { speed } else { 0.0 };
+    let torque = rotor + axis.efficiency.torque(effort - rotor, speed);
+    let most = match &axis.motor {
+        Motor::Dc(motor) => motor.current * motor.torque_constant,
+        Motor::Stepper(motor) => motor.pull_out_torque(speed),
+    };
+    torque.abs() / most
 }
 
 fn position_of(name: &str) -> &'static str {

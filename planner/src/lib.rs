@@ -10,6 +10,7 @@ mod blend;
 pub mod check;
 mod demand;
 pub mod drawing;
+mod gap;
 pub mod itinerary;
 pub mod jet;
 pub mod job;

@@ -12,6 +12,7 @@ use machine::{Axis, Friction, Mechanism, StepperMotor};
 use signals::time::CYCLE_TIME;
 use signals::{GateEdge, LaserCycle, Setpoint, axis::axis_array, setpoint::flags};
 
+use crate::gap::Gaps;
 use crate::joint_move::{JointMove, JointsAt};
 use crate::lead::Lead;
 use crate::posture::{branches, follow, keeps_margins};
@@ -49,6 +50,8 @@ pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
     joints: Joints<N>,
     assembly: M::Assembly,
     lead: Lead<N>,
+    gaps: Gaps<N>,
+    axes: Vec<Axis>,
     /// Speed of the motor side [joint units/s], and effort on the load side, at the last look.
     motor_velocity: Joints<N>,
     effort: Joints<N>,
@@ -154,6 +157,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             mechanism.assemble(&motion.position, branches[branch], None).map_err(unreachable)?;
         let effort = mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
         let lead = Lead::new(&mechanism, effort, STEP);
+        let gaps = Gaps::new(axes, &effort, STEP);
         let end = (trajectory.end() / CYCLE_TIME).ceil() as i64;
         Ok(Self {
             mechanism,
@@ -173,6 +177,8 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             joints: motion.position,
             assembly,
             lead,
+            gaps,
+            axes: axes.to_vec(),
             motor_velocity: Joints::zeros(),
             effort,
             laser: Gate::default(),
@@ -221,10 +227,11 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         // without damper asks for it.
         let effort_rate = self.mechanism.mass_matrix(&assembly) * motion.jerk;
         self.lead.advance(&effort, &effort_rate);
+        self.gaps.advance(&self.axes, &effort, motion.velocity.amax() > 0.0);
         self.joints = motion.position;
         self.assembly = assembly;
         self.effort = effort;
-        self.motor_velocity = motion.velocity + self.lead.rate();
+        self.motor_velocity = motion.velocity + self.lead.rate() + self.gaps.speed();
         Ok(Look { reference, motion, assembly, effort })
     }
 
@@ -255,7 +262,8 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         };
         keeps_margins(&self.mechanism, &assembly)?;
         add(&effort, 1.0);
-        let lead = *self.lead.value();
+        let in_gap = *self.gaps.value();
+        let lead = self.lead.value() + in_gap;
         let motor_velocity = self.motor_velocity;
         for _ in 1..STEPS / 2 {
             let look = self.advance()?;
@@ -282,7 +290,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             acceleration: axis_array(motion.acceleration.as_slice()),
             jerk: axis_array(motion.jerk.as_slice()),
             lead: axis_array(lead.as_slice()),
-            static_lead: axis_array(self.lead.settled(&gravity).as_slice()),
+            static_lead: axis_array((self.lead.settled(&gravity) + in_gap).as_slice()),
             effort: per_axis(&|axis, drive| {
                 drive.inertia * acceleration[axis] / drive.ratio + drive.ratio * mean[axis]
             }),
@@ -351,6 +359,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     fn is_settled(&self) -> bool {
         self.sequence as i64 > self.end
             && (self.lead.value() - self.lead.settled(&self.effort)).amax() <= SETTLED
+            && self.gaps.left() <= SETTLED
     }
 }
 

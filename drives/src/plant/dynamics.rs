@@ -8,8 +8,9 @@
 //! ```
 //!
 //! With an elastic transmission the joints feel `τ = K·(q_m − q_l) + B·(q̇_m − q̇_l)`, and the
-//! motors `−ratio·τ`. With a rigid one motors and load are one inertia in joint coordinates,
-//! `diag(J/ratio²) + M(q)`. A gearbox's efficiency is sizing data and not part of the motion;
+//! motors `−ratio·τ`. A joint with backlash feels nothing while its gap is open; once it is closed,
+//! the spring is wound by what is left of the way, and pushes but does not pull. With a rigid
+//! transmission motors and load are one inertia in joint coordinates, `diag(J/ratio²) + M(q)`. A gearbox's efficiency is sizing data and not part of the motion;
 //! losses are the friction at the shaft.
 //!
 //! Which motors stick, and against which friction the others slide, stands still during a step:
@@ -17,6 +18,7 @@
 //! [`coupling`](super::coupling).
 
 use machine::kinematics::{Joints, KinematicsError};
+use machine::transmission::backlash;
 use machine::{Axis, DcMotor, Mechanism};
 use nalgebra::{SMatrix, SVector};
 
@@ -67,6 +69,8 @@ pub struct Motors<const N: usize> {
     pub viscous: SVector<f64, N>,
     /// Joint units per radian.
     pub ratio: SVector<f64, N>,
+    /// Half of the backlash [joint units].
+    pub gap: SVector<f64, N>,
     /// Largest voltage of the power stage [V].
     pub voltage: SVector<f64, N>,
     /// Largest current that the power stage lets through [A].
@@ -89,6 +93,7 @@ impl<const N: usize> Motors<N> {
             brake: each(|axis| axis.brake),
             viscous: each(|axis| axis.friction.viscous),
             ratio: each(|axis| axis.ratio),
+            gap: each(|axis| axis.backlash / 2.0),
             voltage: each(|axis| dc(axis, 0.0, |motor| motor.voltage)),
             current: each(|axis| dc(axis, 0.0, |motor| motor.current)),
         }
@@ -104,7 +109,12 @@ fn dc(axis: &Axis, other: f64, value: fn(&DcMotor) -> f64) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Transmission<const N: usize> {
     Rigid,
-    Elastic { stiffness: SMatrix<f64, N, N>, damping: SMatrix<f64, N, N> },
+    Elastic {
+        stiffness: SMatrix<f64, N, N>,
+        damping: SMatrix<f64, N, N>,
+        /// Whether any joint has backlash.
+        has_gaps: bool,
+    },
 }
 
 /// The equations of motion.
@@ -148,7 +158,11 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// If the mass matrix at `home` cannot be inverted.
     pub fn new(mechanism: M, motors: Motors<N>, home: M::Assembly) -> Result<Self, PlantError> {
         let transmission = match mechanism.stiffness() {
-            Some(stiffness) => Transmission::Elastic { stiffness, damping: mechanism.damping() },
+            Some(stiffness) => Transmission::Elastic {
+                stiffness,
+                damping: mechanism.damping(),
+                has_gaps: motors.gap.iter().any(|gap| *gap > 0.0),
+            },
             None => Transmission::Rigid,
         };
         let rigid = (transmission == Transmission::Rigid).then(|| rotors(&motors));
@@ -216,7 +230,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         let row_sum = |matrix: SMatrix<f64, N, N>| {
             matrix.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
         };
-        let Transmission::Elastic { stiffness, damping } = &self.transmission else {
+        let Transmission::Elastic { stiffness, damping, .. } = &self.transmission else {
             // Motors and load are one inertia: what acts at the shafts acts on all of it.
             let mobility = self.coupling.middle().mobility;
             let square = motors.ratio.component_mul(&motors.ratio);
@@ -294,10 +308,14 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     pub fn transmitted(&self, state: &State<N>) -> Joints<N> {
         match &self.transmission {
             Transmission::Rigid => Joints::zeros(),
-            Transmission::Elastic { stiffness, damping } => {
+            Transmission::Elastic { stiffness, damping, has_gaps } => {
                 let ratio = &self.motors.ratio;
-                stiffness * (ratio.component_mul(&state.angle) - state.load)
-                    + damping * (ratio.component_mul(&state.speed) - state.load_speed)
+                let ahead = ratio.component_mul(&state.angle) - state.load;
+                let faster = ratio.component_mul(&state.speed) - state.load_speed;
+                if *has_gaps {
+                    return across_gaps(stiffness, damping, &ahead, &faster, &self.motors.gap);
+                }
+                stiffness * ahead + damping * faster
             }
         }
     }
@@ -418,6 +436,31 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         self.couple(&mut end);
         end
     }
+}
+
+/// Effort on the joints where motors are `ahead` and `faster` by so much across gaps of `half` to
+/// either side: none where a gap is open, and never one that pulls the motor's flank along.
+fn across_gaps<const N: usize>(
+    stiffness: &SMatrix<f64, N, N>,
+    damping: &SMatrix<f64, N, N>,
+    ahead: &Joints<N>,
+    faster: &Joints<N>,
+    half: &Joints<N>,
+) -> Joints<N> {
+    let wound = backlash::wound(stiffness, ahead, half);
+    // The very sums that `wound` stops at: to the last bit on a flank, or off it.
+    let pushes = |joint: usize| wound[joint] == ahead[joint] - half[joint];
+    let pulls = |joint: usize| wound[joint] == ahead[joint] + half[joint];
+    let winding =
+        Joints::from_fn(|joint, _| if pushes(joint) || pulls(joint) { faster[joint] } else { 0.0 });
+    let effort = stiffness * wound + damping * winding;
+    Joints::from_fn(|joint, _| match (pushes(joint), pulls(joint)) {
+        // No gap at all.
+        (true, true) => effort[joint],
+        (true, false) => effort[joint].max(0.0),
+        (false, true) => effort[joint].min(0.0),
+        (false, false) => 0.0,
+    })
 }
 
 /// `|s|` of `s² + linear·s + square` at most.

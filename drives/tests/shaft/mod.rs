@@ -101,7 +101,8 @@ pub(crate) fn axis(inertia: f64, friction: Friction) -> machine::Axis {
         name: "shaft".to_owned(),
         unit: machine::JointUnit::Angle,
         ratio: 1.0,
-        efficiency: 1.0,
+        backlash: 0.0,
+        efficiency: Efficiency::LOSSLESS,
         motor: Motor::Dc(DcMotor {
             resistance: 2.3,
             inductance: 2.3e-3,

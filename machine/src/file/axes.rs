@@ -7,6 +7,7 @@ use crate::document::{Decode, Either, Findings, ProblemKind, Quantity, Range};
 use crate::limits::AxisLimits;
 use crate::motor::Motor;
 use crate::quantity::Kind;
+use crate::transmission::gear::Efficiency;
 
 pub(super) use crate::actuator::JointUnit;
 
@@ -83,7 +84,11 @@ pub(super) fn axis(table: &AxisTable, joint: &Joint, findings: &mut Findings) ->
         name: joint.name.to_owned(),
         unit: joint.unit,
         ratio,
-        efficiency: table.efficiency.value,
+        backlash: backlash(table, joint, findings),
+        efficiency: Efficiency {
+            dynamic: table.efficiency.value,
+            at_start: table.static_efficiency.value,
+        },
         motor,
         friction: Friction {
             coulomb: table.friction.coulomb.value,
@@ -97,6 +102,12 @@ pub(super) fn axis(table: &AxisTable, joint: &Joint, findings: &mut Findings) ->
         },
         limits: limits(&table.limits, joint, &motor, ratio, findings),
     })
+}
+
+fn backlash(table: &AxisTable, joint: &Joint, findings: &mut Findings) -> f64 {
+    let Some(backlash) = &table.backlash else { return 0.0 };
+    joint.unit.expect(backlash, joint.name, findings);
+    backlash.value
 }
 
 fn gains(table: &AxisTable, inertia: f64, findings: &mut Findings) -> Option<LoopGains> {

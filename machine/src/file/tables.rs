@@ -125,10 +125,33 @@ table! {
         pub lead: Above<unit::Lead>,
         /// Moment of inertia of the screw, without the carriage; it turns with the motor.
         pub inertia: AtLeastZero<unit::Inertia> = "0 kg m^2",
-        /// Torsional stiffness from gear to nut, the axial one in series; rigid when left out.
+        /// Torsional stiffness from gear to nut, the axial one in series; rigid when this and
+        /// `shaft` are left out.
         pub stiffness: Option<Above<unit::TorsionalStiffness>>,
+        /// The shaft that it follows from, instead of `stiffness`.
+        pub shaft: Option<ShaftTable>,
         /// Damping of that spring, as a share of critical damping under the carriage.
         pub damping_ratio: Number<Positive> = 0.9,
+    }
+}
+
+table! {
+    /// The loaded part of a screw, from its fixed bearing to the nut.
+    pub struct ShaftTable {
+        /// Diameter of its core, under the thread of the balls.
+        pub core_diameter: Above<unit::Length>,
+        /// Bore of a hollow shaft.
+        pub bore: AtLeastZero<unit::Length> = "0 mm",
+        /// From the fixed bearing to the nut, on average.
+        pub length: Above<unit::Length>,
+        /// Modulus of elasticity; that of steel when left out.
+        pub modulus: Above<unit::Modulus> = "210e9 N/m^2",
+        /// Shear modulus; that of steel when left out.
+        pub shear_modulus: Above<unit::Modulus> = "80e9 N/m^2",
+        /// Axial stiffness of the nut, as its data sheet has it; rigid when left out.
+        pub nut_stiffness: Option<Above<unit::Stiffness>>,
+        /// What of the nut's stiffness its tolerances leave.
+        pub nut_accuracy: Fraction<Positive> = 1.0,
     }
 }
 
@@ -150,9 +173,23 @@ table! {
     /// Elasticity of both belts together, in each direction of the tool.
     pub struct BeltTable {
         /// Stiffness in x and in y, both belts together.
-        pub stiffness: Above<unit::Stiffness>,
+        pub stiffness: Option<Above<unit::Stiffness>>,
+        /// The belts that it follows from, instead of `stiffness`.
+        pub section: Option<SectionTable>,
         /// Damping between motor and tool, as a share of critical damping in each direction.
         pub damping_ratio: Number<Positive> = 0.9,
+    }
+}
+
+table! {
+    /// A belt between its pulley and what it pulls.
+    pub struct SectionTable {
+        /// Modulus of elasticity.
+        pub modulus: Above<unit::Modulus>,
+        /// Cross-section that carries the load.
+        pub area: Above<unit::Area>,
+        /// Lengths of its two spans, on average.
+        pub spans: [Above<unit::Length>; 2],
     }
 }
 
@@ -164,8 +201,14 @@ table! {
         /// What stands between gear and joint; of a cartesian and a corexy the mechanism's own
         /// table says it.
         pub transmission: TransmissionTable,
-        /// Efficiency of gear and screw, for sizing only: losses in motion are `friction`.
+        /// How far the joint moves freely while the motor stands, from stop to stop: the play of
+        /// gear, coupling and nut. It needs an elastic transmission.
+        pub backlash: Option<AtLeastZero<unit::Travel>>,
+        /// Efficiency of gear and screw in motion, for sizing only: losses in motion are `friction`.
         pub efficiency: Fraction<Positive> = 1.0,
+        /// What of that efficiency is left when it starts from standstill, for sizing only; 1 of
+        /// planetary gears.
+        pub static_efficiency: Fraction<Positive> = 1.0,
         /// The motor: one table, named by its kind.
         pub motor: MotorTable,
         /// Friction, all of it seen at the motor shaft.
@@ -378,8 +421,11 @@ table! {
         pub lead: Above<unit::Lead>,
         /// Moment of inertia of the screw; it turns with the motor.
         pub inertia: AtLeastZero<unit::Inertia> = "0 kg m^2",
-        /// Torsional stiffness from gear to nut, the axial one in series; rigid when left out.
+        /// Torsional stiffness from gear to nut, the axial one in series; rigid when this and
+        /// `shaft` are left out.
         pub stiffness: Option<Above<unit::TorsionalStiffness>>,
+        /// The shaft that it follows from, instead of `stiffness`.
+        pub shaft: Option<ShaftTable>,
         /// Damping of that spring, as a share of critical damping.
         pub damping_ratio: Number<Positive> = 0.9,
     }
@@ -392,8 +438,10 @@ table! {
         pub pulley_radius: Above<unit::Length>,
         /// Moment of inertia of the pulleys; they turn with the gear.
         pub inertia: AtLeastZero<unit::Inertia> = "0 kg m^2",
-        /// Stiffness of the belt; rigid when left out.
+        /// Stiffness of the belt; rigid when this and `section` are left out.
         pub stiffness: Option<Above<unit::Stiffness>>,
+        /// The belt that it follows from, instead of `stiffness`.
+        pub section: Option<SectionTable>,
         /// Damping of that spring, as a share of critical damping.
         pub damping_ratio: Number<Positive> = 0.9,
     }

@@ -12,6 +12,7 @@ use crate::document::{
 };
 use crate::limits::{PathLimits, WorkArea};
 use crate::machine::Machine;
+use crate::mechanisms::MechanismKind;
 use crate::process::{GcodeSettings, LaserSource, ZMeaning};
 
 pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
@@ -43,6 +44,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     warnings.extend(
         mechanism::damping_ratios(&table).filter_map(|ratio| doubts::of_damping(ratio, &findings)),
     );
+    refuse_rigid_backlash(&mechanism, &table.axis, &mut findings);
     if table.area.z.is_none() && mechanism.moves_in_z() {
         findings.contradict(
             table.area.place,
@@ -95,6 +97,26 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         warnings,
     };
     findings.finish(machine)
+}
+
+/// Refuses a gap with nothing elastic behind it: what meets at its end would meet in no time.
+fn refuse_rigid_backlash(
+    mechanism: &MechanismKind,
+    axes: &Named<AxisTable>,
+    findings: &mut Findings,
+) {
+    if mechanism.is_elastic() {
+        return;
+    }
+    for (name, table) in &axes.entries {
+        if let Some(backlash) = table.backlash.filter(|backlash| backlash.value > 0.0) {
+            findings.contradict(
+                backlash.place,
+                format!("axis `{}` has backlash, and its transmission is rigid", name.value),
+                "give its transmission a stiffness, or leave the backlash out",
+            );
+        }
+    }
 }
 
 /// The area as a box; z is from 0 to 0 where it has no range.

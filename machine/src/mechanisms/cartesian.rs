@@ -5,11 +5,11 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
-use super::transmission::Elasticity;
 use crate::kinematics::{
     Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
     STANDARD_GRAVITY, ToolMotion, finite, in_plane,
 };
+use crate::transmission::Elasticity;
 
 /// Carriages in x, y and, with `N` = 3, z.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,11 +5,11 @@
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-use super::transmission::Elasticity;
 use crate::kinematics::{
     Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
     in_plane,
 };
+use crate::transmission::Elasticity;
 
 /// The head on its two belts.
 ///

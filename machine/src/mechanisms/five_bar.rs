@@ -14,12 +14,12 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
-use super::transmission::Elasticity;
 use crate::kinematics::{
     Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
     ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
+use crate::transmission::Elasticity;
 use signals::math;
 
 /// How far an angle may be from the previous one before a turn is counted [rad]. Anything from

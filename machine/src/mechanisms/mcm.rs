@@ -15,12 +15,12 @@ mod dynamics;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use signals::math;
 
-use super::transmission::Elasticity;
 use crate::kinematics::{
     Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
     ToolMotion, finite,
 };
 use crate::taylor::Scalar;
+use crate::transmission::Elasticity;
 
 pub use dynamics::McmLoad;
 

@@ -8,7 +8,6 @@ mod plane;
 pub mod polar;
 pub mod prrrp;
 pub mod serial;
-pub mod transmission;
 pub mod tri_planar;
 pub mod twin_actuator;
 
@@ -19,7 +18,6 @@ pub use mcm::Mcm;
 pub use polar::Polar;
 pub use prrrp::{Prrrp, PrrrpBranch};
 pub use serial::Serial;
-pub use transmission::Elasticity;
 pub use tri_planar::TriPlanar;
 pub use twin_actuator::{ActuatorBodies, TwinActuator, TwinBranch};
 
@@ -131,6 +129,18 @@ impl MechanismKind {
             }
         }
         self.visit(MovesInZ)
+    }
+
+    /// Whether its transmissions are springs, none of them rigid.
+    pub fn is_elastic(&self) -> bool {
+        struct IsElastic;
+        impl MechanismVisitor for IsElastic {
+            type Output = bool;
+            fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> bool {
+                mechanism.stiffness().is_some()
+            }
+        }
+        self.visit(IsElastic)
     }
 
     /// The number of actuated axes.

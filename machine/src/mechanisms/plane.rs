@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::transmission::Elasticity;
 use crate::kinematics::Jacobian;
+use crate::transmission::Elasticity;
 
 /// `vector` turned by a right angle, counter-clockwise.
 pub(super) fn turned(vector: Vector2<f64>) -> Vector2<f64> {

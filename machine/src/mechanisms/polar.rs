@@ -16,12 +16,12 @@ use core::f64::consts::FRAC_PI_2;
 use nalgebra::{Matrix3, Vector3};
 use signals::math;
 
-use super::transmission::Elasticity;
 use crate::kinematics::{
     Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
     ToolMotion, finite,
 };
 use crate::taylor::Scalar;
+use crate::transmission::Elasticity;
 
 pub use dynamics::{PolarLoad, feed_scale};
 

@@ -14,12 +14,12 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross};
-use super::transmission::Elasticity;
 use crate::kinematics::{
     Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
     ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
+use crate::transmission::Elasticity;
 
 /// The dimensions and masses. Centres of mass are at mid-link.
 #[derive(Debug, Clone, Copy, PartialEq)]

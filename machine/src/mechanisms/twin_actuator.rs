@@ -16,12 +16,12 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
-use super::transmission::Elasticity;
 use crate::kinematics::{
     Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
     ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
+use crate::transmission::Elasticity;
 use signals::math;
 
 /// The dimensions and masses.

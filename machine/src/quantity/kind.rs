@@ -45,6 +45,8 @@ kinds! {
     Force = "a force", "2" "N", [1, 1, -2, 0, 0, 0];
     /// Of elasticity of a material [Pa].
     Modulus = "a modulus of elasticity", "70e9" "N/m^2", [-1, 1, -2, 0, 0, 0];
+    /// [m²].
+    Area = "an area", "50" "mm^2", [2, 0, 0, 0, 0, 0];
     /// Of a cross-section [m⁴].
     SecondMoment = "a second moment of area", "8e-9" "m^4", [4, 0, 0, 0, 0, 0];
     /// [kg].

@@ -10,8 +10,8 @@ mod parse;
 mod unit;
 
 pub use kind::{
-    Acceleration, Angle, AngularSpeed, Bandwidth, CountsPerTurn, Current, Damping, Duration, Force,
-    Inductance, Inertia, Jerk, JointStiffness, Kind, Lead, Length, Mass, Modulus, PulseRate,
+    Acceleration, Angle, AngularSpeed, Area, Bandwidth, CountsPerTurn, Current, Damping, Duration,
+    Force, Inductance, Inertia, Jerk, JointStiffness, Kind, Lead, Length, Mass, Modulus, PulseRate,
     Resistance, SecondMoment, Speed, Stiffness, Torque, TorqueConstant, TorsionalDamping,
     TorsionalStiffness, Travel, TravelAcceleration, TravelJerk, TravelSpeed, Voltage,
 };

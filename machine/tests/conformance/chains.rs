@@ -3,8 +3,8 @@
 use core::f64::consts::FRAC_PI_2;
 
 use machine::kinematics::{Freedom, Joints};
-use machine::mechanisms::Elasticity;
 use machine::mechanisms::serial::{JointKind, Link, Serial};
+use machine::transmission::Elasticity;
 use machine::{Mechanism, Pose};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 

@@ -10,7 +10,7 @@ mod suite;
 mod tables;
 
 use machine::kinematics::Joints;
-use machine::mechanisms::Elasticity;
+use machine::transmission::Elasticity;
 use machine::{Cartesian, CoreXy, Mechanism, Pose};
 use nalgebra::Vector3;
 use suite::conforms;

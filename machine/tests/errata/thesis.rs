@@ -4,7 +4,8 @@ use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use machine::Mechanism;
 use machine::kinematics::Joints;
-use machine::mechanisms::{CoreXy, Elasticity};
+use machine::mechanisms::CoreXy;
+use machine::transmission::{in_series, screw};
 use nalgebra::Vector2;
 use signals::math;
 
@@ -89,8 +90,8 @@ fn the_springs_of_a_screw_stand_in_a_row() {
     only_corrected("3.30", moved / p, force * p / series, force * p / (seen + torsional), 1e-12);
     let mixed = axial * torsional / (axial + torsional);
     only_corrected("3.30, units", moved / p, force * p / series, force * p / mixed, 1e-12);
-    let spring = Elasticity::of_screw(series, p, 1.93, 0.9);
-    assert!((force / spring.stiffness - moved).abs() < 1e-15);
+    let spring = screw::at_nut(in_series([seen, torsional]), p);
+    assert!((force / spring - moved).abs() < 1e-15);
 }
 
 /// The largest force along `angle` with no motor beyond 1, by trying.

@@ -6,7 +6,7 @@ use crate::joint_plan::IsLinear;
 use crate::plan::plan_unless;
 use crate::request::{ARTWORK_FILE, JobRequest, PLAN_FILE, REFUSAL_FILE, REQUEST_FILE, Refusal};
 use machine::kinematics::{Joints, KinematicsError};
-use machine::motor::StepperMotor;
+use machine::transmission::rest;
 use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea};
 use nalgebra::Vector3;
 use signals::AxisArray;
@@ -89,8 +89,8 @@ fn approach(job: &mut Job, machine: &Machine, standing: &AxisArray) -> Result<()
     Ok(())
 }
 
-/// Where the joints stand behind motors at rest: short of them by what gravity stretches springs and
-/// turns steppers. Home itself where that is within what rounding makes of it, so that a job plans
+/// Where the joints stand behind motors at rest: short of them by what gravity makes of springs,
+/// gaps and steppers' fields. Home itself where that is within what rounding makes of it, so that a job plans
 /// alike from every start there.
 struct Standing<'a> {
     motors: &'a AxisArray,
@@ -105,14 +105,10 @@ impl MechanismVisitor for Standing<'_> {
         let sag = |joints: &Joints<N>| -> Result<Joints<N>, KinematicsError> {
             let assembly = mechanism.assemble(joints, mechanism.branch(), None)?;
             let gravity = mechanism.gravity(&assembly);
-            let compliance = mechanism.stiffness().and_then(|stiffness| stiffness.try_inverse());
-            let springs = compliance.map_or_else(Joints::zeros, |compliance| compliance * gravity);
-            let rotors = Joints::from_fn(|index, _| {
-                let ratio = axes[index].ratio;
-                let angle = |motor: &StepperMotor| motor.load_angle(ratio * gravity[index], 0.0);
-                axes[index].motor.stepper().map_or(0.0, |motor| angle(motor).unwrap_or(0.0) * ratio)
+            let fields = Joints::from_fn(|index, _| {
+                rest::field_ahead(&axes[index], gravity[index]).unwrap_or(0.0)
             });
-            Ok(springs + rotors)
+            Ok(rest::rotors_ahead(&mechanism, axes, &gravity) + fields)
         };
         let motors = Joints::<N>::from_fn(|axis, _| motors[axis]);
         let home = Joints::<N>::from_fn(|axis, _| home_joints[axis]);

@@ -1,5 +1,6 @@
 //! The axes of a machine and what their motors can do.
 
+use machine::transmission::gear::LoadClass;
 use machine::{Axis, JointUnit, Machine};
 use serde::Serialize;
 
@@ -19,8 +20,41 @@ pub struct AxisReport {
     pub no_load_velocity: f64,
     /// Torque at standstill with the supply or the current limit used up [N·m at the motor].
     pub stall_torque: f64,
+    /// The same at the joint, after what gear and screw lose from standstill [N or N·m].
+    pub stall_effort: f64,
+    /// Inertia of the load beside the rotor's, seen at the shaft.
+    pub inertia_ratio: f64,
+    /// What a gear calls such a load.
+    pub load_class: LoadClassName,
+    /// How far the joint moves freely [m or rad].
+    pub backlash: f64,
     /// Angle of one encoder count or pulse, seen at the joint [m or rad].
     pub resolution: f64,
+}
+
+/// How hard a gear is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, schemars::JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum LoadClassName {
+    /// The load has up to 0.3 times the rotor's inertia.
+    Uniform,
+    /// Up to 3 times.
+    Medium,
+    /// Up to 10 times.
+    Heavy,
+    /// More.
+    Extreme,
+}
+
+impl From<LoadClass> for LoadClassName {
+    fn from(class: LoadClass) -> Self {
+        match class {
+            LoadClass::Uniform => Self::Uniform,
+            LoadClass::Medium => Self::Medium,
+            LoadClass::Heavy => Self::Heavy,
+            LoadClass::Extreme => Self::Extreme,
+        }
+    }
 }
 
 /// The unit of a joint.
@@ -50,6 +84,8 @@ pub fn axes(machine: &Machine) -> Vec<AxisReport> {
 
 fn report(axis: &Axis) -> AxisReport {
     let motor = &axis.motor;
+    let inertia_ratio = axis.gains.inertia / motor.rotor_inertia() - 1.0;
+    let lost = axis.efficiency.dynamic * axis.efficiency.at_start;
     AxisReport {
         name: axis.name.clone(),
         unit: axis.unit.into(),
@@ -57,6 +93,10 @@ fn report(axis: &Axis) -> AxisReport {
         velocity: axis.limits.velocity,
         no_load_velocity: motor.largest_speed() * axis.ratio,
         stall_torque: motor.stall_torque(),
+        stall_effort: motor.stall_torque() / axis.ratio * lost,
+        inertia_ratio,
+        load_class: LoadClass::of(inertia_ratio).into(),
+        backlash: axis.backlash,
         resolution: axis.encoder.resolution() * axis.ratio,
     }
 }

@@ -30,6 +30,9 @@ pub struct MotorUse {
     /// Torque: current against the power stage's limit, or against a stepper's pull-out torque at
     /// its speed.
     pub torque: f64,
+    /// Torque as the efficiencies of gear and screw have it in place of friction, at start the static
+    /// one too, against the same limit.
+    pub sizing: f64,
     /// Voltage against the supply; null for steppers.
     pub voltage: Option<f64>,
     /// Root mean square of the current against what the winding bears for ever; null for steppers
@@ -67,6 +70,7 @@ fn motors(machine: &Machine, uses: &Uses) -> Vec<MotorUse> {
             axis: axis.name.clone(),
             speed: at(&uses.velocity, index),
             torque: at(&uses.current, index),
+            sizing: at(&uses.sizing, index),
             voltage,
             heat,
             pulse_rate,

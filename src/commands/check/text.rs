@@ -1,6 +1,6 @@
 //! The report for a person.
 
-use super::axes::{AxisReport, Unit};
+use super::axes::{AxisReport, LoadClassName, Unit};
 use super::job::{JobReport, MotorUse};
 use super::reach::{Obstacle, ReachReport};
 use super::{CheckReport, CheckWarning};
@@ -10,7 +10,10 @@ use monitor::summary::MachineSummary;
 pub(super) fn print(report: &CheckReport) {
     let MachineSummary { name, mechanism, .. } = &report.machine;
     eprintln!("machine   {name} ({mechanism})");
-    report.axes.iter().for_each(|axis| eprintln!("{}", axis_line(axis)));
+    for axis in &report.axes {
+        eprintln!("{}", axis_line(axis));
+        eprintln!("{}", transmission_line(axis));
+    }
     reach(&report.reach);
     report.warnings.iter().for_each(warning);
     match &report.job {
@@ -40,6 +43,27 @@ fn axis_line(axis: &AxisReport) -> String {
             axis.resolution.to_degrees()
         ),
     }
+}
+
+/// What the gear bears, and what its motor brings to the joint.
+fn transmission_line(axis: &AxisReport) -> String {
+    let effort = axis.stall_effort;
+    let (effort, play) = match axis.unit {
+        Unit::Metre => (format!("{effort:.1} N"), format!("{:.1} µm", axis.backlash * 1e6)),
+        Unit::Radian => (format!("{effort:.3} N·m"), format!("{:.4}°", axis.backlash.to_degrees())),
+    };
+    let class = match axis.load_class {
+        LoadClassName::Uniform => "uniform",
+        LoadClassName::Medium => "medium",
+        LoadClassName::Heavy => "heavy",
+        LoadClassName::Extreme => "extreme",
+    };
+    let play = if axis.backlash > 0.0 { format!(", backlash {play}") } else { String::new() };
+    format!(
+        "          {effort} at the joint from standstill, load of {:.2} rotor inertias ({class})\
+         {play}",
+        axis.inertia_ratio
+    )
 }
 
 /// The soft limits, in millimetres or degrees.
@@ -122,6 +146,7 @@ fn motor_line(motor: &MotorUse) -> String {
     let torque = if motor.pulse_rate.is_some() { "pull-out torque" } else { "current" };
     for (name, share) in [
         (torque, Some(motor.torque)),
+        ("torque by efficiency", Some(motor.sizing)),
         ("voltage", motor.voltage),
         ("heat", motor.heat),
         ("pulse rate", motor.pulse_rate),

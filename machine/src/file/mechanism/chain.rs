@@ -8,11 +8,12 @@ use nalgebra::Vector3;
 use crate::actuator::Friction;
 use crate::document::{Either, Findings, Number, Place, Positive, ProblemKind};
 use crate::file::axes::{Joint, JointUnit};
-use crate::file::tables::{AxisTable, LinkTable, MachineTable};
+use crate::file::tables::{AxisTable, MachineTable};
 use crate::kinematics::{Joints, KinematicsError, Mechanism, Pose};
-use crate::mechanisms::Elasticity;
+use crate::transmission::{Elasticity, link};
 
 use super::Site;
+use super::springs;
 
 /// The spring behind an axis [N/m or N·m/rad at the joint] and the damping ratio of its load.
 struct Spring<'a> {
@@ -35,14 +36,6 @@ struct Output<'a> {
 /// A joint of a mechanism as its table names it.
 pub(super) type Named = (&'static str, JointUnit);
 
-/// The stiffness of an arm bending under a torque at its end, `E·I/L` [N·m/rad].
-///
-/// Source 003 eq. 5.20 to 5.24 prints `2·E·J/L`; a uniform moment turns the end of a beam by
-/// `M·L/(E·J)`.
-fn bending(table: &LinkTable) -> f64 {
-    table.modulus.value * table.second_moment.value / table.length.value
-}
-
 fn output(axis: &AxisTable) -> Vec<Output<'_>> {
     let table = &axis.transmission;
     let screw = table.screw.as_ref().map(|screw| {
@@ -50,11 +43,8 @@ fn output(axis: &AxisTable) -> Vec<Output<'_>> {
         Output {
             travel: lead,
             inertia: screw.inertia.value,
-            spring: screw.stiffness.map(|stiffness| Spring {
-                // Source 003 sec. 3.4: K_a′ = K_a·(P/2π)².
-                stiffness: stiffness.value / (lead * lead),
-                damping_ratio: &screw.damping_ratio,
-            }),
+            spring: springs::of_screw(screw.stiffness.as_ref(), screw.shaft.as_ref(), lead)
+                .map(|stiffness| Spring { stiffness, damping_ratio: &screw.damping_ratio }),
             unit: JointUnit::Length,
             place: screw.place,
         }
@@ -62,10 +52,8 @@ fn output(axis: &AxisTable) -> Vec<Output<'_>> {
     let belt = table.belt.as_ref().map(|belt| Output {
         travel: belt.pulley_radius.value,
         inertia: belt.inertia.value,
-        spring: belt.stiffness.map(|stiffness| Spring {
-            stiffness: stiffness.value,
-            damping_ratio: &belt.damping_ratio,
-        }),
+        spring: springs::of_belt(belt.stiffness.as_ref(), belt.section.as_ref())
+            .map(|stiffness| Spring { stiffness, damping_ratio: &belt.damping_ratio }),
         unit: JointUnit::Length,
         place: belt.place,
     });
@@ -79,12 +67,19 @@ fn output(axis: &AxisTable) -> Vec<Output<'_>> {
         unit: JointUnit::Angle,
         place: direct.place,
     });
-    let link = table.link.as_ref().map(|link| Output {
+    let link = table.link.as_ref().map(|table| Output {
         travel: 1.0,
         inertia: 0.0,
-        spring: Some(Spring { stiffness: bending(link), damping_ratio: &link.damping_ratio }),
+        spring: Some(Spring {
+            // What the arm moves hangs on a hinge at its tip, which takes no moment.
+            stiffness: link::pushed_at_tip(
+                table.modulus.value * table.second_moment.value,
+                table.length.value,
+            ),
+            damping_ratio: &table.damping_ratio,
+        }),
         unit: JointUnit::Angle,
-        place: link.place,
+        place: table.place,
     });
     let planar = table.planar.as_ref().map(|planar| Output {
         travel: planar.pitch.value / TAU,

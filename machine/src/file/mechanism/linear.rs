@@ -1,11 +1,12 @@
 //! Cartesian and CoreXY: joints that follow from the area.
 
-use super::Built;
+use super::{Built, springs};
 use crate::document::Findings;
 use crate::file::axes::{Joint, JointUnit};
 use crate::file::tables::{CartesianTable, CoreXyTable, ScrewTable};
 use crate::limits::WorkArea;
-use crate::mechanisms::{Cartesian, CoreXy, Elasticity, MechanismKind};
+use crate::mechanisms::{Cartesian, CoreXy, MechanismKind};
+use crate::transmission::Elasticity;
 
 pub(super) fn cartesian(
     table: &CartesianTable,
@@ -32,20 +33,17 @@ pub(super) fn cartesian(
     let springs: Vec<Elasticity> = screws
         .iter()
         .filter_map(|screw| {
-            Some(Elasticity::of_screw(
-                screw.stiffness?.value,
-                screw.lead.value,
-                screw.mass.value,
-                screw.damping_ratio.value,
-            ))
+            let lead = screw.lead.value;
+            let spring = springs::of_screw(screw.stiffness.as_ref(), screw.shaft.as_ref(), lead)?;
+            Some(Elasticity::damped(spring, screw.mass.value, screw.damping_ratio.value))
         })
         .collect();
     if !springs.is_empty() && springs.len() < screws.len() {
-        let rigid = screws.iter().find(|screw| screw.stiffness.is_none());
+        let rigid = screws.iter().find(|screw| screw.stiffness.is_none() && screw.shaft.is_none());
         findings.contradict(
             rigid.map_or(table.place, |screw| screw.place),
             "this screw is rigid, another one is not".to_owned(),
-            "give every screw its `stiffness`, or none",
+            "give every screw its `stiffness` or `shaft`, or none",
         );
         return None;
     }
@@ -82,8 +80,12 @@ pub(super) fn corexy(table: &CoreXyTable, area: &WorkArea, home: [f64; 3]) -> Bu
         joint("a", [x0 + y0, x1 + y1], home[0] + home[1]),
         joint("b", [x0 - y1, x1 - y0], home[0] - home[1]),
     ];
-    let elasticity = table.belt.as_ref().map(|belt| {
-        mass.map(|mass| Elasticity::damped(belt.stiffness.value, mass, belt.damping_ratio.value))
+    let elasticity = table.belt.as_ref().and_then(|belt| {
+        // A direction of the tool has a span of either belt on either side.
+        let both = |belt: f64| 2.0 * belt;
+        let built = springs::of_belt(None, belt.section.as_ref()).map(both);
+        let stiffness = belt.stiffness.map(|given| given.value).or(built)?;
+        Some(mass.map(|mass| Elasticity::damped(stiffness, mass, belt.damping_ratio.value)))
     });
     Built { mechanism: MechanismKind::CoreXy(CoreXy { mass, elasticity }), joints, home }
 }

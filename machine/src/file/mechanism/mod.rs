@@ -7,6 +7,7 @@ pub mod mcm;
 pub mod polar;
 pub mod prrrp;
 pub mod serial;
+mod springs;
 pub mod tri_planar;
 pub mod twin_actuator;
 
@@ -69,6 +70,7 @@ pub(super) fn build(
     findings: &mut Findings,
 ) -> Option<Built> {
     let kinds = &table.mechanism;
+    springs::check(table, findings);
     match given(kinds).as_slice() {
         [] => {
             findings.refuse(

@@ -8,10 +8,11 @@ use super::{Built, Site};
 use crate::document::{Findings, Keyword, Located, NonNegative, Point, Positive, Quantity};
 use crate::file::axes::{Joint, JointUnit};
 use crate::kinematics::{Freedom, Mechanism, Pose, STANDARD_GRAVITY};
+use crate::mechanisms::MechanismKind;
 use crate::mechanisms::serial::{JointKind, Link, Serial};
-use crate::mechanisms::{Elasticity, MechanismKind};
 use crate::quantity as unit;
 use crate::table;
+use crate::transmission::Elasticity;
 
 type Signed<K> = Quantity<K>;
 

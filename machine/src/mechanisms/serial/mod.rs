@@ -13,10 +13,10 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 pub use dynamics::SerialAssembly;
 
-use super::transmission::Elasticity;
 use crate::kinematics::{
     Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
 };
+use crate::transmission::Elasticity;
 
 /// How a joint moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -18,11 +18,11 @@ use nalgebra::{SMatrix, SVector};
 
 pub use assembly::TriPlanarAssembly;
 
-use super::transmission::Elasticity;
 use crate::kinematics::{
     Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
     ToolMotion,
 };
+use crate::transmission::Elasticity;
 
 /// Which way a leg leans from its hinge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,0 +1,104 @@
+//! The stiffness of a transmission, given or from what it is made of.
+
+use crate::document::{Findings, Place};
+use crate::file::tables::{
+    AxisTable, BeltTable, MachineTable, ScrewTable, SectionTable, ShaftTable,
+};
+use crate::quantity as unit;
+use crate::transmission::belt::Belt;
+use crate::transmission::screw::{self, ScrewShaft};
+
+type Above<K> = crate::document::Quantity<K, crate::document::Positive>;
+
+/// Of a screw of `lead` [m/rad], seen at the nut [N/m]; `None` where it is rigid.
+pub(super) fn of_screw(
+    given: Option<&Above<unit::TorsionalStiffness>>,
+    shaft: Option<&ShaftTable>,
+    lead: f64,
+) -> Option<f64> {
+    let torsional = match (given, shaft) {
+        (Some(given), _) => given.value,
+        (None, Some(shaft)) => shaft_of(shaft).stiffness(lead),
+        (None, None) => return None,
+    };
+    Some(screw::at_nut(torsional, lead))
+}
+
+/// Of a belt, both spans [N/m]; `None` where it is rigid.
+pub(super) fn of_belt(
+    given: Option<&Above<unit::Stiffness>>,
+    section: Option<&SectionTable>,
+) -> Option<f64> {
+    let built = section.map(|section| {
+        let belt = Belt { modulus: section.modulus.value, section: section.area.value };
+        belt.stiffness(section.spans.map(|span| span.value))
+    });
+    given.map(|given| given.value).or(built)
+}
+
+fn shaft_of(table: &ShaftTable) -> ScrewShaft {
+    ScrewShaft {
+        core_diameter: table.core_diameter.value,
+        bore: table.bore.value,
+        length: table.length.value,
+        modulus: table.modulus.value,
+        shear_modulus: table.shear_modulus.value,
+        nut_stiffness: table.nut_stiffness.map_or(f64::INFINITY, |stiffness| stiffness.value),
+        nut_accuracy: table.nut_accuracy.value,
+    }
+}
+
+/// Refuses stiffnesses that are said twice, or not at all, and shafts without material.
+pub(super) fn check(table: &MachineTable, findings: &mut Findings) {
+    let mechanism = &table.mechanism;
+    if let Some(cartesian) = &mechanism.cartesian {
+        for screw in [&cartesian.x, &cartesian.y].into_iter().chain(&cartesian.z) {
+            let ScrewTable { stiffness, shaft, .. } = screw;
+            check_shaft(stiffness.is_some(), shaft.as_ref(), findings);
+        }
+    }
+    if let Some(belt) = mechanism.corexy.as_ref().and_then(|corexy| corexy.belt.as_ref()) {
+        let BeltTable { stiffness, section, place, .. } = belt;
+        let built = section.as_ref().map(|section| section.place);
+        once(stiffness.is_some(), built, "section", findings);
+        if stiffness.is_none() && built.is_none() {
+            findings.contradict(
+                *place,
+                "nothing says how stiff the belts are".to_owned(),
+                "add `stiffness`, or a `section`; leave `belt` out to make them rigid",
+            );
+        }
+    }
+    for (_, AxisTable { transmission, .. }) in &table.axis.entries {
+        if let Some(screw) = &transmission.screw {
+            check_shaft(screw.stiffness.is_some(), screw.shaft.as_ref(), findings);
+        }
+        if let Some(belt) = &transmission.belt {
+            let built = belt.section.as_ref().map(|section| section.place);
+            once(belt.stiffness.is_some(), built, "section", findings);
+        }
+    }
+}
+
+fn check_shaft(given: bool, shaft: Option<&ShaftTable>, findings: &mut Findings) {
+    let Some(shaft) = shaft else { return };
+    once(given, Some(shaft.place), "shaft", findings);
+    let ShaftTable { bore, core_diameter, .. } = shaft;
+    if bore.value >= core_diameter.value {
+        findings.contradict(
+            bore.place,
+            format!("a bore of {} m leaves nothing of {} m", bore.value, core_diameter.value),
+            "make the bore smaller than the core",
+        );
+    }
+}
+
+fn once(given: bool, built: Option<Place>, name: &str, findings: &mut Findings) {
+    if let (true, Some(place)) = (given, built) {
+        findings.contradict(
+            place,
+            format!("the stiffness is given twice, by `stiffness` and by `{name}`"),
+            "keep one of them",
+        );
+    }
+}
