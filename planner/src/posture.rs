@@ -91,13 +91,6 @@ fn periodic<const N: usize, M: Mechanism<N>>(
     })
 }
 
-/// Margins that only the inverse kinematics needs: the joints may pass there, and a path has the
-/// rates that it needs, which the limits of the axes judge.
-fn is_serial(name: &str) -> bool {
-    const HARD: [&str; 7] = ["type_2", "collision", "clear", "gap", "baseline", "near_a", "stator"];
-    !HARD.iter().any(|hard| name.contains(hard))
-}
-
 /// The joints at rest somewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Posture<const N: usize> {
@@ -224,7 +217,7 @@ pub(crate) fn keeps_margins<const N: usize, M: Mechanism<N>>(
     match mechanism
         .margins(assembly)
         .into_iter()
-        .find(|margin| margin.value < margin.limit && !is_serial(margin.name))
+        .find(|margin| margin.value < margin.limit && !margin.kind.may_be_passed())
     {
         None => Ok(()),
         Some(margin) => Err(KinematicsError {

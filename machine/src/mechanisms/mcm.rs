@@ -17,8 +17,8 @@ use signals::math;
 
 use super::transmission::Elasticity;
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
-    ToolMotion, finite,
+    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism,
+    Pose, ToolMotion, finite,
 };
 use crate::taylor::Scalar;
 
@@ -267,8 +267,18 @@ impl Mechanism<5> for Mcm {
     /// the effect of r; upright, r is held.
     fn margins(&self, q: &Joints<5>) -> Vec<Margin> {
         vec![
-            Margin { name: "distance", value: q[0].abs(), limit: self.singular_distance },
-            Margin { name: "lean", value: math::sin(q[3]).abs(), limit: 0.0 },
+            Margin {
+                name: "distance",
+                kind: MarginKind::Serial,
+                value: q[0].abs(),
+                limit: self.singular_distance,
+            },
+            Margin {
+                name: "lean",
+                kind: MarginKind::Serial,
+                value: math::sin(q[3]).abs(),
+                limit: 0.0,
+            },
         ]
     }
 

@@ -18,8 +18,8 @@ use signals::math;
 
 use super::transmission::Elasticity;
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
-    ToolMotion, finite,
+    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism,
+    Pose, ToolMotion, finite,
 };
 use crate::taylor::Scalar;
 
@@ -257,8 +257,8 @@ impl Mechanism<3> for Polar {
         let radius = self.pose(q).position.xy().norm();
         let reach = self.arm + self.center_distance - radius;
         vec![
-            Margin { name: "center", value: determinant, limit: 0.0 },
-            Margin { name: "reach", value: reach, limit: 0.0 },
+            Margin { name: "center", kind: MarginKind::Serial, value: determinant, limit: 0.0 },
+            Margin { name: "reach", kind: MarginKind::Serial, value: reach, limit: 0.0 },
         ]
     }
 
