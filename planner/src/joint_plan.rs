@@ -14,13 +14,11 @@ use crate::drawing::Note;
 use crate::itinerary::Stop;
 use crate::plan::{Place, PlanError};
 use crate::posture::{Posture, Refused};
+use crate::retry::Retry;
 use crate::route::{NoWay, Route, Slowed, Speeds, route};
 use crate::timing::Leg;
 use crate::trajectory::{Course, Trajectory};
-
-/// How much slower a stroke or a move that breaks a limit is tried again, and how often in a job.
-const SLOWER: f64 = 0.85;
-const TRIALS: u32 = 24;
+use crate::unwind::divide;
 
 /// What is to be planned.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +38,8 @@ pub(crate) struct Task<'a> {
 pub(crate) struct Routed {
     pub(crate) trajectory: Arc<Trajectory>,
     pub(crate) notes: Vec<Note>,
+    /// What is gone through, where that is not what was asked for: strokes in parts.
+    pub(crate) stops: Option<Vec<Stop>>,
     /// The largest speed of a stroke [m/s].
     pub(crate) speed: f64,
 }
@@ -75,59 +75,74 @@ where
             None => home.get(axis).copied().unwrap_or(0.0),
         });
         let demands = Demands::new(&mechanism, &machine.axes, limits, &joints, attitude);
-        let mut speeds =
-            Speeds { strokes: speeds.to_vec(), shares: vec![1.0; speeds.len()], moves: 1.0 };
-        let strokes = numbers(stops);
-        let mut trial = 0;
+        let mut speeds = Speeds {
+            strokes: speeds.iter().map(|speed| (*speed, 1.0)).collect(),
+            moves: vec![1.0; stops.len()],
+        };
+        let mut retry = Retry::default();
+        let mut divided: Option<Vec<Stop>> = None;
         loop {
-            trial += 1;
+            let stops = divided.as_deref().unwrap_or(stops);
             let start = Posture { joints, branch: 0 };
-            let routed = route(&demands, &machine.area, start, stops, &speeds)
-                .map_err(|found| refusal(machine, found))?;
-            let routed = lay(machine, &limits, routed, attitude)?;
-            match (self.check)(&routed.trajectory) {
-                Ok(checked) => return Ok((routed, checked)),
-                Err(PlanError::Limit { place, breach, .. })
-                    if trial < TRIALS && may_be_slower(&breach) =>
-                {
-                    let piece = routed.trajectory.piece_at(place.time);
-                    let of_joints =
-                        piece.is_none_or(|piece| matches!(piece.course, Course::Joints(_)));
-                    let stroke = strokes.get((place.stroke as usize).wrapping_sub(1)).copied();
-                    match stroke.flatten().filter(|_| !of_joints) {
-                        Some(stroke) => speeds.shares[stroke] *= SLOWER,
-                        None => speeds.moves *= SLOWER,
-                    }
+            let mut routed = match route(&demands, &machine.area, start, stops, &speeds) {
+                Ok(routed) => routed,
+                Err(found) => {
+                    let Some((parts, part_speeds)) =
+                        parts(&demands, &joints, stops, &speeds, &found)
+                    else {
+                        return Err(refusal(machine, found));
+                    };
+                    speeds = part_speeds;
+                    divided = Some(parts);
+                    continue;
                 }
-                Err(error) => return Err(error),
+            };
+            let owners = core::mem::take(&mut routed.owners);
+            let mut routed = lay(machine, &limits, routed, attitude)?;
+            let error = match (self.check)(&routed.trajectory) {
+                Ok(checked) => {
+                    let notes = notes_of_parts(self.task.stops, divided.as_deref());
+                    routed.notes.extend(notes);
+                    routed.stops = divided;
+                    return Ok((routed, checked));
+                }
+                Err(error) => error,
+            };
+            let PlanError::Limit { place, breach, .. } = &error else { return Err(error) };
+            let found = (&*routed.trajectory, owners.as_slice());
+            if !retry.slow(&mut speeds, stops, found, (place, breach)) {
+                return Err(error);
             }
         }
     }
 }
 
-/// Whether less speed mends a breach.
-fn may_be_slower(breach: &Breach) -> bool {
-    const PLACES: [&str; 4] = ["joint position", "x of the tool", "y of the tool", "z of the tool"];
-    !PLACES.contains(&breach.quantity)
+/// The stops with the stroke divided for which a table cannot turn as far as `found` says.
+fn parts<const N: usize, M: Mechanism<N>>(
+    demands: &Demands<'_, N, M>,
+    near: &Joints<N>,
+    stops: &[Stop],
+    speeds: &Speeds,
+    found: &NoWay,
+) -> Option<(Vec<Stop>, Speeds)> {
+    let Refused::Position { axis, .. } = found.cause else { return None };
+    divide(demands, near, (stops, found.stop), speeds, axis)
 }
 
-/// For each stroke or dot in order, its number among the strokes; `None` for dots.
-fn numbers(stops: &[Stop]) -> Vec<Option<usize>> {
-    use crate::itinerary::Item;
-    let mut count = 0;
-    let number = |stop: &Stop| match stop.item {
-        Item::Stroke(_) => {
-            count += 1;
-            Some(Some(count - 1))
-        }
-        Item::Dot(_) => Some(None),
-        _ => None,
-    };
-    stops.iter().filter_map(number).collect()
+/// A note where strokes are marked in parts.
+fn notes_of_parts(asked: &[Stop], gone: Option<&[Stop]>) -> Option<Note> {
+    let gone = gone?;
+    let first = asked.iter().zip(gone).find(|(one, other)| one != other)?.0;
+    let text = format!(
+        "marked in parts, {} more than strokes are drawn: between them an axis is turned back in the \
+         dark, whose travel is less than the stroke winds up",
+        gone.len() - asked.len()
+    );
+    Some(Note { line: first.line, text })
 }
 
 fn refusal(machine: &Machine, found: NoWay) -> PlanError {
-    let NoWay { line, stroke, time, cause } = found;
+    let NoWay { line, stop: _, stroke, time, cause } = found;
     let place = Place { stroke, time };
     match cause {
         Refused::Kinematics(cause) => PlanError::Unreachable { line, place, cause },
@@ -148,12 +163,12 @@ fn lay<'a>(
     route: Route<'a>,
     attitude: AttitudeLaw,
 ) -> Result<Routed, PlanError> {
-    let Route { first, legs, slowed, speed } = route;
+    let Route { first, legs, owners: _, slowed, speed } = route;
     let lay = |sink: &mut dyn FnMut(Leg<'a>)| legs.into_iter().for_each(sink);
     let mut trajectory = Trajectory::lay(Course::Joints(first), limits, &machine.laser, lay)
         .map_err(|short| PlanError::TooShort { line: short.line, duration: short.duration })?;
     trajectory.attitude = attitude;
-    Ok(Routed { trajectory: Arc::new(trajectory), notes: notes(&slowed), speed })
+    Ok(Routed { trajectory: Arc::new(trajectory), notes: notes(&slowed), stops: None, speed })
 }
 
 /// One note for all strokes that the axes slow down.
