@@ -29,7 +29,7 @@ fn mechanism() -> Mcm {
         height: 0.3,
         reach: [0.0, 0.4],
         singular_distance: 1e-3,
-        branch: McmBranch { side: Some(1) },
+        branch: McmBranch { side: Some(1), lean: None },
         load: McmLoad {
             carriage_mass: 9.0,
             slide_mass: 5.5,

@@ -8,7 +8,7 @@
 //! An arm that is as long as the table is far, a₁ = c, reaches the centre of the table, and a path
 //! may cross it; `center` tells how. Another arm leaves a blind disc of radius |a₁ − c|.
 
-mod center;
+pub(super) mod center;
 mod dynamics;
 
 use core::f64::consts::FRAC_PI_2;
