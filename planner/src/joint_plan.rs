@@ -191,3 +191,98 @@ fn notes(slowed: &[Slowed]) -> Vec<Note> {
     }
     vec![Note { line, text }]
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::drawing::{Action, Curve, Drawing, Step};
+    use crate::itinerary::itinerary;
+    use nalgebra::Vector3;
+
+    const POLAR: &str = include_str!("../../machines/polar.toml");
+
+    /// Plans moves by the joints, along a curve and straight, with a check that finds `quantity` in
+    /// excess in the middle of piece `bad` the first `times` times. The pieces at the last check.
+    fn pieces_with(
+        quantity: &'static str,
+        bad: usize,
+        times: usize,
+    ) -> Result<Vec<(String, f64)>, PlanError> {
+        let mut machine = Machine::parse("polar.toml", POLAR, &[]).unwrap();
+        // So narrow that the joints cannot go along their arc at the end, nor through the centre.
+        machine.area.upper[0] = 0.062;
+        let side = machine.home_joints[0].signum();
+        machine.axes[0].limits.position = if side > 0.0 { [0.01, 0.62] } else { [-0.62, -0.01] };
+        let at = |x: f64, y: f64| Vector3::new(x, y, 0.05);
+        let actions = [
+            Action::Rapid { to: at(0.03, 0.02) },
+            Action::Feed {
+                curve: Curve::Line { from: at(0.03, 0.02), to: at(0.06, -0.04) },
+                speed: 0.05,
+            },
+            Action::Rapid { to: at(0.06, 0.04) },
+        ];
+        let steps = actions.map(|action| Step { action, line: 1 }).to_vec();
+        let start = Vector3::from(machine.home);
+        let drawing = Drawing { name: String::new(), start, steps, notes: Vec::new() };
+        let stops = itinerary(&drawing, &machine.path, None).unwrap();
+        let task = Task {
+            machine: &machine,
+            limits: machine.path,
+            stops: &stops,
+            speeds: &[],
+            standing: None,
+            attitude: AttitudeLaw::Level,
+        };
+        let mut pieces = Vec::new();
+        let mut trial = 0;
+        let check = |trajectory: &Arc<Trajectory>| {
+            let name = |course: &Course| format!("{course:?}").chars().take(5).collect();
+            let found = trajectory.pieces.iter().map(|piece| (name(&piece.course), piece.duration));
+            pieces = found.collect();
+            trial += 1;
+            if trial > times {
+                return Ok(());
+            }
+            let piece = &trajectory.pieces[bad];
+            let time = piece.start + piece.duration / 2.0;
+            let breach = Breach { time, axis: None, quantity, value: 2.0, limit: 1.0, unit: "A" };
+            Err(PlanError::Limit { line: 1, place: Place { stroke: 0, time }, breach })
+        };
+        machine.mechanism.visit(PlanJoints { task, check })?;
+        Ok(pieces)
+    }
+
+    #[test]
+    fn what_breaks_a_limit_in_the_dark_is_slowed_and_nothing_else() {
+        let before = pieces_with("motor current", 0, 0).unwrap();
+        let kinds: Vec<&str> = before.iter().map(|(kind, _)| kind.as_str()).collect();
+        assert_eq!(kinds, ["Joint", "Joint", "Feed(", "Strai"]);
+        for bad in 1..=3 {
+            let after = pieces_with("motor current", bad, 2).unwrap();
+            for (index, ((_, was), (kind, is))) in before.iter().zip(&after).enumerate() {
+                let slower = if index == bad { 1.0 / (0.85 * 0.85) } else { 1.0 };
+                assert!((is / was - slower).abs() < 1e-6, "{kind}: {was} s, then {is} s");
+            }
+        }
+    }
+
+    #[test]
+    fn a_breach_that_adds_up_slows_everything() {
+        let before = pieces_with("root mean square of current", 0, 0).unwrap();
+        let after = pieces_with("root mean square of current", 2, 1).unwrap();
+        for ((kind, was), (_, is)) in before.iter().zip(&after).skip(1) {
+            assert!((is / was - 1.0 / 0.85).abs() < 1e-6, "{kind}: {was} s, then {is} s");
+        }
+    }
+
+    #[test]
+    fn a_place_out_of_limits_is_refused_at_once() {
+        let mut refused = 0;
+        for bad in 1..=3 {
+            refused += usize::from(pieces_with("joint position", bad, 1).is_err());
+        }
+        assert_eq!(refused, 3);
+    }
+}
