@@ -252,6 +252,31 @@ fn a_line_beside_the_centre_is_as_fast_as_the_table_can_turn() {
     }
 }
 
+#[test]
+fn a_stroke_is_timed_in_the_posture_in_which_it_can_be_entered() {
+    let mut machine = machine();
+    // The nearest posture is the one with the arm on the same side: its own speed is a third of what
+    // it was, so that to change the side takes longer. On the way there the tool would leave the area.
+    machine.axes[0].limits.velocity = 2.0;
+    machine.area.upper[0] = 0.062;
+    let corner = at(0.06, -0.04);
+    let mut steps = line(at(0.06, 0.04), at(0.03, 0.045), 0.05);
+    steps.insert(0, Step { action: Action::Rapid { to: corner }, line: 2 });
+    steps.insert(1, Step { action: Action::Dwell { time: 0.05, lit: None }, line: 2 });
+    let plan = planned(&machine, &drawn(&machine, steps));
+    let samples: Vec<Setpoint> = plan.setpoints(1).collect();
+    let on = |sample: &&Setpoint| (Vector3::from(sample.tool) - corner).norm() < 1e-9;
+    let before = samples.iter().find(on).unwrap();
+    let lit: Vec<_> = samples.iter().filter(|sample| sample.laser.is_lit()).collect();
+    assert!(lit.iter().all(|sample| sample.position[0] * before.position[0] < 0.0));
+    for pair in lit.windows(2) {
+        let moved = (Vector3::from(pair[1].tool) - Vector3::from(pair[0].tool)).norm() / 1e-3;
+        assert!((moved - pair[0].path_velocity).abs() < 2.1e-3, "{moved}");
+    }
+    assert!(samples.iter().all(|sample| sample.tool[0] <= 0.062 + 1e-9));
+    assert!(plan.facts.uses.velocity.iter().all(|share| *share <= 1.0));
+}
+
 /// Half circles about two centres by turns, growing and then shrinking: a closed line that goes round
 /// the table's centre in one sense all the way.
 fn spiral(halves: i32) -> Vec<Step> {
