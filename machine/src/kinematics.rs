@@ -207,11 +207,35 @@ impl Branch for () {
     }
 }
 
+/// What a mechanism loses where a margin is used up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MarginKind {
+    /// A freedom of the tool, in a singularity of the first kind. The joints may pass there; a path
+    /// has the rates that it needs, which the limits of the axes judge.
+    Serial,
+    /// Its hold on the tool, in a singularity of the second kind. Never to be passed.
+    Parallel,
+    /// Its room: bodies touch, or a part leaves its ground. Never to be passed.
+    Collision,
+}
+
+impl MarginKind {
+    /// Whether the joints may pass below the margin's limit.
+    pub fn may_be_passed(self) -> bool {
+        match self {
+            Self::Serial => true,
+            Self::Parallel | Self::Collision => false,
+        }
+    }
+}
+
 /// How far a configuration is from where a mechanism can no longer do what is asked of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margin {
     /// The name, such as `type_1` or `center`.
     pub name: &'static str,
+    /// What is lost where it is used up.
+    pub kind: MarginKind,
     /// Its value; 0 is the singularity.
     pub value: f64,
     /// What the value must not fall below.

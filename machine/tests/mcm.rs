@@ -41,7 +41,7 @@ fn reference() -> Mcm {
 }
 
 fn branch(sign: &Value) -> McmBranch {
-    McmBranch { side: Some(sign.as_i64().unwrap() as i32) }
+    McmBranch { side: Some(sign.as_i64().unwrap() as i32), lean: None }
 }
 
 /// A rotation whose −z is `axis`, turned about it by `roll` [rad].
@@ -148,7 +148,7 @@ fn verdict(machine: &Mcm, limits: &Value, case: &Value) -> String {
         machine.inverse_machine_angles(&position, a, r, side, &previous)
     } else {
         let rotation = looking(&vector(&input["tool_axis"]), 0.0);
-        machine.inverse(&Pose { position, rotation }, McmBranch { side }, &previous)
+        machine.inverse(&Pose { position, rotation }, McmBranch { side, lean: None }, &previous)
     };
     match solution {
         Err(error) => error.code.to_owned(),
@@ -277,12 +277,74 @@ fn an_upright_tool_keeps_its_turn() {
     assert!(machine.joint_motion(&tool, machine.branch, &previous).is_ok());
 }
 
+/// A beam that leans one way, passes the vertical and leans the other way: the head keeps its turn, the
+/// tilt changes its sign, and all rates are those of the joints before and after.
+#[test]
+fn a_path_through_the_vertical_keeps_the_heads_turn() {
+    let machine = reference();
+    // Leans about an axis of the work by 0.4 rad/s while the tool goes on.
+    let rate = Vector3::new(0.24, 0.32, 0.0);
+    let velocity = Vector3::new(0.03, -0.05, 0.01);
+    let at = |time: f64| {
+        let turn = nalgebra::Rotation3::new(rate * time);
+        ToolMotion {
+            position: Vector3::new(-0.1, 0.28, 0.05) + velocity * time,
+            velocity,
+            attitude: Attitude { velocity: rate, ..Attitude::fixed(*turn.matrix()) },
+            ..still(Vector3::zeros(), Matrix3::identity())
+        }
+    };
+    let first = machine.inverse(&at(-0.5).pose(), machine.branch, &Joints::zeros()).unwrap();
+    for step in [2e-3, 1e-5, 3.3e-8] {
+        let mut previous = first;
+        // Up to near the vertical in coarse steps, then across it in fine ones.
+        for index in 0..=500 {
+            let tool = at(-0.5 + (0.5 - 50.0 * step) * f64::from(index) / 500.0);
+            previous = machine.joint_motion(&tool, machine.branch, &previous).unwrap().position;
+        }
+        assert!(previous[3] > 0.0);
+        let mut rates: Option<Joints<5>> = None;
+        let mut branch = machine.branch;
+        for index in -50..=50 {
+            let tool = at(f64::from(index) * step);
+            if index > 0 {
+                // Away from the vertical the side of the lean says which solution it is.
+                branch = branch.choose("lean", &[-1]).unwrap();
+            }
+            let motion = machine.joint_motion(&tool, branch, &previous).unwrap();
+            let case = format!("step {step:e} at {index}: {:?}", motion.velocity);
+            assert!((motion.position - previous).amax() < 10.0 * step + 1e-3, "{case}");
+            near(
+                machine
+                    .forward(&motion.position, branch)
+                    .unwrap()
+                    .position
+                    .metric_distance(&tool.position),
+                0.0,
+                1e-12,
+                &case,
+            );
+            if let Some(rates) = rates {
+                assert!((motion.velocity - rates).amax() < 30.0 * step + 1e-5, "{case}");
+            }
+            (previous, rates) = (motion.position, Some(motion.velocity));
+        }
+        assert!(previous[3] < 0.0, "the tilt changes its sign");
+        near(previous[3], -0.4 * 50.0 * step, 1e-9, "tilt");
+    }
+    // A head that is turned across the way would have to jump.
+    let mut across = first;
+    across[4] += 1.2;
+    let error = machine.joint_motion(&at(0.0), machine.branch, &across).unwrap_err();
+    assert_eq!((error.code, error.axis), ("singular_axis", Some(4)));
+}
+
 #[test]
 fn it_conforms() {
     let machine = reference();
     assert_eq!(machine.freedom(), Freedom::Axis);
     for side in [1, -1] {
-        conforms(&machine, McmBranch { side: Some(side) }, |random| {
+        conforms(&machine, McmBranch { side: Some(side), lean: None }, |random| {
             let (s, c) = math::sin_cos(3.0 * random.next());
             let radius = 0.3 + 0.1 * random.next();
             let mut tool = still(
@@ -316,7 +378,12 @@ fn branches_have_names_and_values() {
     assert_eq!(free.choose("side", &[0]), None);
     assert_eq!(free.choose("elbow", &[1]), None);
     let machine = reference();
-    assert_eq!(machine.branch_of(&Joints::from([-0.2, 0.0, 0.0, 0.0, 0.0])), chosen);
+    let leaning = chosen.choose("lean", &[-1]).unwrap();
+    assert_eq!(leaning.choices(), [("side", vec![-1]), ("lean", vec![-1])]);
+    assert_eq!(leaning.choose("lean", &[]), Some(chosen));
+    assert_eq!(machine.branch_of(&Joints::from([-0.2, 0.0, 0.0, -0.1, 0.0])), leaning);
+    let straight = chosen.choose("lean", &[1]);
+    assert_eq!(Some(machine.branch_of(&Joints::from([-0.2, 0.0, 0.0, 0.0, 0.0]))), straight);
 }
 
 /// A tree of rigid bodies, by an engine that knows nothing of this mechanism's equations: efforts by
@@ -372,4 +439,43 @@ fn pose_and_dynamics_agree_with_a_tree_of_rigid_bodies() {
             near((found - joints(key)).amax(), 0.0, tolerance, &format!("{key} {context}"));
         }
     }
+}
+
+/// A rest that `home_axes` gives is held to the area, the limits and the margins as one by a place is.
+#[test]
+fn a_home_by_its_axes_is_refused_where_the_machine_cannot_rest() {
+    let text = include_str!("../../machines/mcm.toml");
+    let given = "home_axes = [\"320 mm\", \"100 mm\", \"0 deg\", \"45 deg\", \"180 deg\"]";
+    assert!(text.contains(given));
+    let refused = |home: &str, expected: &[&str]| {
+        let changed = text.replacen(given, &format!("home_axes = [{home}]"), 1);
+        let error = machine::Machine::parse("mcm.toml", &changed, &[]).unwrap_err();
+        let problems: Vec<(Option<usize>, String)> =
+            error.problems().map(|problem| (problem.line(), format!("{problem:?}"))).collect();
+        for part in expected {
+            assert!(problems.iter().any(|(_, text)| text.contains(part)), "{part}: {problems:?}");
+        }
+        let line = 1 + text.lines().position(|line| line == given).unwrap();
+        assert!(problems.iter().any(|(at, _)| *at == Some(line)), "{problems:?}");
+    };
+    // Lowered by 500 mm the tool is 135 mm below the table.
+    refused(
+        r#""320 mm", "500 mm", "0 deg", "45 deg", "180 deg""#,
+        &["outside the area: z is -0.134853 m, the area is from 0 m to 0.45 m", "widen the area"],
+    );
+    // The carriage over the table's axis, nearer than 0.1 mm.
+    refused(
+        r#""0.05 mm", "100 mm", "0 deg", "45 deg", "180 deg""#,
+        &["`distance` is 0.000050, and must be 0.0001 or more", "farther from it"],
+    );
+}
+
+#[test]
+fn a_home_by_its_axes_is_refused_outside_of_their_limits() {
+    let text = include_str!("../../machines/mcm.toml");
+    let changed = text.replacen("\"45 deg\", \"180 deg\"", "\"-20 deg\", \"180 deg\"", 1);
+    let error = machine::Machine::parse("mcm.toml", &changed, &[]).unwrap_err();
+    let all = format!("{:?}", error.problems().collect::<Vec<_>>());
+    assert!(all.contains("axis `a` is at -0.3490658503988659 rad at home"), "{all}");
+    assert!(all.contains("`home_axes`"), "{all}");
 }

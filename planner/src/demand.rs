@@ -17,6 +17,10 @@ const TORQUE_SHARE: f64 = 0.8;
 /// inductance.
 const VOLTAGE_SHARE: f64 = 0.25;
 
+/// Share of an axis's limit that the first guess at a joint move uses: the rest is rounding, which the
+/// check would take for a breach.
+const INSIDE: f64 = 1.0 - 1e-9;
+
 /// Limits of a machine's axes and path, asked about one motion after the other.
 #[derive(Debug, Clone)]
 pub(crate) struct Demands<'a, const N: usize, M: Mechanism<N>> {
@@ -74,7 +78,8 @@ impl<'a, const N: usize, M: Mechanism<N>> Demands<'a, N, M> {
         let assembly = self.assemble(from, branch, None)?;
         let mass = self.mechanism.mass_matrix(&assembly);
         let path = &self.path;
-        let mut most = [path.rapid, path.acceleration, path.jerk].map(|limit| limit / longest);
+        let mut most =
+            [path.rapid, path.acceleration, path.jerk].map(|limit| INSIDE * limit / longest);
         for (index, axis) in self.axes.iter().enumerate().take(N) {
             let way = change[index].abs();
             if way <= 0.0 {
@@ -86,9 +91,9 @@ impl<'a, const N: usize, M: Mechanism<N>> Demands<'a, N, M> {
             let acceleration = TORQUE_SHARE * torque / inertia;
             let jerk = VOLTAGE_SHARE * slew / inertia;
             let limits = &axis.limits;
-            most[0] = most[0].min(limits.velocity / way);
-            most[1] = most[1].min(limits.acceleration.min(acceleration) / way);
-            most[2] = most[2].min(limits.jerk.min(jerk) / way);
+            most[0] = most[0].min(INSIDE * limits.velocity / way);
+            most[1] = most[1].min(INSIDE * limits.acceleration.min(acceleration) / way);
+            most[2] = most[2].min(INSIDE * limits.jerk.min(jerk) / way);
         }
         Ok(most)
     }

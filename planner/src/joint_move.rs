@@ -124,6 +124,11 @@ impl JointMove {
         Ok(if pace > 1.0 { pace * 1.01 } else { pace })
     }
 
+    /// Whether the joints stand still.
+    pub(crate) fn stands(&self) -> bool {
+        self.change.iter().all(|change| *change == 0.0)
+    }
+
     /// Makes it at `share` of its speed.
     pub(crate) fn slow(&mut self, share: f64) {
         self.pace /= share;

@@ -14,13 +14,11 @@ use crate::drawing::Note;
 use crate::itinerary::Stop;
 use crate::plan::{Place, PlanError};
 use crate::posture::{Posture, Refused};
+use crate::retry::Retry;
 use crate::route::{NoWay, Route, Slowed, Speeds, route};
 use crate::timing::Leg;
 use crate::trajectory::{Course, Trajectory};
-
-/// How much slower a stroke or a move that breaks a limit is tried again, and how often in a job.
-const SLOWER: f64 = 0.85;
-const TRIALS: u32 = 24;
+use crate::unwind::divide;
 
 /// What is to be planned.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +38,8 @@ pub(crate) struct Task<'a> {
 pub(crate) struct Routed {
     pub(crate) trajectory: Arc<Trajectory>,
     pub(crate) notes: Vec<Note>,
+    /// What is gone through, where that is not what was asked for: strokes in parts.
+    pub(crate) stops: Option<Vec<Stop>>,
     /// The largest speed of a stroke [m/s].
     pub(crate) speed: f64,
 }
@@ -75,59 +75,74 @@ where
             None => home.get(axis).copied().unwrap_or(0.0),
         });
         let demands = Demands::new(&mechanism, &machine.axes, limits, &joints, attitude);
-        let mut speeds =
-            Speeds { strokes: speeds.to_vec(), shares: vec![1.0; speeds.len()], moves: 1.0 };
-        let strokes = numbers(stops);
-        let mut trial = 0;
+        let mut speeds = Speeds {
+            strokes: speeds.iter().map(|speed| (*speed, 1.0)).collect(),
+            moves: vec![1.0; stops.len()],
+        };
+        let mut retry = Retry::default();
+        let mut divided: Option<Vec<Stop>> = None;
         loop {
-            trial += 1;
+            let stops = divided.as_deref().unwrap_or(stops);
             let start = Posture { joints, branch: 0 };
-            let routed = route(&demands, &machine.area, start, stops, &speeds)
-                .map_err(|found| refusal(machine, found))?;
-            let routed = lay(machine, &limits, routed, attitude)?;
-            match (self.check)(&routed.trajectory) {
-                Ok(checked) => return Ok((routed, checked)),
-                Err(PlanError::Limit { place, breach, .. })
-                    if trial < TRIALS && may_be_slower(&breach) =>
-                {
-                    let piece = routed.trajectory.piece_at(place.time);
-                    let of_joints =
-                        piece.is_none_or(|piece| matches!(piece.course, Course::Joints(_)));
-                    let stroke = strokes.get((place.stroke as usize).wrapping_sub(1)).copied();
-                    match stroke.flatten().filter(|_| !of_joints) {
-                        Some(stroke) => speeds.shares[stroke] *= SLOWER,
-                        None => speeds.moves *= SLOWER,
-                    }
+            let mut routed = match route(&demands, &machine.area, start, stops, &speeds) {
+                Ok(routed) => routed,
+                Err(found) => {
+                    let Some((parts, part_speeds)) =
+                        parts(&demands, &joints, stops, &speeds, &found)
+                    else {
+                        return Err(refusal(machine, found));
+                    };
+                    speeds = part_speeds;
+                    divided = Some(parts);
+                    continue;
                 }
-                Err(error) => return Err(error),
+            };
+            let owners = core::mem::take(&mut routed.owners);
+            let mut routed = lay(machine, &limits, routed, attitude)?;
+            let error = match (self.check)(&routed.trajectory) {
+                Ok(checked) => {
+                    let notes = notes_of_parts(self.task.stops, divided.as_deref());
+                    routed.notes.extend(notes);
+                    routed.stops = divided;
+                    return Ok((routed, checked));
+                }
+                Err(error) => error,
+            };
+            let PlanError::Limit { place, breach, .. } = &error else { return Err(error) };
+            let found = (&*routed.trajectory, owners.as_slice());
+            if !retry.slow(&mut speeds, stops, found, (place, breach)) {
+                return Err(error);
             }
         }
     }
 }
 
-/// Whether less speed mends a breach.
-fn may_be_slower(breach: &Breach) -> bool {
-    const PLACES: [&str; 4] = ["joint position", "x of the tool", "y of the tool", "z of the tool"];
-    !PLACES.contains(&breach.quantity)
+/// The stops with the stroke divided for which a table cannot turn as far as `found` says.
+fn parts<const N: usize, M: Mechanism<N>>(
+    demands: &Demands<'_, N, M>,
+    near: &Joints<N>,
+    stops: &[Stop],
+    speeds: &Speeds,
+    found: &NoWay,
+) -> Option<(Vec<Stop>, Speeds)> {
+    let Refused::Position { axis, .. } = found.cause else { return None };
+    divide(demands, near, (stops, found.stop), speeds, axis)
 }
 
-/// For each stroke or dot in order, its number among the strokes; `None` for dots.
-fn numbers(stops: &[Stop]) -> Vec<Option<usize>> {
-    use crate::itinerary::Item;
-    let mut count = 0;
-    let number = |stop: &Stop| match stop.item {
-        Item::Stroke(_) => {
-            count += 1;
-            Some(Some(count - 1))
-        }
-        Item::Dot(_) => Some(None),
-        _ => None,
-    };
-    stops.iter().filter_map(number).collect()
+/// A note where strokes are marked in parts.
+fn notes_of_parts(asked: &[Stop], gone: Option<&[Stop]>) -> Option<Note> {
+    let gone = gone?;
+    let first = asked.iter().zip(gone).find(|(one, other)| one != other)?.0;
+    let text = format!(
+        "marked in parts, {} more than strokes are drawn: between them an axis is turned back in the \
+         dark, whose travel is less than the stroke winds up",
+        gone.len() - asked.len()
+    );
+    Some(Note { line: first.line, text })
 }
 
 fn refusal(machine: &Machine, found: NoWay) -> PlanError {
-    let NoWay { line, stroke, time, cause } = found;
+    let NoWay { line, stop: _, stroke, time, cause } = found;
     let place = Place { stroke, time };
     match cause {
         Refused::Kinematics(cause) => PlanError::Unreachable { line, place, cause },
@@ -148,12 +163,12 @@ fn lay<'a>(
     route: Route<'a>,
     attitude: AttitudeLaw,
 ) -> Result<Routed, PlanError> {
-    let Route { first, legs, slowed, speed } = route;
+    let Route { first, legs, owners: _, slowed, speed } = route;
     let lay = |sink: &mut dyn FnMut(Leg<'a>)| legs.into_iter().for_each(sink);
     let mut trajectory = Trajectory::lay(Course::Joints(first), limits, &machine.laser, lay)
         .map_err(|short| PlanError::TooShort { line: short.line, duration: short.duration })?;
     trajectory.attitude = attitude;
-    Ok(Routed { trajectory: Arc::new(trajectory), notes: notes(&slowed), speed })
+    Ok(Routed { trajectory: Arc::new(trajectory), notes: notes(&slowed), stops: None, speed })
 }
 
 /// One note for all strokes that the axes slow down.
@@ -175,4 +190,99 @@ fn notes(slowed: &[Slowed]) -> Vec<Note> {
         text.push_str(&format!("; {} strokes are slowed somewhere", slowed.len()));
     }
     vec![Note { line, text }]
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::drawing::{Action, Curve, Drawing, Step};
+    use crate::itinerary::itinerary;
+    use nalgebra::Vector3;
+
+    const POLAR: &str = include_str!("../../machines/polar.toml");
+
+    /// Plans moves by the joints, along a curve and straight, with a check that finds `quantity` in
+    /// excess in the middle of piece `bad` the first `times` times. The pieces at the last check.
+    fn pieces_with(
+        quantity: &'static str,
+        bad: usize,
+        times: usize,
+    ) -> Result<Vec<(String, f64)>, PlanError> {
+        let mut machine = Machine::parse("polar.toml", POLAR, &[]).unwrap();
+        // So narrow that the joints cannot go along their arc at the end, nor through the centre.
+        machine.area.upper[0] = 0.062;
+        let side = machine.home_joints[0].signum();
+        machine.axes[0].limits.position = if side > 0.0 { [0.01, 0.62] } else { [-0.62, -0.01] };
+        let at = |x: f64, y: f64| Vector3::new(x, y, 0.05);
+        let actions = [
+            Action::Rapid { to: at(0.03, 0.02) },
+            Action::Feed {
+                curve: Curve::Line { from: at(0.03, 0.02), to: at(0.06, -0.04) },
+                speed: 0.05,
+            },
+            Action::Rapid { to: at(0.06, 0.04) },
+        ];
+        let steps = actions.map(|action| Step { action, line: 1 }).to_vec();
+        let start = Vector3::from(machine.home);
+        let drawing = Drawing { name: String::new(), start, steps, notes: Vec::new() };
+        let stops = itinerary(&drawing, &machine.path, None).unwrap();
+        let task = Task {
+            machine: &machine,
+            limits: machine.path,
+            stops: &stops,
+            speeds: &[],
+            standing: None,
+            attitude: AttitudeLaw::Level,
+        };
+        let mut pieces = Vec::new();
+        let mut trial = 0;
+        let check = |trajectory: &Arc<Trajectory>| {
+            let name = |course: &Course| format!("{course:?}").chars().take(5).collect();
+            let found = trajectory.pieces.iter().map(|piece| (name(&piece.course), piece.duration));
+            pieces = found.collect();
+            trial += 1;
+            if trial > times {
+                return Ok(());
+            }
+            let piece = &trajectory.pieces[bad];
+            let time = piece.start + piece.duration / 2.0;
+            let breach = Breach { time, axis: None, quantity, value: 2.0, limit: 1.0, unit: "A" };
+            Err(PlanError::Limit { line: 1, place: Place { stroke: 0, time }, breach })
+        };
+        machine.mechanism.visit(PlanJoints { task, check })?;
+        Ok(pieces)
+    }
+
+    #[test]
+    fn what_breaks_a_limit_in_the_dark_is_slowed_and_nothing_else() {
+        let before = pieces_with("motor current", 0, 0).unwrap();
+        let kinds: Vec<&str> = before.iter().map(|(kind, _)| kind.as_str()).collect();
+        assert_eq!(kinds, ["Joint", "Joint", "Feed(", "Strai"]);
+        for bad in 1..=3 {
+            let after = pieces_with("motor current", bad, 2).unwrap();
+            for (index, ((_, was), (kind, is))) in before.iter().zip(&after).enumerate() {
+                let slower = if index == bad { 1.0 / (0.85 * 0.85) } else { 1.0 };
+                assert!((is / was - slower).abs() < 1e-6, "{kind}: {was} s, then {is} s");
+            }
+        }
+    }
+
+    #[test]
+    fn a_breach_that_adds_up_slows_everything() {
+        let before = pieces_with("root mean square of current", 0, 0).unwrap();
+        let after = pieces_with("root mean square of current", 2, 1).unwrap();
+        for ((kind, was), (_, is)) in before.iter().zip(&after).skip(1) {
+            assert!((is / was - 1.0 / 0.85).abs() < 1e-6, "{kind}: {was} s, then {is} s");
+        }
+    }
+
+    #[test]
+    fn a_place_out_of_limits_is_refused_at_once() {
+        let mut refused = 0;
+        for bad in 1..=3 {
+            refused += usize::from(pieces_with("joint position", bad, 1).is_err());
+        }
+        assert_eq!(refused, 3);
+    }
 }

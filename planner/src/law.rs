@@ -14,8 +14,10 @@ const LEVEL: f64 = 0.84;
 pub(crate) struct Cell {
     /// Where it ends along the path [m].
     pub(crate) end: f64,
-    /// Largest steady speed [m/s].
+    /// Largest speed that leaves room for a ramp [m/s].
     pub(crate) speed: f64,
+    /// Largest speed where there is no ramp [m/s], at least `speed`.
+    pub(crate) steady: f64,
     /// Largest acceleration [m/s²] and jerk [m/s³] of a ramp.
     pub(crate) ramp: [f64; 2],
 }
@@ -47,6 +49,7 @@ struct Plateau {
     from: f64,
     to: f64,
     speed: f64,
+    steady: f64,
     ramp: [f64; 2],
 }
 
@@ -59,6 +62,7 @@ impl SpeedLaw {
             plateaus[index].speed = speed;
             plateaus = merged(plateaus);
         }
+        let plateaus = raised(plateaus, top, ends);
         let mut law = Self { phases: Vec::new(), length: 0.0, duration: 0.0 };
         for (index, plateau) in plateaus.iter().enumerate() {
             let before = index.checked_sub(1).map(|index| plateaus[index]);
@@ -184,26 +188,71 @@ fn way(ramp: &Ramp, slower: f64) -> f64 {
     slower * ramp.duration() + ramp.length()
 }
 
+/// Lets plateaus between faster ones go as fast as the axes can without a ramp: the ramps lie on the
+/// faster ones' ground. One that comes up to a neighbour becomes a wider one with it, if that lies
+/// between faster ones again.
+fn raised(mut plateaus: Vec<Plateau>, top: f64, ends: [f64; 2]) -> Vec<Plateau> {
+    loop {
+        let mut rises = false;
+        for index in 0..plateaus.len() {
+            let speed = plateaus[index].speed;
+            let before = index.checked_sub(1).map_or(ends[0], |index| plateaus[index].speed);
+            let after = plateaus.get(index + 1).map_or(ends[1], |after| after.speed);
+            let most = plateaus[index].steady.min(before).min(after).min(top);
+            if most <= speed {
+                continue;
+            }
+            plateaus[index].speed = most;
+            // A shorter ramp at a higher speed may need more room.
+            let beside = [index.wrapping_sub(1), index + 1];
+            if beside.into_iter().any(|index| lacks_room(&plateaus, index).is_some()) {
+                plateaus[index].speed = speed;
+            } else {
+                rises = true;
+            }
+        }
+        let count = plateaus.len();
+        plateaus = widened(&plateaus);
+        if !rises && plateaus.len() == count {
+            return plateaus;
+        }
+    }
+}
+
+/// Neighbours of the same speed become one where both beside them are faster.
+fn widened(plateaus: &[Plateau]) -> Vec<Plateau> {
+    let mut wider: Vec<Plateau> = Vec::with_capacity(plateaus.len());
+    let mut rest = plateaus;
+    while let Some(first) = rest.first() {
+        let same = rest.iter().take_while(|other| other.speed == first.speed).count();
+        let slower = |other: Option<&Plateau>| other.is_some_and(|o| o.speed < first.speed);
+        let (group, left) = rest.split_at(same);
+        if slower(wider.last()) || slower(left.first()) {
+            wider.extend_from_slice(group);
+        } else {
+            wider.extend(merged(group.to_vec()));
+        }
+        rest = left;
+    }
+    wider
+}
+
 /// Cells of the same level as plateaus.
 fn plateaus(cells: &[Cell], top: f64, ends: [f64; 2]) -> Vec<Plateau> {
     let last = cells.len().saturating_sub(1);
     let mut from = 0.0;
     let mut found = Vec::with_capacity(cells.len());
     for (index, cell) in cells.iter().enumerate() {
-        let mut most = cell.speed;
-        if index == 0 {
-            most = most.min(ends[0]);
-        }
-        if index == last {
-            most = most.min(ends[1]);
-        }
+        let first = if index == 0 { ends[0] } else { f64::INFINITY };
+        let end = first.min(if index == last { ends[1] } else { f64::INFINITY });
+        let (most, steady) = (cell.speed.min(end), cell.steady.min(end));
         let speed = if most >= top {
             top
         } else {
             let level = (signals::math::ln(most / top) / signals::math::ln(LEVEL)).ceil();
             top * signals::math::exp(level * signals::math::ln(LEVEL))
         };
-        found.push(Plateau { from, to: cell.end, speed, ramp: cell.ramp });
+        found.push(Plateau { from, to: cell.end, speed, steady, ramp: cell.ramp });
         from = cell.end;
     }
     merged(found)
@@ -216,6 +265,7 @@ fn merged(plateaus: Vec<Plateau>) -> Vec<Plateau> {
         match merged.last_mut() {
             Some(last) if last.speed == plateau.speed => {
                 last.to = plateau.to;
+                last.steady = last.steady.min(plateau.steady);
                 last.ramp = std::array::from_fn(|order| last.ramp[order].min(plateau.ramp[order]));
             }
             _ => merged.push(plateau),
@@ -227,20 +277,156 @@ fn merged(plateaus: Vec<Plateau>) -> Vec<Plateau> {
 /// The first plateau that has no room for its ramps, and the speed of the faster of its slower
 /// neighbours, which it must take on.
 fn too_short(plateaus: &[Plateau]) -> Option<(usize, f64)> {
-    for (index, plateau) in plateaus.iter().enumerate() {
-        let before = index.checked_sub(1).map(|index| plateaus[index]);
-        let after = plateaus.get(index + 1).copied();
-        let slower = |other: &Plateau| other.speed < plateau.speed;
-        let slower = [before, after].map(|other| other.filter(slower));
-        let needed: f64 = slower
-            .iter()
-            .flatten()
-            .map(|other| way(&ramp_between(other, plateau), other.speed))
-            .sum();
-        if needed > plateau.to - plateau.from {
-            let speed = slower.iter().flatten().map(|other| other.speed).fold(0.0, f64::max);
-            return Some((index, speed));
+    (0..plateaus.len()).find_map(|index| Some((index, lacks_room(plateaus, index)?)))
+}
+
+/// Whether the plateau `index` has no room for its ramps: then the speed of the faster of its slower
+/// neighbours [m/s].
+fn lacks_room(plateaus: &[Plateau], index: usize) -> Option<f64> {
+    let plateau = plateaus.get(index)?;
+    let before = index.checked_sub(1).map(|index| plateaus[index]);
+    let after = plateaus.get(index + 1).copied();
+    let slower = |other: &Plateau| other.speed < plateau.speed;
+    let slower = [before, after].map(|other| other.filter(slower));
+    let needed: f64 =
+        slower.iter().flatten().map(|other| way(&ramp_between(other, plateau), other.speed)).sum();
+    (needed > plateau.to - plateau.from)
+        .then(|| slower.iter().flatten().map(|other| other.speed).fold(0.0, f64::max))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    const RAMP: [f64; 2] = [2.0, 100.0];
+
+    fn cell(end: f64, speed: f64) -> Cell {
+        Cell { end, speed, steady: speed, ramp: RAMP }
+    }
+
+    /// The law looked at in small steps: time, motion.
+    fn looks(law: &SpeedLaw) -> Vec<(f64, Motion)> {
+        let count = 4000;
+        let at = |index: i32| law.duration() * f64::from(index) / f64::from(count);
+        (0..=count).map(|index| (at(index), law.at(at(index)))).collect()
+    }
+
+    /// That speed and place go on without a jump, forwards, within `cells`, from end to end.
+    fn check(law: &SpeedLaw, cells: &[Cell], top: f64, ends: [f64; 2], case: &str) {
+        let length = cells.last().map_or(0.0, |cell| cell.end);
+        let looks = looks(law);
+        for (_, now) in &looks {
+            // On the edge between two cells rounding decides which one it is.
+            let fits = |place: f64| {
+                let here = cells.iter().find(|cell| place <= cell.end);
+                let most = here.map_or(f64::INFINITY, |cell| cell.steady).min(top);
+                now.velocity <= most * (1.0 + 1e-9)
+            };
+            assert!(
+                now.velocity > 0.0 && (fits(now.position - 1e-9) || fits(now.position + 1e-9)),
+                "{case}: {} m/s at {} m",
+                now.velocity,
+                now.position
+            );
+            assert!(now.acceleration.abs() <= RAMP[0] * (1.0 + 1e-9), "{case}");
+            assert!(now.jerk.abs() <= RAMP[1] * (1.0 + 1e-9), "{case}");
+        }
+        for pair in looks.windows(2) {
+            let step = pair[1].0 - pair[0].0;
+            let moved = pair[1].1.position - pair[0].1.position;
+            let mean = (pair[1].1.velocity + pair[0].1.velocity) / 2.0;
+            let off = (moved - mean * step).abs();
+            // The trapezoid's error, J·h³/12, and more where the jerk steps inside.
+            assert!(off <= RAMP[1] * step * step * step + 1e-13, "{case}: place jumps by {off}");
+            let change = pair[1].1.velocity - pair[0].1.velocity;
+            assert!(change.abs() <= RAMP[0] * step + 1e-12, "{case}: speed jumps by {change}");
+        }
+        let last = law.at(law.duration());
+        assert!((last.position - length).abs() < 1e-9 * length.max(1e-3), "{case}: {last:?}");
+        assert!(law.first() <= ends[0] * (1.0 + 1e-12) && law.last() <= ends[1] * (1.0 + 1e-12));
+    }
+
+    #[test]
+    fn one_speed_everywhere_is_kept() {
+        let cells = [cell(0.01, 0.2), cell(0.03, 0.3)];
+        let law = SpeedLaw::below(&cells, 0.1, [0.1, 0.1]);
+        assert_eq!((law.first(), law.last()), (0.1, 0.1));
+        assert!((law.duration() - 0.3).abs() < 1e-12);
+        assert_eq!(law.slowest().0, 0.1);
+        check(&law, &cells, 0.1, [0.1; 2], "even");
+    }
+
+    #[test]
+    fn a_slow_place_is_passed_at_its_steady_speed_and_left_again() {
+        let slow = Cell { steady: 0.019, ..cell(0.055, 0.0101) };
+        let cells = [cell(0.05, 0.2), slow, cell(0.1, 0.2)];
+        let law = SpeedLaw::below(&cells, 0.1, [0.1; 2]);
+        check(&law, &cells, 0.1, [0.1; 2], "slow place");
+        let (speed, at) = law.slowest();
+        assert!((speed - 0.019).abs() < 1e-12 && (0.05..=0.055).contains(&at), "{speed} {at}");
+        assert_eq!((law.first(), law.last()), (0.1, 0.1));
+        // Slow only as long as it must be: 5 mm at 19 mm/s, and a ramp of 81 mm/s on either side.
+        let ramp = Ramp::to_speed(0.081, RAMP[0], RAMP[1]);
+        let ramps = 2.0 * ramp.duration();
+        let even = (0.095 - 2.0 * way(&ramp, 0.019)) / 0.1;
+        assert!((law.duration() - (0.005 / 0.019 + ramps + even)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_wide_slow_place_rises_as_one() {
+        // The middle could be as fast as its neighbours with ramps, and all three faster without.
+        let inner = Cell { steady: 0.03, ..cell(0.052, 0.012) };
+        let outer = |end: f64| Cell { steady: 0.04, ..cell(end, 0.02) };
+        let cells = [cell(0.05, 0.2), outer(0.051), inner, outer(0.053), cell(0.1, 0.2)];
+        let law = SpeedLaw::below(&cells, 0.1, [0.1; 2]);
+        check(&law, &cells, 0.1, [0.1; 2], "wide slow place");
+        assert!((law.slowest().0 - 0.03).abs() < 1e-12, "{:?}", law.slowest());
+    }
+
+    #[test]
+    fn a_rise_without_room_is_not_made() {
+        // A hundredth of a millimetre between two slow places is no room to speed up in.
+        let cells = [cell(0.01, 0.01), cell(0.010_01, 0.2), cell(0.02, 0.01)];
+        let law = SpeedLaw::below(&cells, 0.1, [0.1; 2]);
+        check(&law, &cells, 0.1, [0.1; 2], "no room");
+        assert!((law.first() - law.slowest().0).abs() < 1e-15);
+        assert!((law.duration() - 0.02 / law.first()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_ends_are_no_faster_than_the_ways_in_and_out() {
+        let cells: Vec<Cell> = (1..=50).map(|index| cell(f64::from(index) * 1e-3, 0.3)).collect();
+        let law = SpeedLaw::below(&cells, 0.1, [0.02, 0.03]);
+        check(&law, &cells, 0.1, [0.02, 0.03], "ends");
+        assert!((law.first() - 0.02).abs() < 1e-12 && (law.last() - 0.03).abs() < 1e-12);
+        let most = looks(&law).iter().map(|(_, now)| now.velocity).fold(0.0, f64::max);
+        assert!((most - 0.1).abs() < 1e-12, "{most}");
+    }
+
+    #[test]
+    fn random_laws_stay_below_their_cells_and_times_turn_back_into_places() {
+        let mut random = Random::new(5);
+        for trial in 0..200 {
+            let mut end = 0.0;
+            let cells: Vec<Cell> = (0..40)
+                .map(|_| {
+                    end += random.logarithmic(1e-5, 5e-3);
+                    let speed = random.logarithmic(2e-3, 0.3);
+                    Cell { steady: speed * random.logarithmic(1.0, 2.0), ..cell(end, speed) }
+                })
+                .collect();
+            let ends = [random.logarithmic(5e-3, 0.2), random.logarithmic(5e-3, 0.2)];
+            let top = 0.15;
+            let law = SpeedLaw::below(&cells, top, ends);
+            check(&law, &cells, top, ends, &format!("trial {trial}"));
+            for share in [0.0, 0.1, 0.37, 0.5, 0.93, 1.0] {
+                let place = law.at(law.duration() * share).position;
+                let back = law.time_at(place);
+                assert!((law.at(back).position - place).abs() < 1e-12, "trial {trial}");
+            }
+            let instants = law.instants(top);
+            assert!(instants.is_sorted() && instants[0] == 0.0, "trial {trial}");
         }
     }
-    None
 }

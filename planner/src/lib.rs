@@ -28,6 +28,7 @@ mod projected;
 mod random;
 mod reach;
 pub mod request;
+mod retry;
 mod route;
 pub mod run_in;
 mod sampler;
@@ -37,6 +38,7 @@ pub mod stroke;
 pub mod timing;
 mod track;
 pub mod trajectory;
+mod unwind;
 
 pub use job::{Job, Marking, MarkingSpeed};
 pub use plan::{Plan, PlanError, PlanFacts, plan, plan_ideal};

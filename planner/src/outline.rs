@@ -88,6 +88,56 @@ impl Outline {
         &self.tracks[self.tracks.len() - 1]
     }
 
+    /// The point of the drawn line at `distance` from the start [m].
+    pub(crate) fn at(&self, distance: f64) -> Jet {
+        let mut from = 0.0;
+        for track in &self.tracks {
+            if distance < from + track.length() {
+                return track.at(distance - from);
+            }
+            from += track.length();
+        }
+        self.end()
+    }
+
+    /// The same line in parts that begin at the start and at each of `cuts`, growing distances from
+    /// it [m], and go on into each other.
+    pub(crate) fn divided(&self, cuts: &[f64], limits: &PathLimits) -> Vec<Self> {
+        let mut parts: Vec<Self> = Vec::with_capacity(cuts.len() + 1);
+        let mut cuts = cuts.iter().copied().filter(|cut| (GAP..self.length - GAP).contains(cut));
+        let mut next = cuts.next();
+        let mut begins = true;
+        let mut from = 0.0;
+        for (track, power) in self.tracks.iter().zip(&self.powers) {
+            let end = from + track.length();
+            let mut here = from;
+            loop {
+                let cut = next.filter(|cut| *cut < end - GAP);
+                let to = cut.unwrap_or(end);
+                // A cut at a join leaves nothing of the curve before it.
+                if to - here > GAP {
+                    let part = track.part(here - from, to - from);
+                    match parts.last_mut().filter(|_| !begins) {
+                        // What went on into each other in the whole does so in a part.
+                        Some(last) => {
+                            last.extend(part, *power, -1.0, limits.tolerance);
+                        }
+                        None => parts.push(Self::new(part, self.speed, *power, self.line)),
+                    }
+                    begins = false;
+                }
+                here = to;
+                if cut.is_none() {
+                    break;
+                }
+                begins = true;
+                next = cuts.next();
+            }
+            from = end;
+        }
+        parts
+    }
+
     /// The curves in order.
     pub(crate) fn tracks(&self) -> &[Track] {
         &self.tracks

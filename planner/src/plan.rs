@@ -242,7 +242,10 @@ fn plan_within(
         facts: PlanFacts {
             name: drawing.name.clone(),
             strokes: 0,
-            length: speed::outlines(&stops).map(crate::outline::Outline::length).sum(),
+            // From 0, since the sum of nothing is -0.
+            length: speed::outlines(&stops)
+                .map(crate::outline::Outline::length)
+                .fold(0.0, |a, b| a + b),
             duration: 0.0,
             samples: 0,
             speed: chosen.speeds.iter().copied().fold(0.0, f64::max),
@@ -261,6 +264,7 @@ fn plan_within(
         let checker = Checker::new(machine, limits, ideal);
         machine.mechanism.visit(CheckAll { trajectory, axes: &machine.axes, checker, abandoned })
     };
+    let mut gone = None;
     let (samples, uses) = if ideal || machine.mechanism.visit(IsLinear) {
         let mut trajectory =
             Trajectory::new(drawing.start, &stops, &limits, &machine.laser, &chosen.speeds)
@@ -284,13 +288,14 @@ fn plan_within(
         plan.trajectory = routed.trajectory;
         plan.facts.notes.extend(routed.notes);
         plan.facts.speed = routed.speed;
+        gone = routed.stops;
         checked
     };
     plan.facts.duration = plan.trajectory.duration();
     plan.facts.samples = samples;
     plan.facts.uses = uses;
     // Last, so that a drawing far beyond the area is refused before it is drawn point by point.
-    plan.artwork = artwork(&stops);
+    plan.artwork = artwork(gone.as_deref().unwrap_or(&stops));
     plan.facts.strokes = plan.artwork.strokes.len();
     Ok(plan)
 }

@@ -67,7 +67,7 @@ pub(crate) fn branches<const N: usize, M: Mechanism<N>>(
 }
 
 /// Which joints bring the tool to the same place after a whole turn.
-fn periodic<const N: usize, M: Mechanism<N>>(
+pub(crate) fn periodic<const N: usize, M: Mechanism<N>>(
     demands: &Demands<'_, N, M>,
     posture: &Posture<N>,
 ) -> [bool; N] {
@@ -91,18 +91,20 @@ fn periodic<const N: usize, M: Mechanism<N>>(
     })
 }
 
-/// Margins that only the inverse kinematics needs: the joints may pass there, and a path has the
-/// rates that it needs, which the limits of the axes judge.
-fn is_serial(name: &str) -> bool {
-    const HARD: [&str; 7] = ["type_2", "collision", "clear", "gap", "baseline", "near_a", "stator"];
-    !HARD.iter().any(|hard| name.contains(hard))
-}
-
 /// The joints at rest somewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Posture<const N: usize> {
     pub(crate) joints: Joints<N>,
     pub(crate) branch: usize,
+}
+
+impl<const N: usize> Posture<N> {
+    /// Whether `other` is this posture at a place near by: the same branch and the same turns.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        /// Postures differ by a branch or a turn, which is more than this [rad].
+        const SAME: f64 = 1.0;
+        self.branch == other.branch && (self.joints - other.joints).amax() <= SAME
+    }
 }
 
 /// The joints' motion for `tool`, continuous with `previous`. Where the branch would make them jump,
@@ -155,8 +157,9 @@ impl From<KinematicsError> for Refused {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Walked<const N: usize> {
     pub(crate) end: Posture<N>,
-    lower: Joints<N>,
-    upper: Joints<N>,
+    /// The least and the largest value of each joint [m or rad].
+    pub(crate) lower: Joints<N>,
+    pub(crate) upper: Joints<N>,
 }
 
 impl<const N: usize> Walked<N> {
@@ -224,7 +227,7 @@ pub(crate) fn keeps_margins<const N: usize, M: Mechanism<N>>(
     match mechanism
         .margins(assembly)
         .into_iter()
-        .find(|margin| margin.value < margin.limit && !is_serial(margin.name))
+        .find(|margin| margin.value < margin.limit && !margin.kind.may_be_passed())
     {
         None => Ok(()),
         Some(margin) => Err(KinematicsError {

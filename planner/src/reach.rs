@@ -18,6 +18,10 @@ const ACCELERATION: [f64; 2] = [0.5, 0.4];
 /// own jerk may use.
 const JERK: [f64; 3] = [0.4, 0.3, 0.3];
 
+/// Share of the largest steady speed that a plateau without ramps may use; the rest is for what lies
+/// between two looks. Of an acceleration limit that is nine tenths.
+const STEADY: f64 = 0.95;
+
 /// Share of a motor's torque, and of its voltage across the inductance, for a ramp.
 const MOTOR: [f64; 2] = [0.3, 0.15];
 
@@ -103,7 +107,8 @@ impl<const N: usize, M: Mechanism<N>> Walk<'_, N, M> {
             let ramp =
                 core::array::from_fn(|order| one.cell.ramp[order].min(other.cell.ramp[order]));
             let speed = one.cell.speed.min(other.cell.speed);
-            self.cells.push(Cell { end: other.at, speed, ramp });
+            let alone = one.cell.steady.min(other.cell.steady);
+            self.cells.push(Cell { end: other.at, speed, steady: alone, ramp });
             *steady = steady.min(other.steady);
         }
         Ok(far)
@@ -130,9 +135,10 @@ impl<const N: usize, M: Mechanism<N>> Walk<'_, N, M> {
                 detail: "the axes allow no speed worth marking here",
             });
         }
+        let alone = (steady * STEADY).max(speed);
         let mass = demands.mechanism.mass_matrix(&assembly);
         let ramp = self.ramp(&motion, &jet, speed, &mass.diagonal());
-        Ok(Look { at, posture, steady, cell: Cell { end: at, speed, ramp } })
+        Ok(Look { at, posture, steady, cell: Cell { end: at, speed, steady: alone, ramp } })
     }
 
     /// The largest steady speed within shares of the limits of the axes, from the joints' derivatives

@@ -22,6 +22,7 @@ use crate::outline::Outline;
 use crate::posture::{Part, Posture, Refused, candidates, keeps_margins, walk};
 use crate::reach::reach;
 use crate::run_in::{RunIn, RunOut};
+use crate::stroke::StrokePath;
 use crate::timing::{Leg, OUTPUT_REST, PAUSE_REST, Straight, Way};
 
 /// Postures tried for one stroke, the nearest first.
@@ -34,6 +35,8 @@ const ROUNDING: f64 = 1e-9;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NoWay {
     pub(crate) line: u64,
+    /// The stop that it leads to, from 0.
+    pub(crate) stop: usize,
     /// The stroke that it leads to, from 1; 0 for none.
     pub(crate) stroke: u64,
     /// Time since the first motion [s].
@@ -55,6 +58,8 @@ pub(crate) struct Slowed {
 pub(crate) struct Route<'a> {
     pub(crate) first: JointMove,
     pub(crate) legs: Vec<Leg<'a>>,
+    /// The number of the stop that each leg belongs to.
+    pub(crate) owners: Vec<usize>,
     pub(crate) slowed: Vec<Slowed>,
     /// The largest speed of a stroke [m/s].
     pub(crate) speed: f64,
@@ -63,12 +68,11 @@ pub(crate) struct Route<'a> {
 /// How fast a job is gone.
 #[derive(Debug, Clone)]
 pub(crate) struct Speeds {
-    /// Of each stroke as asked for and allowed by its path [m/s].
-    pub(crate) strokes: Vec<f64>,
-    /// Of each stroke, the share of what the axes seem to allow [1].
-    pub(crate) shares: Vec<f64>,
-    /// The share of its speed at which a joint move is made [1].
-    pub(crate) moves: f64,
+    /// Of each stroke, what is asked for and allowed by its path [m/s], and the share that is used of
+    /// what the axes seem to allow [1].
+    pub(crate) strokes: Vec<(f64, f64)>,
+    /// Of each stop, the share of its speed at which a move is made in the dark [1].
+    pub(crate) moves: Vec<f64>,
 }
 
 /// Goes through `stops` from `start`.
@@ -87,14 +91,22 @@ pub(crate) fn route<'a, const N: usize, M: Mechanism<N>>(
         now: start,
         time: 0.0,
         line: 0,
+        index: 0,
         stroke: 0,
         towards: 0,
-        route: Route { first, legs: Vec::new(), slowed: Vec::new(), speed: 0.0 },
+        route: Route {
+            first,
+            legs: Vec::new(),
+            owners: Vec::new(),
+            slowed: Vec::new(),
+            speed: 0.0,
+        },
     };
-    for stop in stops {
-        router.line = stop.line;
+    for (index, stop) in stops.iter().enumerate() {
+        (router.line, router.index) = (stop.line, index);
         router.stop(stop).map_err(|cause| NoWay {
             line: stop.line,
+            stop: index,
             stroke: router.towards,
             time: router.time,
             cause,
@@ -110,13 +122,33 @@ struct Router<'a, 'd, const N: usize, M: Mechanism<N>> {
     now: Posture<N>,
     time: f64,
     line: u64,
+    /// The stop that is under way, from 0.
+    index: usize,
     /// Strokes without dots so far, and strokes and dots begun so far.
     stroke: usize,
     towards: u64,
     route: Route<'a>,
 }
 
+/// The way to where something begins.
+struct Approach<'a, const N: usize> {
+    /// What to do, and how long it takes [s]; `None` where the joints stand there already.
+    way: Option<(f64, Way<'a>)>,
+    /// The posture in which it begins, and the one in which it ends.
+    start: Posture<N>,
+    end: Posture<N>,
+}
+
+/// A stroke timed for the posture in which it is entered.
+struct Timed {
+    run_in: RunIn,
+    run_out: RunOut,
+    /// How its speed changes; `None` where it is constant.
+    law: Option<SpeedLaw>,
+}
+
 /// The way into a stroke or out of it, within shares of the path's limits that the axes can follow.
+#[derive(Clone, Copy)]
 struct Lead {
     speed: f64,
     slower: f64,
@@ -130,7 +162,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         };
         match &stop.item {
             Item::Stroke(outline) => self.mark(outline)?,
-            Item::Rapid(to) => self.go_to(&still(*to), &[])?,
+            Item::Rapid(to) => self.go_to(&still(*to), &[]).map(|_| ())?,
             Item::Feed(feed) => self.feed(feed)?,
             Item::Dot(dot) => self.dot(dot)?,
             Item::Rest(time) if *time <= 0.0 => {}
@@ -144,9 +176,15 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         Ok(())
     }
 
+    /// The share of its speed at which a move of this stop is made in the dark [1].
+    fn share(&self) -> f64 {
+        self.speeds.moves[self.index]
+    }
+
     fn push(&mut self, duration: f64, way: Way<'a>) {
         self.time += duration;
         self.route.legs.push(Leg::new(self.line, duration, way));
+        self.route.owners.push(self.index);
     }
 
     /// Stands where the joints are.
@@ -159,6 +197,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         let way = way(self.tool()?.position);
         self.time += duration;
         self.route.legs.push(Leg { line: self.line, duration, way, standing });
+        self.route.owners.push(self.index);
         Ok(())
     }
 
@@ -178,47 +217,50 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         let first = feed.at(0.0);
         let start = {
             let part = |share: f64| along(&feed.track, share);
-            self.approach(&first, &[&part], None)?
+            self.go_to(&first, &[&part])?
         };
         let duration = feed.duration();
         let pace = self.pace(start, duration, &|time| feed.at(time))?;
-        feed.pace *= if pace > 1.0 { pace * 1.01 } else { 1.0 };
+        feed.pace *= if pace > 1.0 { pace * 1.01 } else { 1.0 } / self.share();
         self.push(feed.duration(), Way::Feed(Cow::Owned(feed)));
         Ok(())
     }
 
-    /// Goes to where `first` is and on along `parts`, which the caller then adds.
-    fn go_to(&mut self, first: &ToolMotion, parts: &[&Part<'_>]) -> Result<(), Refused> {
-        self.approach(first, parts, None).map(|_| ())
+    /// Goes to where `first` is and on along `parts`, which the caller then adds. Gives the posture at
+    /// `first`.
+    fn go_to(&mut self, first: &ToolMotion, parts: &[&Part<'_>]) -> Result<Posture<N>, Refused> {
+        let approach = self.choose(first, parts, None)?;
+        let start = approach.start;
+        self.take(approach);
+        Ok(start)
     }
 
-    /// Goes to a posture from which `parts` can be gone, if it can be to one like `wanted`, and counts
-    /// `parts` as gone. Gives the posture.
-    fn approach(
-        &mut self,
+    /// Goes as was chosen, and counts what comes after as gone.
+    fn take(&mut self, approach: Approach<'a, N>) {
+        if let Some((duration, way)) = approach.way {
+            self.push(duration, way);
+        }
+        self.now = approach.end;
+    }
+
+    /// The way to a posture from which `parts` can be gone, one like `wanted` if it can be.
+    fn choose(
+        &self,
         first: &ToolMotion,
         parts: &[&Part<'_>],
         wanted: Option<&Posture<N>>,
-    ) -> Result<Posture<N>, Refused> {
+    ) -> Result<Approach<'a, N>, Refused> {
         let mut found = candidates(self.demands, &self.now, first, parts)?;
         if let Some(wanted) = wanted {
-            /// A posture differs from another by a branch or a turn, which is more than this [rad].
-            const SAME: f64 = 1.0;
-            let like = |start: &Posture<N>| {
-                start.branch == wanted.branch && (start.joints - wanted.joints).amax() <= SAME
-            };
             // Stable, so that the nearer ones stay before.
-            found.sort_by_key(|(start, _)| !like(start));
+            found.sort_by_key(|(start, _)| !start.is_like(wanted));
         }
         let mut refused = None;
         for (start, end) in found.into_iter().take(TRIED) {
             match self.joint_move(&start) {
                 Ok(step) => {
-                    if let Some(step) = step {
-                        self.push(step.duration(), Way::Joints(step));
-                    }
-                    self.now = end;
-                    return Ok(start);
+                    let way = step.map(|step| (step.duration(), Way::Joints(step)));
+                    return Ok(Approach { way, start, end });
                 }
                 Err(cause) => {
                     refused.get_or_insert(cause);
@@ -247,7 +289,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         let Some(mut step) = JointMove::new(demands, &self.now.joints, &to.joints, branch)? else {
             return Ok(None);
         };
-        step.slow(self.speeds.moves);
+        step.slow(self.share());
         self.check(&step)?;
         Ok(Some(step))
     }
@@ -279,8 +321,12 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         Ok(())
     }
 
-    /// Goes straight with the tool, and counts `parts` as gone.
-    fn straight(&mut self, first: &ToolMotion, parts: &[&Part<'_>]) -> Result<Posture<N>, Refused> {
+    /// The way straight with the tool to where `parts` begin.
+    fn straight(
+        &self,
+        first: &ToolMotion,
+        parts: &[&Part<'_>],
+    ) -> Result<Approach<'a, N>, Refused> {
         const SLOWER: f64 = 1.3;
         const TRIALS: u32 = 20;
         let from = self.tool()?.position;
@@ -290,8 +336,9 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         let start = walk(self.demands, self.now, &[&line])?.end;
         let whole = walk(self.demands, start, parts)?;
         whole.within(self.demands)?;
-        let mut limits = self.demands.path;
+        let mut limits = slower(&self.demands.path, 1.0 / self.share());
         let mut trials = 0;
+        let mut way = None;
         while let Some(straight) = Straight::new(from, to, &limits) {
             trials += 1;
             if trials > TRIALS {
@@ -303,13 +350,12 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
             }
             let duration = straight.profile.duration();
             if self.pace(self.now, duration, &|time| straight.at(time))? <= 1.0 {
-                self.push(duration, Way::Straight(straight));
+                way = Some((duration, Way::Straight(straight)));
                 break;
             }
             limits = slower(&limits, SLOWER);
         }
-        self.now = whole.end;
-        Ok(start)
+        Ok(Approach { way, start, end: whole.end })
     }
 
     /// How many times slower a motion of the tool must be for the axes.
@@ -337,8 +383,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
 
     /// Marks a stroke with the ways into it and out of it.
     fn mark(&mut self, outline: &'a Outline) -> Result<(), Refused> {
-        let top = self.speeds.strokes[self.stroke];
-        let share = self.speeds.shares[self.stroke];
+        let (top, share) = self.speeds.strokes[self.stroke];
         self.stroke += 1;
         let path = outline.trace(top, &self.demands.path);
         let length = path.length();
@@ -347,14 +392,47 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
 
         // A posture for the whole; with shorter ways in and out where long ones leave the reach.
         let mut leads = [top, top].map(|speed| Lead { speed, slower: 1.0 });
-        let wanted = self.posture_for(&ends, &middle, &mut leads)?;
+        let mut wanted = self.posture_for(&ends, &middle, &mut leads)?;
+        for _ in 0..=TRIED {
+            let timed = self.time(&ends, (&path, &middle), &wanted, leads, [top, share])?;
+            let Timed { run_in, run_out, .. } = &timed;
+            let into = |share: f64| run_in.at(run_in.duration() * share);
+            let out = |share: f64| run_out.at(run_out.duration() * share);
+            let approach = self.choose(&run_in.at(0.0), &[&into, &middle, &out], Some(&wanted))?;
+            if approach.start.is_like(&wanted) {
+                self.take(approach);
+                self.add_stroke(outline, &path, timed, top);
+                return Ok(());
+            }
+            // What was timed cannot be reached: what can be has times of its own.
+            wanted = approach.start;
+        }
+        Err(Refused::Kinematics(KinematicsError {
+            code: "posture",
+            axis: None,
+            value: TRIED as f64,
+            limit: TRIED as f64,
+            detail: "no posture in which the axes can follow this stroke can be reached from the one \
+                     before; move the stroke, or mark it in parts",
+        }))
+    }
 
+    /// Times a stroke of at most `top` [m/s], at a share of what the axes seem to allow, that is
+    /// entered in a posture like `wanted`.
+    fn time(
+        &self,
+        ends: &[Jet; 2],
+        (path, middle): (&StrokePath, &Part<'_>),
+        wanted: &Posture<N>,
+        mut leads: [Lead; 2],
+        [top, share]: [f64; 2],
+    ) -> Result<Timed, Refused> {
         let limits = self.demands.path;
         for _ in 0..12 {
-            let (run_in, run_out) = ways(&ends, &leads, &limits);
+            let (run_in, run_out) = ways(ends, &leads, &limits);
             let into = |share: f64| run_in.at(run_in.duration() * share);
-            let entered = walk(self.demands, wanted_start(self, &run_in, &wanted)?, &[&into])?.end;
-            let reach = reach(self.demands, &path, &entered, top)?;
+            let entered = walk(self.demands, wanted_start(self, &run_in, wanted)?, &[&into])?.end;
+            let reach = reach(self.demands, path, &entered, top)?;
             let law = if share >= 1.0 && reach.steady >= top && leads.iter().all(|l| l.speed >= top)
             {
                 None
@@ -362,6 +440,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
                 let mut cells = reach.cells;
                 for cell in &mut cells {
                     cell.speed *= share;
+                    cell.steady *= share;
                     cell.ramp = cell.ramp.map(|limit| limit * share);
                 }
                 let most = cells.iter().map(|cell| cell.speed).fold(0.0, f64::max).min(top);
@@ -371,9 +450,9 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
             leads[0].speed = first;
             leads[1].speed = last;
             let (run_in, run_out) =
-                if law.is_some() { ways(&ends, &leads, &limits) } else { (run_in, run_out) };
-            let start = wanted_start(self, &run_in, &wanted)?;
-            let left = walk(self.demands, entered, &[&middle])?.end;
+                if law.is_some() { ways(ends, &leads, &limits) } else { (run_in, run_out) };
+            let start = wanted_start(self, &run_in, wanted)?;
+            let left = walk(self.demands, entered, &[middle])?.end;
             let paces = [
                 self.pace(start, run_in.duration(), &|time| run_in.at(time))?,
                 self.pace(left, run_out.duration(), &|time| run_out.at(time))?,
@@ -392,7 +471,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
                 }
             }
             if fits {
-                return self.add_stroke(outline, &path, law, top, (run_in, run_out), &wanted);
+                return Ok(Timed { run_in, run_out, law });
             }
         }
         Err(Refused::Kinematics(KinematicsError {
@@ -435,20 +514,8 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         Err(refused.unwrap_or(Refused::Position { axis: 0, value: f64::NAN, limit: 0.0 }))
     }
 
-    fn add_stroke(
-        &mut self,
-        outline: &'a Outline,
-        path: &crate::stroke::StrokePath,
-        law: Option<SpeedLaw>,
-        top: f64,
-        (run_in, run_out): (RunIn, RunOut),
-        wanted: &Posture<N>,
-    ) -> Result<(), Refused> {
-        let length = path.length();
-        let into = |share: f64| run_in.at(run_in.duration() * share);
-        let middle = |share: f64| path.at(length * share).motion(1.0, 0.0, 0.0);
-        let out = |share: f64| run_out.at(run_out.duration() * share);
-        self.approach(&run_in.at(0.0), &[&into, &middle, &out], Some(wanted))?;
+    fn add_stroke(&mut self, outline: &'a Outline, path: &StrokePath, timed: Timed, top: f64) {
+        let Timed { run_in, run_out, law } = timed;
         let duration = law.as_ref().map_or(outline.length() / top, SpeedLaw::duration);
         if let Some(law) = &law {
             let (speed, at) = law.slowest();
@@ -462,7 +529,6 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         self.push(run_in.duration(), Way::RunIn(run_in));
         self.push(duration, Way::Stroke { outline, speed: top, law: law.map(Arc::new) });
         self.push(run_out.duration(), Way::RunOut(run_out));
-        Ok(())
     }
 }
 

@@ -31,6 +31,8 @@ pub(crate) enum Track {
     Ellipse(Arc<ByArcLength<Ellipse>>),
     /// A flat curve on a surface.
     Projected(Arc<ByArcLength<Projected>>),
+    /// A stretch of another curve from this distance on.
+    Part { of: Box<Self>, from: f64, length: f64 },
 }
 
 /// An arc of a [`Curve`] by the angle from its start, which is positive whatever its sense.
@@ -146,7 +148,9 @@ impl Track {
     /// [m].
     pub(crate) fn length(&self) -> f64 {
         match self {
-            Self::Line { length, .. } | Self::Circle { length, .. } => *length,
+            Self::Line { length, .. } | Self::Circle { length, .. } | Self::Part { length, .. } => {
+                *length
+            }
             Self::Ellipse(table) => table.length(),
             Self::Projected(table) => table.length(),
         }
@@ -173,6 +177,24 @@ impl Track {
             }
             Self::Ellipse(table) => table.at(distance),
             Self::Projected(table) => table.at(distance),
+            Self::Part { of, from, .. } => of.at(from + distance),
+        }
+    }
+
+    /// The stretch between two distances from the start [m].
+    pub(crate) fn part(&self, from: f64, to: f64) -> Self {
+        let length = to - from;
+        if from <= 0.0 && to >= self.length() {
+            return self.clone();
+        }
+        match self {
+            Self::Line { direction, .. } => {
+                Self::Line { from: self.at(from).point, direction: *direction, length }
+            }
+            Self::Part { of, from: before, .. } => {
+                Self::Part { of: of.clone(), from: before + from, length }
+            }
+            _ => Self::Part { of: Box::new(self.clone()), from, length },
         }
     }
 
@@ -189,6 +211,7 @@ impl Track {
                 curvature: table.curve().largest(|jet| jet.second.norm()),
                 third: table.curve().largest(|jet| jet.third.norm()),
             },
+            Self::Part { of, .. } => of.bend(),
         }
     }
 

@@ -5,9 +5,10 @@
 use machine::mechanisms::mcm::{Mcm, McmBranch, McmLoad};
 use machine::surface::{Cone, Placement, Projection, Shape, Surface};
 use machine::{Axis, Machine, Mechanism, MechanismKind};
-use nalgebra::{SVector, Vector3};
-use planner::attitude::turned;
-use planner::{Job, PlanError, plan};
+use nalgebra::{Matrix3, SVector, Vector3};
+use planner::attitude::{AttitudeLaw, turned};
+use planner::drawing::{Action, Curve, Drawing, Power, Step};
+use planner::{Job, Marking, PlanError, plan};
 
 const RADIUS: f64 = 0.03;
 
@@ -29,7 +30,7 @@ fn mechanism() -> Mcm {
         height: 0.3,
         reach: [0.0, 0.4],
         singular_distance: 1e-3,
-        branch: McmBranch { side: Some(1) },
+        branch: McmBranch { side: Some(1), lean: None },
         load: McmLoad {
             carriage_mass: 9.0,
             slide_mass: 5.5,
@@ -130,4 +131,61 @@ fn a_drawing_beyond_the_edge_is_refused() {
         panic!("8 mm do not fit on 6 mm")
     };
     assert_eq!(cause.code, "off_surface");
+}
+
+/// A lean that follows the place, and is none in the middle of the line.
+fn line_through_upright(machine: &Machine) -> Job {
+    let center = Vector3::from(machine.home) + Vector3::new(0.02, 0.03, 0.0);
+    // About the way that the head is turned there.
+    let half = Vector3::new(-0.006, 0.019, 0.0);
+    let curve = Curve::Line { from: center - half, to: center + half };
+    let power = Power { level: 1.0, follows_speed: false };
+    let action = Action::Mark { curve, speed: Some(0.02), power };
+    Job {
+        drawing: Drawing {
+            name: "upright".to_owned(),
+            start: Vector3::from(machine.home),
+            steps: vec![Step { action, line: 4 }],
+            notes: Vec::new(),
+        },
+        marking: Marking::default(),
+        rapid: None,
+        program: None,
+        ideal_only: None,
+        standing: None,
+        surface: None,
+        attitude: AttitudeLaw::Following { center, gradient: 10.0, base: Matrix3::identity() },
+    }
+}
+
+#[test]
+fn a_path_through_the_upright_tool_goes_on_with_the_tilt_of_the_other_sign() {
+    let machine = machine();
+    let planned = plan(&machine, &line_through_upright(&machine)).unwrap_or_else(|e| panic!("{e}"));
+    let lit: Vec<_> = planned.setpoints(1).filter(|sample| sample.laser.is_lit()).collect();
+    assert_eq!(planned.facts.strokes, 1);
+    for pair in lit.windows(2) {
+        assert_eq!(pair[1].sequence, pair[0].sequence + 1, "lit without a break");
+        for index in 0..5 {
+            let moved = (pair[1].position[index] - pair[0].position[index]) / 1e-3;
+            let mean = (pair[0].velocity[index] + pair[1].velocity[index]) / 2.0;
+            assert!((moved - mean).abs() < 1e-4, "axis {index}: {moved} {mean}");
+        }
+    }
+    let tilts = [lit[0].position[3], lit[lit.len() - 1].position[3]];
+    assert!(tilts[0] * tilts[1] < 0.0, "{tilts:?}");
+    assert!(tilts.iter().all(|tilt| (tilt.abs() - 0.199).abs() < 2e-3), "{tilts:?}");
+}
+
+#[test]
+fn a_path_through_the_upright_tool_is_refused_where_the_tilt_goes_one_way_only() {
+    let mut machine = machine();
+    machine.axes[3].limits.position[0] = 0.0;
+    let Err(PlanError::Limit { line, breach, .. }) =
+        plan(&machine, &line_through_upright(&machine))
+    else {
+        panic!("the tilt has no other side")
+    };
+    assert_eq!((line, breach.quantity, breach.limit), (4, "joint position", 0.0));
+    assert_eq!(breach.axis, Some(machine.axes[3].name.clone()));
 }

@@ -215,7 +215,7 @@ fn limits(
                         "axis `{}` is at {} {name} at home, outside its limits {} {name} to {} {name}",
                         joint.name, joint.home, lower.value, upper.value
                     ),
-                    "widen the limits, or move `home`",
+                    "widen the limits, or change `home` or `home_axes`",
                 );
             }
             [lower.value, upper.value]

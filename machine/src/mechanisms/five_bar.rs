@@ -15,8 +15,8 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
-    ToolMotion, in_plane,
+    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism,
+    Pose, ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
 use crate::transmission::Elasticity;
@@ -358,8 +358,18 @@ impl Mechanism<2> for FiveBar {
         let [d1, d2] = assembly.distal;
         let type_2 = cross(d1, d2).abs() / (self.distal * self.distal);
         vec![
-            Margin { name: "type_1", value: sine(0).min(sine(1)), limit: self.type_1_limit },
-            Margin { name: "type_2", value: type_2, limit: self.type_2_limit },
+            Margin {
+                name: "type_1",
+                kind: MarginKind::Serial,
+                value: sine(0).min(sine(1)),
+                limit: self.type_1_limit,
+            },
+            Margin {
+                name: "type_2",
+                kind: MarginKind::Parallel,
+                value: type_2,
+                limit: self.type_2_limit,
+            },
         ]
     }
 

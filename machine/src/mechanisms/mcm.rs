@@ -12,14 +12,17 @@
 
 mod dynamics;
 
+use core::f64::consts::{FRAC_PI_2, PI};
+
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use signals::math;
 
+use super::polar::center;
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
-    ToolMotion, finite,
+    Attitude, Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind,
+    Mechanism, Pose, ToolMotion, finite,
 };
-use crate::taylor::Scalar;
+use crate::taylor::{Scalar, Taylor};
 use crate::transmission::Elasticity;
 
 pub use dynamics::McmLoad;
@@ -30,6 +33,13 @@ const UPRIGHT: f64 = 1e-9;
 /// How fast an upright tool may seem to tilt and still be taken as staying upright [rad/s and its
 /// derivatives]: rounding of a path's attitude.
 const UPRIGHT_RATE: f64 = 1e-9;
+
+/// Up to this sine of the tilt a beam may be taken as passing the vertical: farther away the direction
+/// that it leans to is known well enough without.
+const PASSING: f64 = 1e-4;
+
+/// How far the head may be turned from the direction in which its beam passes the vertical [rad].
+const ALIGNED: f64 = 0.3;
 
 /// X and Z carry the head over the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,18 +69,25 @@ pub struct McmBranch {
     /// Sign of X, or of v where tilt and turn are given: 1 or −1. `None` keeps the side of the
     /// previous joints.
     pub side: Option<i32>,
+    /// Sign of the tilt a: 1 or −1. `None` is 1, except right where a path passes through a = 0.
+    pub lean: Option<i32>,
 }
 
 impl Branch for McmBranch {
     fn choices(&self) -> Vec<(&'static str, Vec<i32>)> {
-        self.side.map(|side| ("side", vec![side])).into_iter().collect()
+        [("side", self.side), ("lean", self.lean)]
+            .into_iter()
+            .filter_map(|(name, sign)| Some((name, vec![sign?])))
+            .collect()
     }
 
     /// No values leave the choice to the previous joints.
     fn choose(self, name: &str, values: &[i32]) -> Option<Self> {
         match (name, values) {
-            ("side" | "sign", []) => Some(Self { side: None }),
-            ("side" | "sign", &[side @ (1 | -1)]) => Some(Self { side: Some(side) }),
+            ("side" | "sign", []) => Some(Self { side: None, ..self }),
+            ("side" | "sign", &[side @ (1 | -1)]) => Some(Self { side: Some(side), ..self }),
+            ("lean", []) => Some(Self { lean: None, ..self }),
+            ("lean", &[lean @ (1 | -1)]) => Some(Self { lean: Some(lean), ..self }),
             _ => None,
         }
     }
@@ -149,12 +166,13 @@ impl Mcm {
     }
 
     /// Joints that bring the focus to `position` with the beam along the unit vector `axis`, both
-    /// in the workpiece's frame. `upright` says that the tool is, and stays so.
+    /// in the workpiece's frame. `upright` says that the tool is, and stays so; `passing` gives signed
+    /// lean and turn of a beam that passes the vertical, by its x and y in the machine's frame.
     fn solve<S: Scalar>(
         &self,
-        position: [S; 3],
-        axis: [S; 3],
+        [position, axis]: [[S; 3]; 2],
         upright: bool,
+        passing: impl Fn([S; 2]) -> Option<[S; 2]>,
         branch: McmBranch,
         previous: &Joints<5>,
     ) -> Result<[S; 5], KinematicsError> {
@@ -175,11 +193,43 @@ impl Mcm {
             let (sine, cosine) = table.sin_cos();
             let x = axis[0] * cosine + axis[1] * sine;
             let y = axis[1] * cosine - axis[0] * sine;
-            let lean = (axis[0] * axis[0] + axis[1] * axis[1]).sqrt();
-            (lean.atan2(-axis[2]), near(x.atan2(y), previous[4]))
+            let (lean, turn) = match passing([x, y]) {
+                Some([lean, turn]) => (lean, turn),
+                None => ((axis[0] * axis[0] + axis[1] * axis[1]).sqrt(), x.atan2(y)),
+            };
+            // Leaning the other way is the same with the head turned by half a turn.
+            let across = math::nearest_turn(turn.value(), previous[4]) - previous[4];
+            let keeps = match branch.lean {
+                Some(sign) if lean.value() != 0.0 => (lean.value() < 0.0) == (sign < 0),
+                // On the way through a = 0 the turn goes on, and the tilt changes its sign.
+                _ if lean.value() <= PASSING => across.abs() <= FRAC_PI_2,
+                _ => true,
+            };
+            let (lean, turn) = if keeps { (lean, turn) } else { (-lean, turn + PI) };
+            (lean.atan2(-axis[2]), near(turn, previous[4]))
         };
         Ok([carriage, slide, table, tilt, turn])
     }
+}
+
+/// Signed lean, as a sine, and turn [rad] of a beam with x and y in the machine's frame that passes
+/// the vertical as the head is turned, at `turned` [rad]; `None` where it does not.
+fn passing([x, y]: [Taylor; 2], turned: f64) -> Option<[Taylor; 2]> {
+    if math::hypot(x.value, y.value) > PASSING {
+        return None;
+    }
+    // As a path passes the centre of a table: the turn is counted from y to x.
+    let flat = |of: fn(&Taylor) -> f64| Vector3::new(of(&y), of(&x), 0.0);
+    let [lean, turn] = center::through(&ToolMotion {
+        position: flat(|series| series.value),
+        velocity: flat(|series| series.first),
+        acceleration: flat(|series| series.second),
+        jerk: flat(|series| series.third),
+        attitude: Attitude::LEVEL,
+    })?;
+    let off = turn.value - turned;
+    let across = off - (off / PI).round() * PI;
+    (across.abs() <= ALIGNED).then_some([lean, turn])
 }
 
 /// Distance from the table's axis [m]; in the axis without derivatives, which there do not exist.
@@ -203,7 +253,8 @@ impl Mechanism<5> for Mcm {
     }
 
     fn branch_of(&self, q: &Joints<5>) -> McmBranch {
-        McmBranch { side: Some(if q[0] < 0.0 { -1 } else { 1 }) }
+        let sign = |value: f64| Some(if value < 0.0 { -1 } else { 1 });
+        McmBranch { side: sign(q[0]), lean: sign(q[3]) }
     }
 
     fn assemble(
@@ -267,8 +318,18 @@ impl Mechanism<5> for Mcm {
     /// the effect of r; upright, r is held.
     fn margins(&self, q: &Joints<5>) -> Vec<Margin> {
         vec![
-            Margin { name: "distance", value: q[0].abs(), limit: self.singular_distance },
-            Margin { name: "lean", value: math::sin(q[3]).abs(), limit: 0.0 },
+            Margin {
+                name: "distance",
+                kind: MarginKind::Serial,
+                value: q[0].abs(),
+                limit: self.singular_distance,
+            },
+            Margin {
+                name: "lean",
+                kind: MarginKind::Serial,
+                value: math::sin(q[3]).abs(),
+                limit: 0.0,
+            },
         ]
     }
 
@@ -284,15 +345,17 @@ impl Mechanism<5> for Mcm {
     ) -> Result<Joints<5>, KinematicsError> {
         let axis: [f64; 3] = (-pose.rotation.column(2)).into();
         let upright = math::hypot(axis[0], axis[1]) <= UPRIGHT;
-        let joints = self.solve(pose.position.into(), axis, upright, branch, previous)?;
+        let target = [pose.position.into(), axis];
+        let joints = self.solve(target, upright, |_| None, branch, previous)?;
         finite(&pose.position)?;
         finite(&pose.rotation.column(2).into_owned())?;
         Ok(Joints::from(joints))
     }
 
     /// # Errors
-    /// As for [`Self::inverse`], and `singular_axis` where an upright tool begins to lean: the turn
-    /// r then has to be right beforehand.
+    /// As for [`Self::inverse`], and `singular_axis` where an upright tool begins to lean in a
+    /// direction that the head is not turned to. A path that passes through a = 0 the way the head is
+    /// turned goes on with a of the other sign.
     fn joint_motion(
         &self,
         tool: &ToolMotion,
@@ -304,16 +367,25 @@ impl Mechanism<5> for Mcm {
         let upright = lean <= UPRIGHT;
         let rates = [axis[0], axis[1]].map(|row| row.first.abs().max(row.second.abs()));
         let rate = rates[0].max(rates[1]);
-        if upright && rate > UPRIGHT_RATE {
+        let upright = upright && rate <= UPRIGHT_RATE;
+        let passed = core::cell::Cell::new(false);
+        let passing = |beam: [Taylor; 2]| {
+            let found = passing(beam, previous[4]);
+            passed.set(found.is_some());
+            found
+        };
+        let joints = self.solve([tool.series(), axis], upright, passing, branch, previous)?;
+        if lean <= UPRIGHT && !upright && !passed.get() {
             return Err(KinematicsError {
                 code: "singular_axis",
                 axis: Some(4),
                 value: rate,
                 limit: UPRIGHT_RATE,
-                detail: "an upright tool begins to lean, where the turn of the head has no rate",
+                detail: "an upright tool begins to lean where its head is not turned to: it would have \
+                         to turn at once; let the path pass there the way the head is turned, or keep \
+                         a lean",
             });
         }
-        let joints = self.solve(tool.series(), axis, upright, branch, previous)?;
         finite(&tool.position)?;
         finite(&tool.attitude.rotation.column(2).into_owned())?;
         Ok(JointMotion::of_series(&joints))

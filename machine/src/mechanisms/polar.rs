@@ -8,7 +8,7 @@
 //! An arm that is as long as the table is far, a₁ = c, reaches the centre of the table, and a path
 //! may cross it; `center` tells how. Another arm leaves a blind disc of radius |a₁ − c|.
 
-mod center;
+pub(super) mod center;
 mod dynamics;
 
 use core::f64::consts::FRAC_PI_2;
@@ -17,8 +17,8 @@ use nalgebra::{Matrix3, Vector3};
 use signals::math;
 
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
-    ToolMotion, finite,
+    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism,
+    Pose, ToolMotion, finite,
 };
 use crate::taylor::Scalar;
 use crate::transmission::Elasticity;
@@ -257,8 +257,8 @@ impl Mechanism<3> for Polar {
         let radius = self.pose(q).position.xy().norm();
         let reach = self.arm + self.center_distance - radius;
         vec![
-            Margin { name: "center", value: determinant, limit: 0.0 },
-            Margin { name: "reach", value: reach, limit: 0.0 },
+            Margin { name: "center", kind: MarginKind::Serial, value: determinant, limit: 0.0 },
+            Margin { name: "reach", kind: MarginKind::Serial, value: reach, limit: 0.0 },
         ]
     }
 

@@ -15,8 +15,8 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross};
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
-    ToolMotion, in_plane,
+    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism,
+    Pose, ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
 use crate::transmission::Elasticity;
@@ -235,8 +235,18 @@ impl Mechanism<2> for Prrrp {
     fn margins(&self, assembly: &PrrrpAssembly) -> Vec<Margin> {
         let [first, _] = assembly.links;
         vec![
-            Margin { name: "type_1", value: first.y / self.link, limit: self.type_1_limit },
-            Margin { name: "type_2", value: first.x.abs() / self.link, limit: self.type_2_limit },
+            Margin {
+                name: "type_1",
+                kind: MarginKind::Serial,
+                value: first.y / self.link,
+                limit: self.type_1_limit,
+            },
+            Margin {
+                name: "type_2",
+                kind: MarginKind::Parallel,
+                value: first.x.abs() / self.link,
+                limit: self.type_2_limit,
+            },
         ]
     }
 

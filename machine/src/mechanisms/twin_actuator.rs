@@ -17,8 +17,8 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
-    ToolMotion, in_plane,
+    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism,
+    Pose, ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
 use crate::transmission::Elasticity;
@@ -290,8 +290,18 @@ impl Mechanism<2> for TwinActuator {
 
     fn margins(&self, assembly: &TwinAssembly) -> Vec<Margin> {
         vec![
-            Margin { name: "baseline", value: assembly.baseline, limit: self.baseline_limit },
-            Margin { name: "near_a", value: assembly.plate.x, limit: self.near_limit },
+            Margin {
+                name: "baseline",
+                kind: MarginKind::Parallel,
+                value: assembly.baseline,
+                limit: self.baseline_limit,
+            },
+            Margin {
+                name: "near_a",
+                kind: MarginKind::Collision,
+                value: assembly.plate.x,
+                limit: self.near_limit,
+            },
         ]
     }
 

@@ -71,7 +71,7 @@ fn the_mcm_conforms_on_both_sides() {
         },
         elasticity: Some([SCREW; 5]),
     };
-    let sides = [None, Some(1), Some(-1)].map(|side| McmBranch { side });
+    let sides = [None, Some(1), Some(-1)].map(|side| McmBranch { side, lean: None });
     conforms(&mechanism, &sides, |random| {
         random.joints([[0.2, 0.45], [0.0, 0.35], [-3.0, 9.0], [0.2, 1.5], [-2.0, 2.0]])
     });

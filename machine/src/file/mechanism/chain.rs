@@ -12,8 +12,7 @@ use crate::file::tables::{AxisTable, MachineTable};
 use crate::kinematics::{Joints, KinematicsError, Mechanism, Pose};
 use crate::transmission::{Elasticity, link};
 
-use super::Site;
-use super::springs;
+use super::{Site, rest, springs};
 
 /// The spring behind an axis [N/m or N·m/rad at the joint] and the damping ratio of its load.
 struct Spring<'a> {
@@ -106,8 +105,11 @@ pub(super) fn joints<const N: usize, M: Mechanism<N>>(
     site: &Site<'_>,
     findings: &mut Findings,
 ) -> Option<Standing<N>> {
-    let Site { table, home } = *site;
+    let Site { table, area, home } = *site;
     let (standing, assembly) = standing(mechanism, &names, table, home, findings)?;
+    if let Some(values) = &table.home_axes {
+        rest::check(mechanism, &assembly, values, area, findings);
+    }
     let mass = mechanism.mass_matrix(&assembly);
     let mut joints = Vec::with_capacity(N);
     let mut springs = Vec::with_capacity(N);

@@ -52,7 +52,7 @@ pub(super) fn build(table: &McmTable, site: &Site<'_>, findings: &mut Findings) 
         height: table.height.value,
         reach: chain::range(site, "X").unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
         singular_distance: table.singular_distance.value,
-        branch: McmBranch { side: None },
+        branch: McmBranch { side: None, lean: None },
         load: McmLoad {
             carriage_mass: table.carriage_mass.value,
             slide_mass: table.slide_mass.value,

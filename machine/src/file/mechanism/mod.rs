@@ -6,6 +6,7 @@ mod linear;
 pub mod mcm;
 pub mod polar;
 pub mod prrrp;
+mod rest;
 pub mod serial;
 mod springs;
 pub mod tri_planar;
@@ -28,6 +29,7 @@ pub(super) struct Built {
 /// What a mechanism's table needs of the rest of the file.
 pub(super) struct Site<'a> {
     pub(super) table: &'a MachineTable,
+    pub(super) area: &'a WorkArea,
     /// Where the tool rests [m], unless the file says how the axes stand.
     pub(super) home: [f64; 3],
 }
@@ -97,7 +99,7 @@ pub(super) fn build(
     if let Some(corexy) = &kinds.corexy {
         return Some(linear::corexy(corexy, area, home));
     }
-    let site = Site { table, home };
+    let site = Site { table, area, home };
     if let Some(five_bar) = &kinds.five_bar {
         return five_bar::build(five_bar, &site, findings);
     }

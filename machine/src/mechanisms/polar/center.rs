@@ -26,7 +26,7 @@ const CURVE_TOLERANCE: f64 = 1e-15;
 
 /// Signed distance from the centre [m] and its direction [rad] for a path that passes the centre;
 /// `None` where it does not, or has no direction.
-pub(super) fn through(tool: &ToolMotion) -> Option<[Taylor; 2]> {
+pub(in crate::mechanisms) fn through(tool: &ToolMotion) -> Option<[Taylor; 2]> {
     straight(tool).or_else(|| curved(tool))
 }
 

@@ -14,7 +14,8 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 pub use dynamics::SerialAssembly;
 
 use crate::kinematics::{
-    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
+    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
+    ToolMotion,
 };
 use crate::transmission::Elasticity;
 
@@ -114,6 +115,7 @@ impl<const N: usize> Mechanism<N> for Serial<N> {
         let rows = self.rows(&self.chain(&assembly.joints.into()), self.reach());
         vec![Margin {
             name: "singular_value",
+            kind: MarginKind::Serial,
             value: rows.smallest_singular_value(),
             limit: inverse::SINGULAR,
         }]

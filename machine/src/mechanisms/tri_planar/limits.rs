@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, Vector3};
 
 use super::struts::struts;
 use super::{TriPlanar, TriPlanarAssembly};
-use crate::kinematics::{Joints, KinematicsError, Margin, Pose};
+use crate::kinematics::{Joints, KinematicsError, Margin, MarginKind, Pose};
 
 const OFF_STATOR: [&str; 3] = ["off_stator_D", "off_stator_E", "off_stator_F"];
 
@@ -127,19 +127,20 @@ pub(super) fn check(
 pub(super) fn margins(mechanism: &TriPlanar, assembly: &TriPlanarAssembly) -> Vec<Margin> {
     let arms = mechanism.arms(&assembly.rotation);
     let feet = &assembly.feet;
+    use MarginKind::{Collision, Parallel, Serial};
     let mut margins = Vec::with_capacity(11);
-    let mut add = |name, value, limit| margins.push(Margin { name, value, limit });
+    let mut add = |name, kind, value, limit| margins.push(Margin { name, kind, value, limit });
     for (name, leg) in ["type_1_D", "type_1_E", "type_1_F"].into_iter().zip(&assembly.legs) {
-        add(name, leg.normal.z.abs(), mechanism.type_1_limit);
+        add(name, Serial, leg.normal.z.abs(), mechanism.type_1_limit);
     }
     let struts = struts(mechanism, &arms, &assembly.position, feet);
-    add("type_2", smallest_singular_value(&struts), mechanism.type_2_limit);
-    add("clearance", lowest(&arms, &assembly.position), mechanism.clearance);
+    add("type_2", Parallel, smallest_singular_value(&struts), mechanism.type_2_limit);
+    add("clearance", Collision, lowest(&arms, &assembly.position), mechanism.clearance);
     for (leg, name) in ["stator_D", "stator_E", "stator_F"].into_iter().enumerate() {
-        add(name, inside(mechanism, feet, leg).1, 0.0);
+        add(name, Collision, inside(mechanism, feet, leg).1, 0.0);
     }
     for (one, other, name) in PAIRS {
-        add(name, between(mechanism, feet, one, other), mechanism.gap);
+        add(name, Collision, between(mechanism, feet, one, other), mechanism.gap);
     }
     margins
 }
