@@ -269,7 +269,20 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
     /// # Errors
     /// Where the chain cannot close.
     fn forward(&self, q: &Joints<N>, branch: Self::Branch) -> Result<Pose, KinematicsError> {
-        Ok(self.pose(&self.assemble(q, branch, None)?))
+        self.locate(q, branch, None)
+    }
+
+    /// The pose of [`Self::assemble`] alone, to the bit, which may be had for less than the assembly.
+    ///
+    /// # Errors
+    /// Where the chain cannot close.
+    fn locate(
+        &self,
+        q: &Joints<N>,
+        branch: Self::Branch,
+        near: Option<&Self::Assembly>,
+    ) -> Result<Pose, KinematicsError> {
+        Ok(self.pose(&self.assemble(q, branch, near)?))
     }
 
     /// The joints that bring the tool to `pose` on `branch`, continuous with `previous`.
