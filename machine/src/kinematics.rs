@@ -252,6 +252,21 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
         near: Option<&Self::Assembly>,
     ) -> Result<Self::Assembly, KinematicsError>;
 
+    /// The same where the tool is known to be at `pose`, from the inverse that gave `q`: what an
+    /// iterative solution looks for.
+    ///
+    /// # Errors
+    /// Where the chain cannot close.
+    fn assemble_at(
+        &self,
+        _pose: &Pose,
+        q: &Joints<N>,
+        branch: Self::Branch,
+        near: Option<&Self::Assembly>,
+    ) -> Result<Self::Assembly, KinematicsError> {
+        self.assemble(q, branch, near)
+    }
+
     /// Where the tool is.
     fn pose(&self, assembly: &Self::Assembly) -> Pose;
 
