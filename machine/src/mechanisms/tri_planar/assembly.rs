@@ -45,7 +45,7 @@ pub struct TriPlanarAssembly {
     pub(super) gravity: Joints<6>,
     state: State,
     /// Inverse of the matrix of the struts, for the next solution near by.
-    loosened: SMatrix<f64, 6, 6>,
+    pub(super) loosened: SMatrix<f64, 6, 6>,
 }
 
 impl TriPlanarAssembly {

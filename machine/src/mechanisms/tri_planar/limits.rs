@@ -5,6 +5,7 @@ use nalgebra::{SMatrix, Vector3};
 use super::struts::struts;
 use super::{TriPlanar, TriPlanarAssembly};
 use crate::kinematics::{Joints, KinematicsError, Margin, Pose};
+use crate::mechanisms::spectrum::largest_eigenvalue;
 
 const OFF_STATOR: [&str; 3] = ["off_stator_D", "off_stator_E", "off_stator_F"];
 
@@ -132,8 +133,10 @@ pub(super) fn margins(mechanism: &TriPlanar, assembly: &TriPlanarAssembly) -> Ve
     for (name, leg) in ["type_1_D", "type_1_E", "type_1_F"].into_iter().zip(&assembly.legs) {
         add(name, leg.normal.z.abs(), mechanism.type_1_limit);
     }
-    let struts = struts(mechanism, &arms, &assembly.position, feet);
-    add("type_2", smallest_singular_value(&struts), mechanism.type_2_limit);
+    // The smallest singular value is one over the largest of the inverse, whose square loses
+    // nothing where the value is small.
+    let square = assembly.loosened * assembly.loosened.transpose();
+    add("type_2", 1.0 / largest_eigenvalue(square).sqrt(), mechanism.type_2_limit);
     add("clearance", lowest(&arms, &assembly.position), mechanism.clearance);
     for (leg, name) in ["stator_D", "stator_E", "stator_F"].into_iter().enumerate() {
         add(name, inside(mechanism, feet, leg).1, 0.0);
