@@ -244,8 +244,8 @@ fn positive_inverse<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Option<SMatr
     for row in 0..N {
         for column in 0..=row {
             let mut rest = matrix[(row, column)];
-            for before in 0..column {
-                rest -= factor[row][before] * factor[column][before];
+            for (own, other) in factor[row].iter().zip(&factor[column]).take(column) {
+                rest -= own * other;
             }
             if column < row {
                 factor[row][column] = rest * scale[column];

@@ -87,13 +87,13 @@ fn tridiagonal<const N: usize>(mut matrix: SMatrix<f64, N, N>) -> ([f64; N], [f6
         matrix[(next, column)] = head + length;
         let scale = 1.0 / (length * (head + length));
         let mut image = [0.0; N];
-        for row in next..N {
+        for (row, image) in image.iter_mut().enumerate().skip(next) {
             let mut sum = 0.0;
             for across in next..N {
                 let entry = if across <= row { (row, across) } else { (across, row) };
                 sum += matrix[entry] * matrix[(across, column)];
             }
-            image[row] = sum * scale;
+            *image = sum * scale;
         }
         let mut along = 0.0;
         for row in next..N {
