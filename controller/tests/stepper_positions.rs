@@ -126,8 +126,9 @@ impl Drivers {
         assert_eq!(command.mode(), CommandMode::Position);
         let before = self.feedback.position;
         self.feedback.position = command.position;
-        for axis in 0..2 {
-            self.feedback.velocity[axis] = (command.position[axis] - before[axis]) / 1e-3;
+        let moved = before.iter().zip(&command.position);
+        for (velocity, (before, now)) in self.feedback.velocity.iter_mut().zip(moved) {
+            *velocity = (now - before) / 1e-3;
         }
         let joint = |axis: usize| command.position[axis] * self.machine.axes[axis].ratio;
         self.told.push([joint(0), joint(1)]);

@@ -83,8 +83,7 @@ fn measure<const N: usize, M: Mechanism<N>>(
         bencher.iter(|| {
             let case = black_box(next.next().unwrap());
             let q = mechanism.inverse(&case.pose, branch, &case.q).unwrap();
-            let there = mechanism.assemble(&q, branch, Some(&case.before)).unwrap();
-            mechanism.pose(&there)
+            mechanism.locate(&q, branch, Some(&case.before)).unwrap()
         });
     });
     let mut next = cases.iter().cycle();

@@ -276,6 +276,21 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
         near: Option<&Self::Assembly>,
     ) -> Result<Self::Assembly, KinematicsError>;
 
+    /// The same where the tool is known to be at `pose`, from the inverse that gave `q`: what an
+    /// iterative solution looks for.
+    ///
+    /// # Errors
+    /// Where the chain cannot close.
+    fn assemble_at(
+        &self,
+        _pose: &Pose,
+        q: &Joints<N>,
+        branch: Self::Branch,
+        near: Option<&Self::Assembly>,
+    ) -> Result<Self::Assembly, KinematicsError> {
+        self.assemble(q, branch, near)
+    }
+
     /// Where the tool is.
     fn pose(&self, assembly: &Self::Assembly) -> Pose;
 
@@ -293,7 +308,20 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
     /// # Errors
     /// Where the chain cannot close.
     fn forward(&self, q: &Joints<N>, branch: Self::Branch) -> Result<Pose, KinematicsError> {
-        Ok(self.pose(&self.assemble(q, branch, None)?))
+        self.locate(q, branch, None)
+    }
+
+    /// The pose of [`Self::assemble`] alone, to the bit, which may be had for less than the assembly.
+    ///
+    /// # Errors
+    /// Where the chain cannot close.
+    fn locate(
+        &self,
+        q: &Joints<N>,
+        branch: Self::Branch,
+        near: Option<&Self::Assembly>,
+    ) -> Result<Pose, KinematicsError> {
+        Ok(self.pose(&self.assemble(q, branch, near)?))
     }
 
     /// The joints that bring the tool to `pose` on `branch`, continuous with `previous`.

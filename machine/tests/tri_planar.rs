@@ -111,6 +111,15 @@ fn golden_case(mechanism: &TriPlanar, case: &Value, tolerance: f64, fk_tolerance
         same_pose(&mechanism.pose(&warm), &pose, fk_tolerance, context);
     }
 
+    let known = mechanism.assemble_at(&pose, &q, branch, None).unwrap();
+    same_pose(&mechanism.pose(&known), &pose, fk_tolerance, context);
+    // A pose that is not that of the feet, or no pose at all, does not matter.
+    let misled = mechanism.assemble_at(&guess, &q, branch, None).unwrap();
+    same_pose(&mechanism.pose(&misled), &pose, fk_tolerance, context);
+    let nowhere = Pose::at(pose.position * f64::NAN);
+    let found = mechanism.assemble_at(&nowhere, &q, branch, None).unwrap();
+    assert_eq!(found, cold, "{context}");
+
     let inverse_jacobian = cold.inverse_jacobian();
     let expected =
         SMatrix::<f64, 6, 6>::from_fn(|row, column| number(&output["jinv"][row][column]));

@@ -186,10 +186,11 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         let branch = self.branch(request)?;
         let position =
             Vector3::from_fn(|row, _| wanted.position.get(row).copied().unwrap_or_default());
+        let mut pose = None;
         let solved = match (wanted.a, wanted.r) {
             (None, None) => {
-                let pose = Pose { position, rotation: rotation(wanted)? };
-                self.mechanism.inverse(&pose, branch, &self.previous)
+                let pose = pose.insert(Pose { position, rotation: rotation(wanted)? });
+                self.mechanism.inverse(pose, branch, &self.previous)
             }
             (a, r) => self
                 .mechanism
@@ -208,7 +209,18 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         let q = solved.map_err(|error| self.kinematics_error(&error))?;
         self.check_limits(&q)?;
         self.previous = q;
-        let assembly = self.assemble(&q, branch)?;
+        let assembly = match pose {
+            Some(pose) => {
+                let near = self.near.as_ref();
+                let assembly = self
+                    .mechanism
+                    .assemble_at(&pose, &q, branch, near)
+                    .or_else(|_| self.mechanism.assemble(&q, branch, None))
+                    .map_err(|error| self.kinematics_error(&error))?;
+                *self.near.insert(assembly)
+            }
+            None => self.assemble(&q, branch)?,
+        };
         let axes = self.machine.axes.iter().zip(q.iter()).filter_map(|(axis, value)| {
             let [lower, upper] = axis.limits.position;
             let distance = (value - lower).min(upper - value);

@@ -13,7 +13,7 @@
 
 use machine::Mechanism;
 use machine::kinematics::{Joints, KinematicsError};
-use nalgebra::{Cholesky, Const, SMatrix};
+use nalgebra::SMatrix;
 
 /// Solutions behind the newest one that the parabola goes through.
 const EARLIER: usize = 2;
@@ -160,17 +160,21 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
 
         // The chain of another motion is no place to start from: it may lie on another branch.
         let near = (self.known > 0).then_some(&self.assembly);
-        let assembly = mechanism.assemble(&place, mechanism.branch(), near)?;
-        let inertia = mechanism.mass_matrix(&assembly) + self.rotors;
-        let mobility = positive_inverse(&inertia).ok_or(Unsolvable::Mass)?;
-        let bias = mechanism.bias(&assembly, &speed);
-
-        let before = self.middle;
-        self.assembly = assembly;
-        self.middle = LoadSide { inertia, mobility, bias };
-        if self.known > 0 {
-            self.earlier = [before, self.earlier[0]];
+        match mechanism.assemble(&place, mechanism.branch(), near) {
+            Ok(assembly) => self.assembly = assembly,
+            Err(error) => return Err(error.into()),
         }
+        let inertia = mechanism.mass_matrix(&self.assembly) + self.rotors;
+        let Some(mobility) = positive_inverse(&inertia) else {
+            self.known = 0;
+            return Err(Unsolvable::Mass);
+        };
+        if self.known > 0 {
+            self.earlier.swap(0, 1);
+            self.earlier[0] = self.middle;
+        }
+        let bias = mechanism.bias(&self.assembly, &speed);
+        self.middle = LoadSide { inertia, mobility, bias };
         let [first, second] = &self.earlier;
         match self.known {
             0 => (self.slope, self.curvature) = (LoadSide::zero(), LoadSide::zero()),
@@ -231,7 +235,84 @@ impl<const N: usize> LoadSide<N> {
 }
 
 /// The inverse of a positive definite matrix; `None` for one that is not, or holds no numbers.
+///
+/// Cholesky's factor is inverted in its place, and multiplied with itself: nalgebra solves for one
+/// column of the identity after the other, zeros and all, which takes five times as long.
 fn positive_inverse<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
-    let inverse = Cholesky::<f64, Const<N>>::new(*matrix)?.inverse();
-    inverse.iter().all(|entry| entry.is_finite()).then_some(inverse)
+    let mut factor = [[0.0; N]; N];
+    let mut scale = [0.0; N];
+    for row in 0..N {
+        for column in 0..=row {
+            let mut rest = matrix[(row, column)];
+            for (own, other) in factor[row].iter().zip(&factor[column]).take(column) {
+                rest -= own * other;
+            }
+            if column < row {
+                factor[row][column] = rest * scale[column];
+            } else {
+                // False for what is not a number too.
+                let positive = rest > 0.0 && rest.is_finite();
+                if !positive {
+                    return None;
+                }
+                scale[row] = 1.0 / rest.sqrt();
+            }
+        }
+    }
+    // L·K = 1, below and on the diagonal.
+    let mut inverse = [[0.0; N]; N];
+    for column in 0..N {
+        inverse[column][column] = scale[column];
+        for row in column + 1..N {
+            let mut sum = 0.0;
+            for between in column..row {
+                sum += factor[row][between] * inverse[between][column];
+            }
+            inverse[row][column] = -sum * scale[row];
+        }
+    }
+    let mut product = SMatrix::zeros();
+    let mut finite = true;
+    for column in 0..N {
+        for row in column..N {
+            let mut sum = 0.0;
+            for line in &inverse[row..] {
+                sum += line[row] * line[column];
+            }
+            finite &= sum.is_finite();
+            product[(row, column)] = sum;
+            product[(column, row)] = sum;
+        }
+    }
+    finite.then_some(product)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::positive_inverse;
+    use nalgebra::{Matrix3, SMatrix};
+
+    #[test]
+    fn a_positive_matrix_times_its_inverse_is_the_identity() {
+        // A·Aᵀ of a matrix with no structure, and the identity to keep it away from singular.
+        let a = SMatrix::<f64, 6, 6>::from_fn(|row, column| {
+            f64::from(((row * 7 + column * 11 + row * column * 5) % 13) as u8) / 6.0 - 1.0
+        });
+        let matrix = a * a.transpose() + SMatrix::identity() * 0.1;
+        let inverse = positive_inverse(&matrix).unwrap_or_default();
+        let off = matrix * inverse - SMatrix::<f64, 6, 6>::identity();
+        assert!(off.amax() < 1e-12, "{off}");
+        assert_eq!(inverse, inverse.transpose());
+    }
+
+    #[test]
+    fn what_is_not_positive_definite_has_no_inverse() {
+        let singular = Matrix3::new(1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 2.0);
+        let turned = Matrix3::new(1.0, 2.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0, 2.0);
+        let nowhere = Matrix3::identity() * f64::NAN;
+        let endless = Matrix3::identity() * f64::INFINITY;
+        for matrix in [singular, turned, nowhere, endless, -Matrix3::identity()] {
+            assert_eq!(positive_inverse(&matrix), None, "{matrix}");
+        }
+    }
 }

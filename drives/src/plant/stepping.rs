@@ -38,16 +38,18 @@ pub struct Field<const N: usize> {
 impl<const N: usize> Field<N> {
     /// Torque on the rotors [N·m].
     pub fn torque(&self, state: &State<N>) -> SVector<f64, N> {
-        SVector::from_fn(|row, _| {
-            let motor = &self.motors[row];
+        let mut torque = SVector::zeros();
+        for (row, motor) in self.motors.iter().enumerate() {
             let (angle, speed) = (state.angle[row], state.speed[row]);
             let teeth = motor.teeth_torque(angle - self.origin[row]);
-            if !self.powered {
-                return teeth;
+            torque[row] = teeth;
+            if self.powered {
+                let lag = self.angle[row] - angle;
+                let spring = motor.field_torque(motor.pull_out_torque(speed), lag);
+                torque[row] = spring + motor.damping * (self.speed[row] - speed) + teeth;
             }
-            let spring = motor.field_torque(motor.pull_out_torque(speed), self.angle[row] - angle);
-            spring + motor.damping * (self.speed[row] - speed) + teeth
-        })
+        }
+        torque
     }
 
     /// The rotors' springs [N·m/rad], at their stiffest.

@@ -4,6 +4,7 @@
 use machine::kinematics::{
     Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
 };
+use machine::transmission::gear::Efficiency;
 use machine::{AxisLimits, DcMotor, Encoder, Friction, LoopGains, Motor};
 use nalgebra::{SMatrix, Vector1, Vector3};
 

@@ -140,9 +140,46 @@ impl FiveBarAssembly {
     }
 }
 
-/// Which of the two codes belongs to `arm`.
-fn unreachable(arm: usize) -> &'static str {
-    ["unreachable_leg_1", "unreachable_leg_2"][arm]
+/// The linkage closed, and nothing derived from that.
+struct Closed {
+    /// From each motor to its elbow [m].
+    proximal: [Vector2<f64>; 2],
+    /// The elbows [m].
+    elbows: [Vector2<f64>; 2],
+    /// The tool [m].
+    tool: Vector2<f64>,
+}
+
+/// The elbow of an arm whose tool is given.
+struct Elbow<S> {
+    /// From the motor to it, times the square of the tool's distance [m³].
+    direction: [S; 2],
+    /// Where it is [m].
+    place: Vector2<f64>,
+}
+
+impl<S: Scalar> Elbow<S> {
+    /// The joint's angle [rad], on the turn of the tool's own, which is `above` the motors or not.
+    #[inline]
+    fn angle(&self, above: bool, side: i32) -> S {
+        let angle = self.direction[1].atan2(self.direction[0]);
+        // The rotation from the tool's direction to the elbow's is below half a turn, so it
+        // crossed the cut of atan2 exactly if the two lie on either side of it this way round.
+        match (side > 0, above, self.direction[1].value() < 0.0) {
+            (true, true, true) => angle + math::TURN,
+            (false, false, false) => angle - math::TURN,
+            _ => angle,
+        }
+    }
+}
+
+/// The angle on a turn that makes a path continuous with `previous` [rad].
+#[inline]
+fn near<S: Scalar>(angle: S, previous: f64) -> S {
+    if (angle.value() - previous).abs() < TURN_HYSTERESIS {
+        return angle;
+    }
+    angle + (math::nearest_turn(angle.value(), previous) - angle.value())
 }
 
 impl FiveBar {
@@ -166,6 +203,35 @@ impl FiveBar {
         self.proximal_inertia + self.proximal_mass * centre * centre
     }
 
+    /// Where the forearms meet from the elbows that the joints give.
+    #[inline]
+    fn close(&self, q: &Joints<2>, branch: FiveBarBranch) -> Result<Closed, KinematicsError> {
+        let proximal = |angle| {
+            let (sine, cosine) = math::sin_cos(angle);
+            Vector2::new(cosine, sine) * self.proximal
+        };
+        let proximal = [proximal(q[0]), proximal(q[1])];
+        let elbow = |arm: usize| Vector2::new(self.base(arm), 0.0) + proximal[arm];
+        let elbows = [elbow(0), elbow(1)];
+        let between = elbows[1] - elbows[0];
+        let square = between.norm_squared();
+        // Source 003 eq. 5.1: the tool stands on the middle between the elbows.
+        let height = self.distal * self.distal - square / 4.0;
+        // Written so that joints that are not numbers fail too.
+        if !(height > 0.0 && square > 0.0) {
+            return Err(KinematicsError {
+                code: "unreachable_elbows",
+                axis: None,
+                value: square.sqrt(),
+                limit: 2.0 * self.distal,
+                detail: "the forearms do not meet from these elbows",
+            });
+        }
+        let up = turned(between) * (f64::from(branch.assembly_mode) * (height / square).sqrt());
+        let tool = elbows[0] + between / 2.0 + up;
+        Ok(Closed { proximal, elbows, tool })
+    }
+
     /// The joint angles for the tool at (`x`, `y`).
     ///
     /// Source 003 eq. 5.1 with atan2, `θi = atan2(y, x ± e) + sᵢ·acos((b² + r² − a²)/(2·b·r))`,
@@ -177,27 +243,26 @@ impl FiveBar {
         branch: FiveBarBranch,
         previous: &Joints<2>,
     ) -> Result<[S; 2], KinematicsError> {
-        let first = self.arm(0, x, y, branch)?;
-        let second = self.arm(1, x, y, branch)?;
-        self.check_forearms([first, second].map(|(_, elbow)| elbow), x, y, branch)?;
-        Ok([(0, first.0), (1, second.0)].map(|(arm, angle)| {
-            let off = angle.value() - previous[arm];
-            if off.abs() < TURN_HYSTERESIS {
-                angle
-            } else {
-                angle + (math::nearest_turn(angle.value(), previous[arm]) - angle.value())
-            }
-        }))
+        let first = self.elbow(0, x, y, branch)?;
+        let second = self.elbow(1, x, y, branch)?;
+        let tool = Vector2::new(x.value(), y.value());
+        self.check_forearms([tool - first.place, tool - second.place], branch)?;
+        let above = tool.y >= 0.0;
+        Ok([
+            near(first.angle(above, branch.working_mode[0]), previous[0]),
+            near(second.angle(above, branch.working_mode[1]), previous[1]),
+        ])
     }
 
-    /// The angle of one arm, and where its elbow is [m].
-    fn arm<S: Scalar>(
+    /// The elbow of one arm.
+    #[inline(always)] // Handed on through memory, two arms cost half as much again.
+    fn elbow<S: Scalar>(
         &self,
         arm: usize,
         x: S,
         y: S,
         branch: FiveBarBranch,
-    ) -> Result<(S, Vector2<f64>), KinematicsError> {
+    ) -> Result<Elbow<S>, KinematicsError> {
         let (a, b) = (self.distal, self.proximal);
         let x = x - self.base(arm);
         let square = x * x + y * y;
@@ -207,55 +272,52 @@ impl FiveBar {
         // Written so that a position that is not a number fails too.
         let area_value = twice_area.value();
         if !(area_value >= 0.0 && area_value.is_finite()) {
-            let radius = square.value().sqrt();
-            let limit = if radius < a + b { (a - b).abs() } else { a + b };
-            return Err(KinematicsError {
-                code: unreachable(arm),
-                axis: Some(arm),
-                value: radius,
-                limit,
-                detail: "the tool is farther from the motor than the stretched arm reaches, or \
-                         nearer than the folded one",
-            });
+            return Err(self.unreachable(arm, square.value().sqrt()));
         }
         // Twice the area over a·b is the sine between the two links.
         let sine = area_value.sqrt() / (a * b);
         if sine == 0.0 || sine < self.type_1_limit {
-            return Err(KinematicsError {
-                code: "singular_type_1",
-                axis: Some(arm),
-                value: sine,
-                limit: self.type_1_limit,
-                detail: "the arm is all but stretched or folded",
-            });
+            return Err(self.all_but_straight(arm, sine));
         }
-        let side = f64::from(branch.working_mode[arm]);
-        let across = twice_area.sqrt() * side;
-        let elbow = [x * along - y * across, y * along + x * across];
-        let value = Vector2::new(elbow[0].value(), elbow[1].value());
-        let angle = elbow[1].atan2(elbow[0]);
-        // The rotation from the tool's direction to the elbow's is below half a turn, so it
-        // crossed the cut of atan2 exactly if the two lie on either side of it this way round.
-        let above = y.value() >= 0.0;
-        let turn = match (side > 0.0, above, value.y < 0.0) {
-            (true, true, true) => math::TURN,
-            (false, false, false) => -math::TURN,
-            _ => 0.0,
-        };
-        let elbow = value / square.value() + Vector2::new(self.base(arm), 0.0);
-        Ok((angle + turn, elbow))
+        let across = twice_area.sqrt() * f64::from(branch.working_mode[arm]);
+        let direction = [x * along - y * across, y * along + x * across];
+        let [forwards, sideways] = [direction[0].value(), direction[1].value()];
+        let scale = square.value();
+        let place = Vector2::new(forwards / scale + self.base(arm), sideways / scale);
+        Ok(Elbow { direction, place })
     }
 
-    /// Refuses elbows from which the tool lies on the other side, or whose forearms are in line.
-    fn check_forearms<S: Scalar>(
+    #[cold]
+    fn unreachable(&self, arm: usize, radius: f64) -> KinematicsError {
+        let (a, b) = (self.distal, self.proximal);
+        KinematicsError {
+            code: ["unreachable_leg_1", "unreachable_leg_2"][arm],
+            axis: Some(arm),
+            value: radius,
+            limit: if radius < a + b { (a - b).abs() } else { a + b },
+            detail: "the tool is farther from the motor than the stretched arm reaches, or \
+                     nearer than the folded one",
+        }
+    }
+
+    #[cold]
+    fn all_but_straight(&self, arm: usize, sine: f64) -> KinematicsError {
+        KinematicsError {
+            code: "singular_type_1",
+            axis: Some(arm),
+            value: sine,
+            limit: self.type_1_limit,
+            detail: "the arm is all but stretched or folded",
+        }
+    }
+
+    /// Refuses forearms, from elbow to tool, with the tool on the other side or all but in line.
+    #[inline]
+    fn check_forearms(
         &self,
-        elbows: [Vector2<f64>; 2],
-        x: S,
-        y: S,
+        [d1, d2]: [Vector2<f64>; 2],
         branch: FiveBarBranch,
     ) -> Result<(), KinematicsError> {
-        let tool = Vector2::new(x.value(), y.value());
-        let [d1, d2] = elbows.map(|elbow| tool - elbow);
         let sine = f64::from(branch.assembly_mode) * cross(d1, d2) / (self.distal * self.distal);
         let refusal = |code, detail| KinematicsError {
             code,
@@ -299,29 +361,9 @@ impl Mechanism<2> for FiveBar {
         branch: FiveBarBranch,
         _near: Option<&FiveBarAssembly>,
     ) -> Result<FiveBarAssembly, KinematicsError> {
-        let proximal = [0, 1].map(|arm| {
-            let (sine, cosine) = math::sin_cos(q[arm]);
-            Vector2::new(cosine, sine) * self.proximal
-        });
-        let elbows = [0, 1].map(|arm| Vector2::new(self.base(arm), 0.0) + proximal[arm]);
-        let between = elbows[1] - elbows[0];
-        let square = between.norm_squared();
-        // Source 003 eq. 5.1: the tool stands on the middle between the elbows.
-        let height = self.distal * self.distal - square / 4.0;
-        // Written so that joints that are not numbers fail too.
-        if !(height > 0.0 && square > 0.0) {
-            return Err(KinematicsError {
-                code: "unreachable_elbows",
-                axis: None,
-                value: square.sqrt(),
-                limit: 2.0 * self.distal,
-                detail: "the forearms do not meet from these elbows",
-            });
-        }
-        let up = turned(between) * (f64::from(branch.assembly_mode) * (height / square).sqrt());
-        let tool = elbows[0] + between / 2.0 + up;
-        let distal = elbows.map(|elbow| tool - elbow);
-        let [d1, d2] = distal;
+        let Closed { proximal, elbows, tool } = self.close(q, branch)?;
+        let [d1, d2] = [tool - elbows[0], tool - elbows[1]];
+        let distal = [d1, d2];
         // Source 003 eq. 5.2: dᵢ·Ṗ = (pᵢ × dᵢ)·θ̇ᵢ; eq. 5.3 lacks b, and (X − e) in its second row.
         let drive = [cross(proximal[0], d1), cross(proximal[1], d2)];
         let det = cross(d1, d2);
@@ -344,6 +386,16 @@ impl Mechanism<2> for FiveBar {
 
     fn pose(&self, assembly: &FiveBarAssembly) -> Pose {
         Pose::at(Vector3::new(assembly.tool.x, assembly.tool.y, 0.0))
+    }
+
+    fn locate(
+        &self,
+        q: &Joints<2>,
+        branch: FiveBarBranch,
+        _near: Option<&FiveBarAssembly>,
+    ) -> Result<Pose, KinematicsError> {
+        let Closed { tool, .. } = self.close(q, branch)?;
+        Ok(Pose::at(Vector3::new(tool.x, tool.y, 0.0)))
     }
 
     fn jacobian(&self, assembly: &FiveBarAssembly) -> Jacobian<2> {

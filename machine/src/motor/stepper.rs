@@ -64,6 +64,7 @@ pub struct BeyondTorque {
 
 impl StepperMotor {
     /// Electrical periods in a revolution, `N_r`.
+    #[inline]
     pub fn periods(&self) -> f64 {
         self.full_steps / STEPS_PER_PERIOD
     }
@@ -103,18 +104,21 @@ impl StepperMotor {
     }
 
     /// Angle between rotor and magnetic axis from which the rotor falls out of step [rad].
+    #[inline]
     pub fn stall_angle(&self) -> f64 {
         STEPS_TO_STALL * TAU / self.full_steps
     }
 
     /// Torque on a rotor that lags the magnetic axis by `lag` [rad], which could give `torque` at
     /// most [N·m].
+    #[inline]
     pub fn field_torque(&self, torque: f64, lag: f64) -> f64 {
         torque * math::sin(self.periods() * lag)
     }
 
     /// Torque of the teeth on a rotor at `angle` from a full step [rad], in N·m; there with the
     /// power off too.
+    #[inline]
     pub fn teeth_torque(&self, angle: f64) -> f64 {
         -self.detent_torque * math::sin(STEPS_PER_PERIOD * self.periods() * angle)
     }
@@ -155,11 +159,19 @@ impl StepperMotor {
     ///
     /// (the synchronous machine with fixed voltage; Acarnley, Stepping Motors, sec. 5.3). Both
     /// phases in quadrature give that torque evenly.
+    #[inline]
     pub fn pull_out_torque(&self, speed: f64) -> f64 {
+        /// Rounding of the comparison that saves the divisions.
+        const SURELY: f64 = 1.0 + 1e-9;
         let speed = speed.abs();
-        let constant = self.holding_torque / self.current;
         let reactance = self.periods() * speed * self.inductance;
         let square = self.resistance * self.resistance + reactance * reactance;
+        let given = self.current * self.voltage * square.sqrt()
+            - self.holding_torque * speed * self.resistance;
+        if given > self.current * self.current * square * SURELY {
+            return self.holding_torque;
+        }
+        let constant = self.holding_torque / self.current;
         let driven = constant * self.voltage / square.sqrt()
             - constant * constant * speed * self.resistance / square;
         driven.min(self.holding_torque).max(0.0)

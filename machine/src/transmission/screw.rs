@@ -26,7 +26,8 @@ pub struct ScrewShaft {
 impl ScrewShaft {
     /// Of the shaft along its axis, the nut left out [N/m]. Source 003 eq. 3.25.
     pub fn shaft_stiffness(&self) -> f64 {
-        let section = PI * (self.core_diameter.powi(2) - self.bore.powi(2)) / 4.0;
+        let [core, bore] = [self.core_diameter, self.bore].map(|diameter| diameter * diameter);
+        let section = PI * (core - bore) / 4.0;
         section * self.modulus / self.length
     }
 
@@ -37,7 +38,8 @@ impl ScrewShaft {
 
     /// Of the shaft in torsion [N·m/rad]. Source 003 eq. 3.29, for a hollow shaft too.
     pub fn torsional_stiffness(&self) -> f64 {
-        let section = PI * (self.core_diameter.powi(4) - self.bore.powi(4)) / 32.0;
+        let [core, bore] = [self.core_diameter, self.bore].map(|diameter| diameter * diameter);
+        let section = PI * (core * core - bore * bore) / 32.0;
         section * self.shear_modulus / self.length
     }
 
@@ -78,7 +80,7 @@ mod tests {
         let stretch = force * 0.3 / (210e9 * area);
         let nut = force / 90e6;
         // The torque that holds this force twists the shaft, and each radian is a lead.
-        let polar = PI * 6e-3_f64.powi(4) / 2.0;
+        let polar = PI * 6e-3 * 6e-3 * 6e-3 * 6e-3 / 2.0;
         let twist = force * lead * 0.3 / (80e9 * polar) * lead;
         let found = force / at_nut(SHAFT.stiffness(lead), lead);
         assert!((found / (stretch + nut + twist) - 1.0).abs() < 1e-12, "{found}");

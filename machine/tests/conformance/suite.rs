@@ -1,6 +1,6 @@
 //! What every mechanism must do, whatever it is: independent routes to the same numbers.
 
-use machine::kinematics::{JointMotion, Joints, ToolMotion};
+use machine::kinematics::{Freedom, JointMotion, Joints, ToolMotion};
 use machine::{Mechanism, Pose};
 use nalgebra::{SVector, Vector3};
 
@@ -75,6 +75,11 @@ fn positions<const N: usize, M: Mechanism<N>>(
     if N <= rows(mechanism.freedom()) {
         near((found - q).amax(), 0.0, 1e-10, 1.0, context);
     }
+    // The short ways lead to the same: to the bit, and to where an iteration ends.
+    let solved = mechanism.assemble(&found, branch, None).unwrap();
+    assert_eq!(back, mechanism.pose(&solved), "{context}");
+    let known = mechanism.assemble_at(pose, &found, branch, None).unwrap();
+    near(distance(Freedom::Pose, &mechanism.pose(&known), &back), 0.0, 2e-12, 1.0, context);
     let again = mechanism.inverse(&back, branch, &found).unwrap();
     near((again - found).amax(), 0.0, 1e-10, 1.0, context);
 }

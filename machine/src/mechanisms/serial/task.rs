@@ -9,6 +9,7 @@ use signals::math;
 use super::frame::{Frame, Vector, cross, difference, dot};
 use super::{JointKind, Serial};
 use crate::kinematics::{Freedom, Pose};
+use crate::mechanisms::spectrum::smallest_eigenvalue;
 use crate::taylor::Scalar;
 
 /// Most rows that a task has.
@@ -156,7 +157,7 @@ impl<const N: usize> Rows<f64, N> {
                 0.0
             }
         });
-        padded.symmetric_eigenvalues().min().max(0.0).sqrt()
+        smallest_eigenvalue(padded).max(0.0).sqrt()
     }
 }
 

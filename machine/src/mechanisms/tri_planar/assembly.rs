@@ -1,11 +1,13 @@
 //! From the feet to the platform's pose, and all that follows from it.
 
-use nalgebra::{Matrix3, Quaternion, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{
+    Matrix3, Quaternion, Rotation3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3,
+};
 use signals::math;
 
 use super::struts::{CLOSED, State, Struts, invert, struts};
 use super::{Fold, Legs, OUTWARD, TriPlanar, dynamics};
-use crate::kinematics::{Jacobian, Joints, KinematicsError};
+use crate::kinematics::{Jacobian, Joints, KinematicsError, Pose};
 
 /// A leg in an assembly; vectors in the machine frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +25,13 @@ pub(super) struct Leg {
     pub(super) turn: SVector<f64, 6>,
 }
 
+impl Leg {
+    /// Which way it leans.
+    fn fold(&self) -> Fold {
+        if self.normal.z > 0.0 { Fold::Outward } else { Fold::Inward }
+    }
+}
+
 /// The mechanism with its six struts closed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriPlanarAssembly {
@@ -36,12 +45,12 @@ pub struct TriPlanarAssembly {
     pub(super) gravity: Joints<6>,
     state: State,
     /// Inverse of the matrix of the struts, for the next solution near by.
-    loosened: SMatrix<f64, 6, 6>,
+    pub(super) loosened: SMatrix<f64, 6, 6>,
 }
 
 impl TriPlanarAssembly {
     pub(super) fn folds(&self) -> Legs {
-        Legs(self.legs.map(|leg| if leg.normal.z > 0.0 { Fold::Outward } else { Fold::Inward }))
+        Legs(self.legs.map(|leg| leg.fold()))
     }
 
     /// Rates of the feet per twist of the platform, the inverse of the Jacobian in closed form.
@@ -114,19 +123,8 @@ pub(super) fn assemble(
     branch: Legs,
     near: Option<&TriPlanarAssembly>,
 ) -> Result<TriPlanarAssembly, KinematicsError> {
-    let centroid = Vector2::new(q[0] + q[2] + q[4], q[1] + q[3] + q[5]) / 3.0;
-    // Counted from there, rounding does not grow with the size of the stator.
-    let feet = Joints::from_fn(|row, _| q[row] - centroid[row % 2]);
-    let equations = Struts { mechanism, feet };
-    let accept = |state: &State| {
-        complete(&equations, state, q, &centroid).filter(|found| {
-            let arms = mechanism.arms(&found.rotation);
-            found.rotation[(2, 2)] > 0.0
-                && arms.iter().all(|arm| arm.z + found.position.z > 0.0)
-                && found.legs.iter().all(|leg| leg.normal.z.abs() > 0.0)
-                && found.folds() == branch
-        })
-    };
+    let (centroid, equations) = equations(mechanism, q);
+    let accept = |state: &State| complete(&equations, state, q, &centroid, branch);
     if let Some(near) = near {
         let start = State {
             position: near.position - Vector3::new(centroid.x, centroid.y, 0.0),
@@ -136,8 +134,11 @@ pub(super) fn assemble(
             .follow(start, &near.loosened)
             .or_else(|| equations.solve(start))
             .filter(|found| found.attitude.coords.dot(&start.attitude.coords).abs() > NEARBY);
-        if let Some(found) = found.as_ref().and_then(accept) {
-            return Ok(found);
+        // Handed on as it is: an assembly is worth copying once only.
+        if let Some(done) = found.as_ref().map(accept)
+            && done.is_ok()
+        {
+            return done;
         }
     }
 
@@ -147,7 +148,7 @@ pub(super) fn assemble(
     });
     starts.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
     for (_, start) in &starts {
-        if let Some(found) = equations.solve(*start).as_ref().and_then(accept) {
+        if let Some(Ok(found)) = equations.solve(*start).as_ref().map(accept) {
             return Ok(found);
         }
     }
@@ -157,51 +158,102 @@ pub(super) fn assemble(
                 let turn = Quaternion::new(1.0, x * tilt, y * tilt, 0.0);
                 let attitude = UnitQuaternion::new_normalize(turn * start.attitude.into_inner());
                 let start = State { attitude, ..*start };
-                if let Some(found) = equations.solve(start).as_ref().and_then(accept) {
+                if let Some(Ok(found)) = equations.solve(start).as_ref().map(accept) {
                     return Ok(found);
                 }
             }
         }
     }
-    Err(KinematicsError {
+    Err(no_assembly(starts[0].0))
+}
+
+/// The chain at `q` where `pose` is known to close it, to the rounding of both; `None` if it does not.
+pub(super) fn assemble_at(
+    mechanism: &TriPlanar,
+    pose: &Pose,
+    q: &Joints<6>,
+    branch: Legs,
+) -> Option<TriPlanarAssembly> {
+    let (centroid, equations) = equations(mechanism, q);
+    let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
+    let start = State {
+        position: pose.position - Vector3::new(centroid.x, centroid.y, 0.0),
+        attitude: UnitQuaternion::from_rotation_matrix(&rotation),
+    };
+    let found = equations.solve(start)?;
+    // A singular pose might lead elsewhere.
+    let stays = found.attitude.coords.dot(&start.attitude.coords).abs() > NEARBY;
+    if stays { complete(&equations, &found, q, &centroid, branch).ok() } else { None }
+}
+
+/// The centroid of the feet `q`, and the equations of the struts counted from there: so rounding
+/// does not grow with the size of the stator.
+fn equations<'a>(mechanism: &'a TriPlanar, q: &Joints<6>) -> (Vector2<f64>, Struts<'a>) {
+    let centroid = Vector2::new(q[0] + q[2] + q[4], q[1] + q[3] + q[5]) / 3.0;
+    let feet = Joints::from_fn(|row, _| q[row] - centroid[row % 2]);
+    (centroid, Struts { mechanism, feet })
+}
+
+/// The failure, with the best start's residual.
+#[cold]
+fn no_assembly(residual: f64) -> KinematicsError {
+    KinematicsError {
         code: "no_assembly",
         axis: None,
-        value: starts[0].0,
+        value: residual,
         limit: CLOSED,
         detail: "no pose above the stator closes the legs on these feet in this branch; \
                  the value is the best start's residual",
-    })
+    }
 }
 
-/// Everything else that follows from a solved pose.
+/// The leg `index` of a solved pose.
+#[inline]
+fn leg(equations: &Struts<'_>, state: &State, rotation: &Matrix3<f64>, index: usize) -> Leg {
+    let height = equations.mechanism.height();
+    let [x, y] = OUTWARD[index];
+    let outward: Vector3<f64> = rotation.column(0) * x + rotation.column(1) * y;
+    let middle = outward * (height / 3.0);
+    let hinge = outward.cross(&rotation.column(2));
+    let foot = Vector3::new(equations.feet[2 * index], equations.feet[2 * index + 1], 0.0);
+    let arm = foot - state.position;
+    let shank = (arm - middle) / height;
+    let normal = hinge.cross(&shank);
+    // The foot's velocity along z, v_z + (Ω×arm)_z + h·turn·normal_z, is none.
+    let turn = SVector::from([0.0, 0.0, 1.0, arm.y, -arm.x, 0.0]) / (-height * normal.z);
+    Leg { middle, hinge, shank, normal, turn }
+}
+
+/// Everything else that follows from a solved pose, if it is the one that the machine stands in: see
+/// [`assemble`].
+///
+/// # Errors
+/// `no_assembly` where it is not, or the platform has no stiffness.
 fn complete(
     equations: &Struts<'_>,
     state: &State,
     q: &Joints<6>,
     centroid: &Vector2<f64>,
-) -> Option<TriPlanarAssembly> {
+    branch: Legs,
+) -> Result<TriPlanarAssembly, KinematicsError> {
     let mechanism = equations.mechanism;
-    let height = mechanism.height();
     let rotation = state.attitude.to_rotation_matrix().into_inner();
-    let normal = rotation.column(2).into_owned();
-    let mut index = 0;
-    let legs = OUTWARD.map(|[x, y]| {
-        let outward: Vector3<f64> = rotation.column(0) * x + rotation.column(1) * y;
-        let middle = outward * (height / 3.0);
-        let hinge = outward.cross(&normal);
-        let (foot_x, foot_y) = (equations.feet[2 * index], equations.feet[2 * index + 1]);
-        index += 1;
-        let arm = Vector3::new(foot_x, foot_y, 0.0) - state.position;
-        let shank = (arm - middle) / height;
-        let normal = hinge.cross(&shank);
-        // The foot's velocity along z, v_z + (Ω×arm)_z + h·turn·normal_z, is none.
-        let turn = SVector::from([0.0, 0.0, 1.0, arm.y, -arm.x, 0.0]) / (-height * normal.z);
-        Leg { middle, hinge, shank, normal, turn }
-    });
-
     let arms = mechanism.arms(&rotation);
+    let above = |arm: &Vector3<f64>| arm.z + state.position.z > 0.0;
+    if !(rotation[(2, 2)] > 0.0 && above(&arms[0]) && above(&arms[1]) && above(&arms[2])) {
+        return Err(no_assembly(0.0));
+    }
+    let leg = |index: usize| leg(equations, state, &rotation, index);
+    let legs = [leg(0), leg(1), leg(2)];
+    for (leg, fold) in legs.iter().zip(branch.0) {
+        if leg.normal.z.abs() > 0.0 && fold == leg.fold() {
+            continue;
+        }
+        return Err(no_assembly(0.0));
+    }
+
     let struts = struts(mechanism, &arms, &state.position, &equations.feet);
-    let loosened = invert(struts)?;
+    let loosened = invert(struts).ok_or_else(|| no_assembly(0.0))?;
     // l·v + (r×l)·Ω = l·ḟ for each strut, in the units of the matrix.
     let mut jacobian = Jacobian::zeros();
     for column in 0..6 {
@@ -226,8 +278,6 @@ fn complete(
         state: *state,
         loosened,
     };
-    let (mass, gravity) = dynamics::inertia_and_gravity(mechanism, &assembly);
-    assembly.mass = mass;
-    assembly.gravity = gravity;
-    Some(assembly)
+    (assembly.mass, assembly.gravity) = dynamics::inertia_and_gravity(mechanism, &assembly);
+    Ok(assembly)
 }

@@ -89,13 +89,33 @@ pub(super) fn inertia_and_gravity(
     mass.fill_upper_triangle_with_lower_triangle();
 
     let jacobian = &assembly.jacobian;
-    let mut seen = jacobian.tr_mul(&(mass * jacobian));
+    let mut seen = seen_from_feet(&mass, jacobian);
     for column in 0..6 {
         seen[(column, column)] += mechanism.inductor_mass;
     }
-    // Rounding leaves the two halves apart by a unit in the last place.
-    seen.fill_upper_triangle_with_lower_triangle();
     (seen, jacobian.tr_mul(&weight) * STANDARD_GRAVITY)
+}
+
+/// `Jᵀ·M·J`, of which both halves are the same.
+fn seen_from_feet(mass: &SMatrix<f64, 6, 6>, jacobian: &SMatrix<f64, 6, 6>) -> SMatrix<f64, 6, 6> {
+    let mut seen = SMatrix::<f64, 6, 6>::zeros();
+    for column in 0..6 {
+        let mut momentum = Twist::zeros();
+        for (axis, rate) in jacobian.column(column).iter().enumerate() {
+            for row in 0..6 {
+                momentum[row] += mass[(row, axis)] * rate;
+            }
+        }
+        for row in column..6 {
+            let mut sum = 0.0;
+            for axis in 0..6 {
+                sum += jacobian[(axis, row)] * momentum[axis];
+            }
+            seen[(row, column)] = sum;
+            seen[(column, row)] = sum;
+        }
+    }
+    seen
 }
 
 /// Coriolis, centrifugal and gravity efforts with the feet moving at `velocity` [N].

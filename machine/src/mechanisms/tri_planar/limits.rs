@@ -5,6 +5,7 @@ use nalgebra::{SMatrix, Vector3};
 use super::struts::struts;
 use super::{TriPlanar, TriPlanarAssembly};
 use crate::kinematics::{Joints, KinematicsError, Margin, MarginKind, Pose};
+use crate::mechanisms::spectrum::largest_eigenvalue;
 
 const OFF_STATOR: [&str; 3] = ["off_stator_D", "off_stator_E", "off_stator_F"];
 
@@ -133,8 +134,11 @@ pub(super) fn margins(mechanism: &TriPlanar, assembly: &TriPlanarAssembly) -> Ve
     for (name, leg) in ["type_1_D", "type_1_E", "type_1_F"].into_iter().zip(&assembly.legs) {
         add(name, Serial, leg.normal.z.abs(), mechanism.type_1_limit);
     }
-    let struts = struts(mechanism, &arms, &assembly.position, feet);
-    add("type_2", Parallel, smallest_singular_value(&struts), mechanism.type_2_limit);
+    // The smallest singular value is one over the largest of the inverse, whose square loses
+    // nothing where the value is small.
+    let square = assembly.loosened * assembly.loosened.transpose();
+    let type_2 = 1.0 / largest_eigenvalue(square).sqrt();
+    add("type_2", Parallel, type_2, mechanism.type_2_limit);
     add("clearance", Collision, lowest(&arms, &assembly.position), mechanism.clearance);
     for (leg, name) in ["stator_D", "stator_E", "stator_F"].into_iter().enumerate() {
         add(name, Collision, inside(mechanism, feet, leg).1, 0.0);

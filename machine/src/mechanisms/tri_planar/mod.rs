@@ -141,6 +141,17 @@ impl Mechanism<6> for TriPlanar {
         assembly::assemble(self, q, branch, near)
     }
 
+    fn assemble_at(
+        &self,
+        pose: &Pose,
+        q: &Joints<6>,
+        branch: Legs,
+        near: Option<&TriPlanarAssembly>,
+    ) -> Result<TriPlanarAssembly, KinematicsError> {
+        assembly::assemble_at(self, pose, q, branch)
+            .map_or_else(|| assembly::assemble(self, q, branch, near), Ok)
+    }
+
     fn pose(&self, assembly: &TriPlanarAssembly) -> Pose {
         Pose { position: assembly.position, rotation: assembly.rotation }
     }

@@ -25,8 +25,13 @@ const STRIDE: f64 = 0.6;
 
 impl TriPlanar {
     /// From the centroid to the corners, in the machine frame [m].
+    #[inline]
     pub(super) fn arms(&self, rotation: &Matrix3<f64>) -> [Vector3<f64>; 3] {
-        CORNERS.map(|[x, y]| (rotation.column(0) * x + rotation.column(1) * y) * self.side)
+        let arm = |corner: usize| {
+            let [x, y] = CORNERS[corner];
+            (rotation.column(0) * x + rotation.column(1) * y) * self.side
+        };
+        [arm(0), arm(1), arm(2)]
     }
 }
 
