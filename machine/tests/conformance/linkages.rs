@@ -2,9 +2,9 @@
 
 use machine::kinematics::Joints;
 use machine::mechanisms::{
-    ActuatorBodies, Elasticity, FiveBar, FiveBarBranch, Prrrp, PrrrpBranch, TwinActuator,
-    TwinBranch,
+    ActuatorBodies, FiveBar, FiveBarBranch, Prrrp, PrrrpBranch, TwinActuator, TwinBranch,
 };
+use machine::transmission::Elasticity;
 use machine::{Mechanism, Pose};
 use nalgebra::{Vector2, Vector3};
 
