@@ -1,6 +1,6 @@
 //! The stiffness of a transmission, given or from what it is made of.
 
-use crate::document::{Findings, Place};
+use crate::document::{Findings, Place, ProblemKind};
 use crate::file::tables::{
     AxisTable, BeltTable, MachineTable, ScrewTable, SectionTable, ShaftTable,
 };
@@ -62,10 +62,14 @@ pub(super) fn check(table: &MachineTable, findings: &mut Findings) {
         let built = section.as_ref().map(|section| section.place);
         once(stiffness.is_some(), built, "section", findings);
         if stiffness.is_none() && built.is_none() {
-            findings.contradict(
+            findings.refuse(
+                ProblemKind::MissingKey,
                 *place,
                 "nothing says how stiff the belts are".to_owned(),
-                "add `stiffness`, or a `section`; leave `belt` out to make them rigid",
+                Some(
+                    "add `stiffness`, or a `section`; leave `belt` out to make them rigid"
+                        .to_owned(),
+                ),
             );
         }
     }
