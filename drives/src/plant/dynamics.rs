@@ -130,6 +130,8 @@ pub struct Dynamics<const N: usize, M: Mechanism<N>> {
     mobility: SVector<f64, N>,
     /// ratio/J of each rotor.
     reaction: SVector<f64, N>,
+    /// 1/ratio: motor radians per joint unit.
+    turns: SVector<f64, N>,
 }
 
 /// The part of a substep that a step takes.
@@ -177,6 +179,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             field: None,
             mobility,
             reaction: motors.ratio.component_mul(&mobility),
+            turns: motors.ratio.map(|ratio| 1.0 / ratio),
         })
     }
 
@@ -340,14 +343,14 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
                 (motor, side.mobility * (effort - side.bias))
             }
             Transmission::Rigid => {
-                let push = (torque.component_div(&motors.ratio) - side.bias)
-                    .component_mul(contacts.free());
+                let push =
+                    (torque.component_mul(&self.turns) - side.bias).component_mul(contacts.free());
                 let load = if contacts.any_held() {
                     partly_held(&side.inertia, &push, contacts.free())
                 } else {
                     side.mobility * push
                 };
-                (load.component_div(&motors.ratio), load)
+                (load.component_mul(&self.turns), load)
             }
         }
     }

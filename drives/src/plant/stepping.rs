@@ -33,6 +33,8 @@ pub struct Field<const N: usize> {
     angle: SVector<f64, N>,
     /// How fast the commanded angles move [rad/s].
     speed: SVector<f64, N>,
+    /// Largest torques at those speeds, which are the frequencies that the windings see [N·m].
+    most: SVector<f64, N>,
 }
 
 impl<const N: usize> Field<N> {
@@ -45,7 +47,7 @@ impl<const N: usize> Field<N> {
             torque[row] = teeth;
             if self.powered {
                 let lag = self.angle[row] - angle;
-                let spring = motor.field_torque(motor.pull_out_torque(speed), lag);
+                let spring = motor.field_torque(self.most[row], lag);
                 torque[row] = spring + motor.damping * (self.speed[row] - speed) + teeth;
             }
         }
@@ -111,6 +113,7 @@ impl<const N: usize> Stepping<N> {
             powered: false,
             angle: self.origin,
             speed: SVector::zeros(),
+            most: SVector::from_fn(|row, _| self.motors[row].pull_out_torque(0.0)),
         }
     }
 
@@ -151,6 +154,7 @@ impl<const N: usize> Stepping<N> {
             let (angle, speed) = segment.at(at);
             field.angle[row] = self.origin[row] + self.stepped(row, angle);
             field.speed[row] = speed;
+            field.most[row] = self.motors[row].pull_out_torque(speed);
         }
     }
 
