@@ -6,12 +6,15 @@
 // A benchmark stops where a test would.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+#[path = "../tests/support/loads.rs"]
+mod loads;
+
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use machine::kinematics::{Attitude, Freedom, Joints, ToolMotion};
-use machine::mechanisms::mcm::{McmBranch, McmLoad};
-use machine::mechanisms::polar::{PolarBranch, PolarLoad};
+use machine::mechanisms::mcm::McmBranch;
+use machine::mechanisms::polar::PolarBranch;
 use machine::mechanisms::serial::{JointKind, Link};
 use machine::mechanisms::tri_planar::Legs;
 use machine::mechanisms::{
@@ -176,22 +179,7 @@ fn spatial(criterion: &mut Criterion) {
         singular_radius: 2e-4,
         endless: true,
         branch: PolarBranch::default(),
-        load: PolarLoad {
-            arm_mass: 1.2,
-            arm_center: 0.105,
-            arm_inertia: 0.0095,
-            head_mass: 0.38,
-            head_center: 0.252,
-            head_inertia: 3.2e-4,
-            table_inertia: 0.018,
-            workpiece_mass: 1.1,
-            workpiece_center: 0.004,
-            workpiece_inertia: 0.0026,
-            counterbalance: 2.0,
-            gravity: GRAVITY,
-            viscous: [0.035, 0.05, 6.0],
-            coulomb: [0.06, 0.09, 1.4],
-        },
+        load: loads::POLAR,
         elasticity: None,
     };
     measure(criterion, "polar", polar, [0.4, 1.0, 0.05]);
@@ -202,17 +190,7 @@ fn spatial(criterion: &mut Criterion) {
         reach: [0.1, 0.5],
         singular_distance: 1e-4,
         branch: McmBranch::default(),
-        load: McmLoad {
-            carriage_mass: 9.0,
-            slide_mass: 5.5,
-            table_inertia: 0.031,
-            yoke_inertia: 0.012,
-            head_mass: 2.3,
-            head_center: 0.045,
-            head_inertia: [0.0081, 0.0077, 0.0019],
-            counterbalance: 60.0,
-            gravity: GRAVITY,
-        },
+        load: loads::MCM,
         elasticity: None,
     };
     measure(criterion, "mcm", mcm, [0.3, 0.1, 0.5, 0.6, 0.4]);

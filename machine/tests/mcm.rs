@@ -21,17 +21,7 @@ fn mcm(parameters: &Value) -> Mcm {
         reach: array(&parameters["limits"]["X"]),
         singular_distance: of("v_sing"),
         branch: McmBranch::default(),
-        load: McmLoad {
-            carriage_mass: 9.0,
-            slide_mass: 5.5,
-            table_inertia: 0.031,
-            yoke_inertia: 0.012,
-            head_mass: 2.3,
-            head_center: 0.045,
-            head_inertia: [0.0081, 0.0077, 0.0019],
-            counterbalance: 60.0,
-            gravity: 9.80665,
-        },
+        load: support::loads::MCM,
         elasticity: None,
     }
 }

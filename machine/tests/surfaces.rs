@@ -7,7 +7,7 @@ mod support;
 use machine::deviation::{Deviation, Interpolated, Interpolation, SurfaceCurve};
 use machine::focus::{marginal_travel, paraxial_travel};
 use machine::kinematics::Joints;
-use machine::mechanisms::mcm::{McmBranch, McmLoad};
+use machine::mechanisms::mcm::McmBranch;
 use machine::surface::{
     Cone, Placement, Projection, Shape, Sphere, SphereProjection, Spot, Surface, facing,
 };
@@ -182,17 +182,7 @@ fn mcm() -> Mcm {
         reach: array(&file["params"]["limits"]["X"]),
         singular_distance: of("v_sing"),
         branch: McmBranch::default(),
-        load: McmLoad {
-            carriage_mass: 9.0,
-            slide_mass: 5.5,
-            table_inertia: 0.031,
-            yoke_inertia: 0.012,
-            head_mass: 2.3,
-            head_center: 0.045,
-            head_inertia: [0.0081, 0.0077, 0.0019],
-            counterbalance: 60.0,
-            gravity: 9.80665,
-        },
+        load: support::loads::MCM,
         elasticity: None,
     }
 }

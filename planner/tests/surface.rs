@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
-use machine::mechanisms::mcm::{Mcm, McmBranch, McmLoad};
+#[path = "../../machine/tests/support/loads.rs"]
+mod loads;
+
+use machine::mechanisms::mcm::{Mcm, McmBranch};
 use machine::surface::{Cone, Placement, Projection, Shape, Surface};
 use machine::{Axis, Machine, Mechanism, MechanismKind};
 use nalgebra::{Matrix3, SVector, Vector3};
@@ -31,17 +34,7 @@ fn mechanism() -> Mcm {
         reach: [0.0, 0.4],
         singular_distance: 1e-3,
         branch: McmBranch { side: Some(1), lean: None },
-        load: McmLoad {
-            carriage_mass: 9.0,
-            slide_mass: 5.5,
-            table_inertia: 0.031,
-            yoke_inertia: 0.012,
-            head_mass: 2.3,
-            head_center: 0.045,
-            head_inertia: [0.0081, 0.0077, 0.0019],
-            counterbalance: 60.0,
-            gravity: 9.806_65,
-        },
+        load: loads::MCM,
         elasticity: None,
     }
 }

@@ -5,6 +5,8 @@
 mod chains;
 mod dynamics;
 mod linkages;
+#[path = "../support/loads.rs"]
+mod loads;
 mod sample;
 mod suite;
 mod tables;

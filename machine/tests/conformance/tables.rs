@@ -1,33 +1,18 @@
 //! Machines with a rotary table, and the platform on planar motors.
 
 use machine::kinematics::Joints;
-use machine::mechanisms::mcm::{McmBranch, McmLoad};
-use machine::mechanisms::polar::{PolarBranch, PolarLoad};
+use machine::mechanisms::mcm::McmBranch;
+use machine::mechanisms::polar::PolarBranch;
 use machine::mechanisms::tri_planar::{Fold, Legs, TriPlanar};
 use machine::{Mcm, Mechanism, Polar, Pose};
 use nalgebra::{Rotation3, Vector3};
 
-use super::SCREW;
 use super::suite::conforms;
+use super::{SCREW, loads};
 
 #[test]
 fn the_polar_machine_conforms_on_both_sides() {
-    let load = PolarLoad {
-        arm_mass: 1.2,
-        arm_center: 0.105,
-        arm_inertia: 0.0095,
-        head_mass: 0.38,
-        head_center: 0.252,
-        head_inertia: 3.2e-4,
-        table_inertia: 0.018,
-        workpiece_mass: 1.1,
-        workpiece_center: 0.004,
-        workpiece_inertia: 0.0026,
-        counterbalance: 2.0,
-        gravity: 9.806_65,
-        viscous: [0.035, 0.05, 6.0],
-        coulomb: [0.06, 0.09, 1.4],
-    };
+    let load = loads::POLAR;
     let sides = [None, Some(1), Some(-1)].map(|side| PolarBranch { side, table_turn: None });
     // With the arm as long as the table is far, and with a blind disc.
     for (center_distance, sign) in [(0.25, 1.0), (0.25, -1.0), (0.23, 1.0)] {
@@ -58,17 +43,7 @@ fn the_mcm_conforms_on_both_sides() {
         reach: [0.1, 0.5],
         singular_distance: 1e-4,
         branch: McmBranch::default(),
-        load: McmLoad {
-            carriage_mass: 9.0,
-            slide_mass: 5.5,
-            table_inertia: 0.031,
-            yoke_inertia: 0.012,
-            head_mass: 2.3,
-            head_center: 0.045,
-            head_inertia: [0.0081, 0.0077, 0.0019],
-            counterbalance: 60.0,
-            gravity: 9.806_65,
-        },
+        load: loads::MCM,
         elasticity: Some([SCREW; 5]),
     };
     let sides = [None, Some(1), Some(-1)].map(|side| McmBranch { side, lean: None });

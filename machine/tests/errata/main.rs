@@ -5,6 +5,8 @@
 
 mod five_bar;
 mod listed;
+#[path = "../support/loads.rs"]
+mod loads;
 mod mcm;
 mod polar;
 mod prrrp;

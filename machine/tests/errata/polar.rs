@@ -19,20 +19,11 @@ fn machine() -> Polar {
         endless: true,
         branch: PolarBranch::default(),
         load: PolarLoad {
-            arm_mass: 1.2,
-            arm_center: 0.105,
-            arm_inertia: 0.0095,
-            head_mass: 0.38,
             head_center: 0.23,
-            head_inertia: 3.2e-4,
-            table_inertia: 0.018,
-            workpiece_mass: 1.1,
-            workpiece_center: 0.004,
-            workpiece_inertia: 0.0026,
             counterbalance: 0.0,
-            gravity: 9.806_65,
             viscous: [0.0; 3],
             coulomb: [0.0; 3],
+            ..super::loads::POLAR
         },
         elasticity: None,
     }

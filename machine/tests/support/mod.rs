@@ -3,6 +3,8 @@
 // Each test takes a part of it, and is a crate of its own.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used)]
 
+pub mod loads;
+
 use machine::kinematics::{Attitude, Joints, KinematicsError, ToolMotion};
 use machine::{Mechanism, Pose};
 use nalgebra::{Matrix3, Vector3};
