@@ -196,8 +196,8 @@ impl<'a> Checker<'a> {
 }
 
 /// The share of its torque that the motor of `axis` needs at `speed` [rad/s] by the efficiencies of
-/// its gear, which data sheets give in place of friction: its rotor's part of `effort` [N·m] reaches
-/// no gear.
+/// its gear, which data sheets give in place of friction: its rotor's part of `effort` [N·m],
+/// taken from the joint's acceleration, reaches no gear. Whatever stands is taken to be starting.
 fn sizing(axis: &Axis, effort: f64, acceleration: f64, speed: f64) -> f64 {
     let rotor = axis.motor.rotor_inertia() * acceleration / axis.ratio;
     let speed = if speed.abs() > 1e-9 { speed } else { 0.0 };

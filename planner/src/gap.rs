@@ -3,19 +3,26 @@
 //! A joint is pushed by one flank of its gap or by the other, as the effort on it has it. Where the
 //! effort changes its sign the load coasts, and the motor crosses the gap behind its back: as a
 //! critically damped second-order system would, so that the motor need not jump. It arrives late
-//! by about 2/ω, while the effort that the load lacks is still small.
+//! by about 2/ω. Where the effort changes gently, as under a limit of jerk, the load lacks little of
+//! it by then.
+//!
+//! The side is that of the planned rate. At another rate gravity and inertia weigh differently, and a
+//! load between them may lean on the other flank than the motor stands for.
 
+use crate::demand::torque_and_slew;
 use machine::Axis;
 use machine::kinematics::Joints;
 use machine::transmission::rest;
 use signals::math;
+use signals::time::CYCLE_TIME;
 
 /// Fastest rate of a crossing [rad/s]: with the voltage of a cycle held, quicker ones cannot be
 /// followed.
 const FASTEST: f64 = 700.0;
 
-/// Share of the motor's torque from rest that a crossing may take for its rotor.
-const TORQUE_SHARE: f64 = 0.2;
+/// Shares of the motor's torque from rest, and of the torque that its voltage builds up in a cycle,
+/// that the start of a crossing may take for the rotor.
+const SHARES: [f64; 2] = [0.2, 0.25];
 
 /// Where the motors stand in their gaps.
 #[derive(Debug, Clone)]
@@ -38,9 +45,11 @@ impl<const N: usize> Gaps<N> {
         let half = Joints::from_fn(|index, _| axes[index].backlash / 2.0);
         let rate = Joints::from_fn(|index, _| {
             let axis = &axes[index];
-            let rotor = axis.motor.stall_torque() / axis.motor.rotor_inertia() * axis.ratio;
+            let [torque, slew] = torque_and_slew(&axis.motor);
+            let torque = (SHARES[0] * torque).min(SHARES[1] * slew * CYCLE_TIME);
             // A step of the whole backlash b starts with an acceleration of b·ω².
-            (TORQUE_SHARE * rotor / axis.backlash).sqrt().min(FASTEST)
+            let acceleration = torque / axis.motor.rotor_inertia() * axis.ratio;
+            (acceleration / axis.backlash).sqrt().min(FASTEST)
         });
         let value =
             Joints::from_fn(|index, _| rest::side(&axes[index], effort[index]) * half[index]);

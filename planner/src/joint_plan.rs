@@ -129,16 +129,26 @@ fn parts<const N: usize, M: Mechanism<N>>(
     divide(demands, near, (stops, found.stop), speeds, axis)
 }
 
-/// A note where strokes are marked in parts.
-fn notes_of_parts(asked: &[Stop], gone: Option<&[Stop]>) -> Option<Note> {
-    let gone = gone?;
-    let first = asked.iter().zip(gone).find(|(one, other)| one != other)?.0;
-    let text = format!(
-        "marked in parts, {} more than strokes are drawn: between them an axis is turned back in the \
-         dark, whose travel is less than the stroke winds up",
-        gone.len() - asked.len()
-    );
-    Some(Note { line: first.line, text })
+/// A note for each stroke that is marked in parts.
+fn notes_of_parts(asked: &[Stop], gone: Option<&[Stop]>) -> Vec<Note> {
+    let Some(gone) = gone else { return Vec::new() };
+    let mut notes = Vec::new();
+    let mut rest = gone;
+    for (index, stop) in asked.iter().enumerate() {
+        let next = asked.get(index + 1);
+        let is_part = |found: &&Stop| Some(*found) != next && found.line == stop.line;
+        let parts =
+            if rest.first() == Some(stop) { 1 } else { rest.iter().take_while(is_part).count() };
+        if parts > 1 {
+            let text = format!(
+                "marked in {parts} parts: between them an axis is turned back in the dark, whose travel \
+                 is less than the stroke winds up"
+            );
+            notes.push(Note { line: stop.line, text });
+        }
+        rest = &rest[parts.min(rest.len())..];
+    }
+    notes
 }
 
 fn refusal(machine: &Machine, found: NoWay) -> PlanError {

@@ -14,6 +14,9 @@ const GENTLE: f64 = 0.2;
 /// Curves that meet within this distance are taken to meet [m].
 pub(crate) const GAP: f64 = 1e-8;
 
+/// Share of a curve that is not left as a part of its own where a line is divided.
+const SLIVER: f64 = 0.1;
+
 /// Curves that are marked in one go, with the same speed asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outline {
@@ -100,11 +103,32 @@ impl Outline {
         self.end()
     }
 
+    /// `cut`, or the end of its curve where that is nearer than a tenth of the curve: a short rest of
+    /// one would leave no room to smooth the join at it, and slow all of its part.
+    fn beside_joins(&self, cut: f64) -> f64 {
+        let mut from = 0.0;
+        for track in &self.tracks {
+            let end = from + track.length();
+            if cut < end {
+                let near = SLIVER * track.length();
+                return match (cut - from < near, end - cut < near) {
+                    (true, _) => from,
+                    (false, true) => end,
+                    (false, false) => cut,
+                };
+            }
+            from = end;
+        }
+        cut
+    }
+
     /// The same line in parts that begin at the start and at each of `cuts`, growing distances from
     /// it [m], and go on into each other.
     pub(crate) fn divided(&self, cuts: &[f64], limits: &PathLimits) -> Vec<Self> {
         let mut parts: Vec<Self> = Vec::with_capacity(cuts.len() + 1);
-        let mut cuts = cuts.iter().copied().filter(|cut| (GAP..self.length - GAP).contains(cut));
+        let mut cuts: Vec<f64> = cuts.iter().map(|cut| self.beside_joins(*cut)).collect();
+        cuts.dedup();
+        let mut cuts = cuts.into_iter().filter(|cut| (GAP..self.length - GAP).contains(cut));
         let mut next = cuts.next();
         let mut begins = true;
         let mut from = 0.0;
@@ -117,12 +141,12 @@ impl Outline {
                 // A cut at a join leaves nothing of the curve before it.
                 if to - here > GAP {
                     let part = track.part(here - from, to - from);
-                    match parts.last_mut().filter(|_| !begins) {
-                        // What went on into each other in the whole does so in a part.
-                        Some(last) => {
-                            last.extend(part, *power, -1.0, limits.tolerance);
-                        }
-                        None => parts.push(Self::new(part, self.speed, *power, self.line)),
+                    // What went on into each other in the whole does so in a part.
+                    let goes_on = parts.last_mut().filter(|_| !begins).is_some_and(|last| {
+                        last.extend(part.clone(), *power, -1.0, limits.tolerance)
+                    });
+                    if !goes_on {
+                        parts.push(Self::new(part, self.speed, *power, self.line));
                     }
                     begins = false;
                 }

@@ -11,7 +11,7 @@ use crate::trajectory::{Course, Trajectory};
 /// How much slower a stroke or a move that breaks a limit is tried again.
 const SLOWER: f64 = 0.85;
 
-/// How often one stroke or move after the other is slowed, and how often after that all of them.
+/// How often in a job what breaks a limit is slowed alone, and how often after that everything is.
 const TRIALS: [u32; 2] = [24, 24];
 
 /// The retries of one job.

@@ -13,9 +13,11 @@ use crate::route::Speeds;
 /// Share of a table's travel that one part winds up; the rest is for the ways into it and out of it.
 const TRAVEL: f64 = 0.85;
 
-/// A part that winds up less than this share of the travel is not divided any more, and one that is
-/// divided becomes parts of at most so much of the whole.
-const LEAST: [f64; 2] = [0.5, 0.6];
+/// A part that winds up less than this share of the travel is not divided any more.
+const LEAST: f64 = 0.5;
+
+/// What one part has at most of a stroke that is divided.
+const LARGEST: f64 = 0.6;
 
 /// Pieces of a stroke that are looked at one by one: it is divided between two of them.
 const PIECES: usize = 512;
@@ -39,7 +41,7 @@ pub(crate) fn divide<const N: usize, M: Mechanism<N>>(
         return None;
     }
     let cuts = (0..demands.branches.len())
-        .find_map(|branch| cuts(demands, near, outline, (axis, branch), travel).ok())??;
+        .find_map(|branch| cuts(demands, near, outline, (axis, branch), travel).ok().flatten())?;
     let parts = outline.divided(&cuts, &demands.path);
     let strokes_before =
         stops[..index].iter().filter(|stop| matches!(stop.item, Item::Stroke(_))).count();
@@ -89,10 +91,10 @@ fn cuts<const N: usize, M: Mechanism<N>>(
         upper - lower
     };
     let whole = range(&looks);
-    if whole < LEAST[0] * travel {
+    if whole < LEAST * travel {
         return Ok(None);
     }
-    let parts = (whole / (TRAVEL * travel).min(LEAST[1] * whole)).ceil();
+    let parts = (whole / (TRAVEL * travel).min(LARGEST * whole)).ceil();
     // A little more than an even share, so that rounding makes no part more.
     let usable = whole / parts * (1.0 + 2.0 / PIECES as f64);
     let mut cuts = Vec::new();

@@ -227,7 +227,7 @@ fn a_table_at_the_end_of_its_travel_is_unwound_in_the_dark() {
     for sample in &samples {
         assert!(sample.position[1].abs() <= TRAVEL * TAU + 1e-9);
     }
-    assert!(plan.facts.notes.iter().any(|note| note.line == 9 && note.text.contains("in parts")));
+    assert!(plan.facts.notes.iter().any(|note| note.line == 9 && note.text.contains("in 2 parts")));
     // An arm is no table: what it does not reach is refused.
     let far = line(at(0.09, 0.02), at(0.09, -0.02), 0.05);
     let mut narrow = machine.clone();

@@ -324,7 +324,7 @@ fn a_spiral_of_more_turns_than_the_table_has_is_unwound_in_the_dark() {
         assert!(gap.norm() < 1e-12, "the parts are {} m apart", gap.norm());
     }
     assert!((plan.facts.length - endless.facts.length).abs() < 1e-9);
-    assert!(plan.facts.notes.iter().any(|note| note.line == 7 && note.text.contains("in parts")));
+    assert!(plan.facts.notes.iter().any(|note| note.line == 7 && note.text.contains("in 4 parts")));
 
     let mut dark_speed: f64 = 0.0;
     let mut before: Option<Setpoint> = None;

@@ -1,9 +1,9 @@
 //! Backlash: what a motor turns before its load feels it.
 //!
 //! Each joint's transmission is a spring behind a gap. In the gap it carries nothing; beyond, it is
-//! wound by what is left of the way. Where stiffness couples the joints, as crossed belts do, the
-//! ends of the springs stand inside their gaps where the springs hold the least energy, which is
-//! where a spring whose end lies free carries nothing.
+//! wound by what is left of the way. Springs that couple the joints pull at each other's ends: each
+//! end then stands at that place in its gap at which all of them together hold the least energy. An
+//! end that touches neither side carries nothing there.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -27,7 +27,8 @@ pub fn wound<const N: usize>(
             let own = stiffness[(joint, joint)];
             let others = (stiffness.row(joint) * wound)[0] - own * wound[joint];
             let (from, to) = (ahead[joint] - half[joint], ahead[joint] + half[joint]);
-            wound[joint] = (-others / own).clamp(from, to);
+            // Not `clamp`, which panics at bounds that are no numbers.
+            wound[joint] = (-others / own).max(from).min(to);
         }
         if wound == before {
             break;

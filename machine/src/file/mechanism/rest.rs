@@ -1,5 +1,6 @@
 //! Whether a machine may rest where `home_axes` says: the tool in its area, and the mechanism away from
-//! its singularities and collisions. The axes' own limits are compared with their home beside them.
+//! its singularities, of either kind, and collisions: joints may pass some of them, but none is a place
+//! to wait at. The axes' own limits are compared with their home beside them.
 
 use crate::document::{Findings, Quantity};
 use crate::kinematics::Mechanism;
