@@ -443,6 +443,8 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
 
 /// Effort on the joints where motors are `ahead` and `faster` by so much across gaps of `half` to
 /// either side: none where a gap is open, and never one that pulls the motor's flank along.
+#[cold]
+#[inline(never)] // Its loop in every stage would cost the machines that have no backlash.
 fn across_gaps<const N: usize>(
     stiffness: &SMatrix<f64, N, N>,
     damping: &SMatrix<f64, N, N>,

@@ -14,7 +14,6 @@ const ROUNDS: usize = 60;
 /// units], each with a gap of `half` a backlash to either side, and springs of `stiffness`.
 ///
 /// `stiffness` must be positive definite, as that of a transmission is.
-#[inline]
 pub fn wound<const N: usize>(
     stiffness: &SMatrix<f64, N, N>,
     ahead: &SVector<f64, N>,
