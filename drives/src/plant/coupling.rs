@@ -188,15 +188,16 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
         Ok(())
     }
 
-    /// The load side at the share `at` of the substep begun.
+    /// The load side at the share `at` of the substep begun. Its inertia, which only joints with a held
+    /// motor ask for, is that of the middle unless it is `wanted`.
     #[inline(always)] // Called in every stage.
-    pub(super) fn at(&self, at: f64) -> LoadSide<N> {
+    pub(super) fn at(&self, at: f64, wanted: bool) -> LoadSide<N> {
         let Law::Varying { needs_inertia } = self.law else { return self.middle };
         let from = at - 0.5;
         let square = from * from;
         let (middle, slope, curvature) = (&self.middle, &self.slope, &self.curvature);
         LoadSide {
-            inertia: if needs_inertia {
+            inertia: if needs_inertia && wanted {
                 middle.inertia + slope.inertia * from + curvature.inertia * square
             } else {
                 middle.inertia

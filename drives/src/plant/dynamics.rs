@@ -274,7 +274,8 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         if self.coupling.is_constant() {
             return;
         }
-        let (_, acceleration) = self.accelerations(state, contacts, &self.coupling.at(1.0));
+        let (_, acceleration) =
+            self.accelerations(state, contacts, &self.coupling.at(1.0, contacts.any_held()));
         self.coupling.end(&state.load, &state.load_speed, &acceleration);
     }
 
@@ -288,7 +289,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
                 shaft - motors.ratio.component_mul(&self.transmitted(state))
             }
             Transmission::Rigid => {
-                let side = self.coupling.at(at);
+                let side = self.coupling.at(at, true);
                 let (_, load) = self.accelerations(state, contacts, &side);
                 // A held motor bears what the others' acceleration puts on its joint.
                 let load_side = side.inertia * load + side.bias;
@@ -382,9 +383,10 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
              speed: &SVector<f64, N>| {
                 course.as_ref().map_or_else(SVector::zeros, |course| value(course, weights, speed))
             };
-        let side = self.coupling.at(part.from);
-        let halfway = self.coupling.at(part.from + 0.5 * part.length);
-        let last = self.coupling.at(part.end());
+        let holds = contacts.any_held();
+        let side = self.coupling.at(part.from, holds);
+        let halfway = self.coupling.at(part.from + 0.5 * part.length, holds);
+        let last = self.coupling.at(part.end(), holds);
         let mut first = *start;
         if course.is_none() {
             first.current = SVector::zeros();
