@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use machine::Mechanism;
 use machine::kinematics::{
     Attitude, Branch, JointMotion, Joints, KinematicsError, Pose, ToolMotion,
@@ -9,19 +11,7 @@ use machine::kinematics::{
 use machine::mechanisms::tri_planar::{Fold, Legs, TriPlanar};
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 use serde_json::Value;
-
-fn golden() -> Value {
-    read("tri_planar")
-}
-
-fn read(name: &str) -> Value {
-    let path = format!("{}/../tests/golden/{name}.json", env!("CARGO_MANIFEST_DIR"));
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap()
-}
+use support::{golden, number};
 
 fn list<const N: usize>(value: &Value) -> [f64; N] {
     core::array::from_fn(|index| number(&value[index]))
@@ -161,7 +151,7 @@ fn golden_case(mechanism: &TriPlanar, case: &Value, tolerance: f64, fk_tolerance
 
 #[test]
 fn it_agrees_with_the_golden_vectors() {
-    let golden = golden();
+    let golden = golden("tri_planar");
     let mechanism = mechanism(&golden["params"]);
     let tolerance = number(&golden["tolerance"]);
     let fk_tolerance = number(&golden["fk_tolerance"]);
@@ -206,7 +196,7 @@ fn it_agrees_with_the_golden_vectors() {
 
 #[test]
 fn it_refuses_what_the_golden_vectors_refuse() {
-    let golden = golden();
+    let golden = golden("tri_planar");
     let mut count = 0;
     for failing in golden["failing"].as_array().unwrap() {
         let mut params = golden["params"].clone();
@@ -232,7 +222,7 @@ fn refusal(mechanism: &TriPlanar, pose: &Pose, branch: Legs) -> KinematicsError 
 
 #[test]
 fn it_says_which_limit_and_by_how_much() {
-    let mechanism = mechanism(&golden()["params"]);
+    let mechanism = mechanism(&golden("tri_planar")["params"]);
     let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
     let outward = Legs::default();
     let level = |x, y, z| Pose::at(Vector3::new(x, y, z * height));
@@ -307,7 +297,7 @@ impl Random {
 
 #[test]
 fn feet_and_pose_lead_to_each_other_over_the_working_range() {
-    let mechanism = mechanism(&golden()["params"]);
+    let mechanism = mechanism(&golden("tri_planar")["params"]);
     let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     let mut counts = [0; 2];
@@ -406,7 +396,7 @@ fn courses(mechanism: &TriPlanar, branch: Legs, count: usize) -> Vec<Course> {
 
 #[test]
 fn every_derivative_of_the_joints_is_that_of_the_one_below() {
-    let mechanism = mechanism(&golden()["params"]);
+    let mechanism = mechanism(&golden("tri_planar")["params"]);
     let mixed = Legs([Fold::Outward, Fold::Inward, Fold::Outward]);
     for branch in [Legs::default(), mixed] {
         for course in courses(&mechanism, branch, 200) {
@@ -476,7 +466,7 @@ fn energy(mechanism: &TriPlanar, branch: Legs, course: &Course, time: f64) -> (f
 
 #[test]
 fn power_into_the_feet_is_the_change_of_energy() {
-    let mechanism = mechanism(&golden()["params"]);
+    let mechanism = mechanism(&golden("tri_planar")["params"]);
     let mixed = Legs([Fold::Outward, Fold::Outward, Fold::Inward]);
     for branch in [Legs::default(), mixed] {
         for course in courses(&mechanism, branch, 200) {
@@ -511,7 +501,7 @@ fn power_into_the_feet_is_the_change_of_energy() {
 /// of it: `Ṁ·q̇ − ∂T/∂q + ∂V/∂q`.
 #[test]
 fn the_bias_is_that_of_lagrange() {
-    let mechanism = mechanism(&golden()["params"]);
+    let mechanism = mechanism(&golden("tri_planar")["params"]);
     let branch = Legs::default();
     for course in courses(&mechanism, branch, 100) {
         let context = &format!("{:?}", course.tool);
@@ -537,7 +527,7 @@ fn the_bias_is_that_of_lagrange() {
 
 #[test]
 fn a_level_load_spreads_the_feet_by_a_third_of_it_over_tan_omega() {
-    let massless = TriPlanar { leg_mass: 0.0, ..mechanism(&golden()["params"]) };
+    let massless = TriPlanar { leg_mass: 0.0, ..mechanism(&golden("tri_planar")["params"]) };
     let height = massless.side * 3.0_f64.sqrt() / 2.0;
     for share in [0.3, 0.5, 0.7, 0.9] {
         let pose = Pose::at(Vector3::new(0.1, -0.05, share * height));
@@ -557,9 +547,9 @@ fn a_level_load_spreads_the_feet_by_a_third_of_it_over_tan_omega() {
 /// Against a rigid-body library that knows nothing of these equations; the file says how.
 #[test]
 fn its_dynamics_are_those_of_an_independent_library() {
-    let vectors = read("independent_tri_planar");
+    let vectors = golden("independent_tri_planar");
     let tolerance = number(&vectors["tolerance"]);
-    let template = unlimited(&mechanism(&golden()["params"]));
+    let template = unlimited(&mechanism(&golden("tri_planar")["params"]));
     let mut count = 0;
     for machine in vectors["machines"].as_array().unwrap() {
         let params = &machine["params"];

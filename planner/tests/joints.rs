@@ -10,7 +10,7 @@ use machine::{Axis, Machine, MechanismKind};
 use nalgebra::Vector3;
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
 use planner::trajectory::Course;
-use planner::{Job, Marking, Plan, PlanError, plan};
+use planner::{Job, Plan, PlanError, plan};
 use signals::Setpoint;
 
 const ARM: f64 = 0.2;
@@ -90,16 +90,7 @@ fn line(from: Vector3<f64>, to: Vector3<f64>, speed: f64) -> [Step; 2] {
 
 fn job(machine: &Machine, steps: Vec<Step>) -> Job {
     let start = Vector3::from(machine.home);
-    Job {
-        drawing: Drawing { name: "test".to_owned(), start, steps, notes: Vec::new() },
-        marking: Marking::default(),
-        rapid: None,
-        program: None,
-        ideal_only: None,
-        standing: None,
-        surface: None,
-        attitude: planner::attitude::AttitudeLaw::Level,
-    }
+    Job::of(Drawing { name: "test".to_owned(), start, steps, notes: Vec::new() })
 }
 
 /// The plan, with every sample the derivative of the one before: joints, and the tool's speed.

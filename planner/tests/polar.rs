@@ -12,7 +12,7 @@ use planner::drawing::{Action, Curve, Drawing, Power, Step};
 use planner::job::cloud::Cloud;
 use planner::profile::Move;
 use planner::trajectory::Course;
-use planner::{Job, Marking, Plan, plan};
+use planner::{Job, Plan, plan};
 use signals::{Setpoint, math};
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -31,22 +31,9 @@ fn wound(turns: f64) -> Machine {
     machine
 }
 
-fn job(drawing: Drawing) -> Job {
-    Job {
-        drawing,
-        marking: Marking::default(),
-        rapid: None,
-        program: None,
-        ideal_only: None,
-        standing: None,
-        surface: None,
-        attitude: planner::attitude::AttitudeLaw::Level,
-    }
-}
-
 fn drawn(machine: &Machine, steps: Vec<Step>) -> Job {
     let start = Vector3::from(machine.home);
-    job(Drawing { name: "test".to_owned(), start, steps, notes: Vec::new() })
+    Job::of(Drawing { name: "test".to_owned(), start, steps, notes: Vec::new() })
 }
 
 fn planned(machine: &Machine, job: &Job) -> Plan {
@@ -111,7 +98,7 @@ fn ten_thousand_points_are_marked_once_each_in_their_order() {
         from: 0,
     };
     let home = Vector3::from(machine.home);
-    let plan = planned(&machine, &job(cloud.draw("bust", &points, 0.8, home, 1)));
+    let plan = planned(&machine, &Job::of(cloud.draw("bust", &points, 0.8, home, 1)));
     assert_eq!(plan.facts.strokes, COUNT);
 
     // Every point once: as sets they are the same.

@@ -11,7 +11,7 @@ use machine::{Axis, Machine, Mechanism, MechanismKind};
 use nalgebra::{Matrix3, SVector, Vector3};
 use planner::attitude::{AttitudeLaw, turned};
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
-use planner::{Job, Marking, PlanError, plan};
+use planner::{Job, PlanError, plan};
 
 const RADIUS: f64 = 0.03;
 
@@ -135,19 +135,13 @@ fn line_through_upright(machine: &Machine) -> Job {
     let power = Power { level: 1.0, follows_speed: false };
     let action = Action::Mark { curve, speed: Some(0.02), power };
     Job {
-        drawing: Drawing {
+        attitude: AttitudeLaw::Following { center, gradient: 10.0, base: Matrix3::identity() },
+        ..Job::of(Drawing {
             name: "upright".to_owned(),
             start: Vector3::from(machine.home),
             steps: vec![Step { action, line: 4 }],
             notes: Vec::new(),
-        },
-        marking: Marking::default(),
-        rapid: None,
-        program: None,
-        ideal_only: None,
-        standing: None,
-        surface: None,
-        attitude: AttitudeLaw::Following { center, gradient: 10.0, base: Matrix3::identity() },
+        })
     }
 }
 

@@ -9,7 +9,7 @@ use machine::{Machine, Override};
 use nalgebra::Vector3;
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
 use planner::trajectory::{Course, Trajectory};
-use planner::{Job, Marking, MarkingSpeed, Plan, PlanError, plan};
+use planner::{Job, MarkingSpeed, Plan, PlanError, plan};
 use signals::setpoint::flags;
 
 /// splitmix64, so that a failing seed can be run again.
@@ -45,16 +45,7 @@ fn job(steps: Vec<Step>, machine: &Machine) -> Job {
         steps,
         notes: Vec::new(),
     };
-    Job {
-        drawing,
-        marking: Marking::default(),
-        rapid: None,
-        program: None,
-        ideal_only: None,
-        standing: None,
-        surface: None,
-        attitude: planner::attitude::AttitudeLaw::Level,
-    }
+    Job::of(drawing)
 }
 
 /// An arc that starts at `from` with the direction `heading`, and the point and heading it ends with.

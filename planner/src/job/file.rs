@@ -15,7 +15,6 @@ use super::letters::{self, Letter, Style};
 use super::path_table::{self, PathTable};
 use super::workpiece_table::{self, AttitudeTable, SurfaceTable};
 use super::{Job, JobError, Marking, MarkingSpeed, gcode, points};
-use crate::attitude::AttitudeLaw;
 use crate::drawing::{Drawing, Power};
 
 table! {
@@ -307,16 +306,7 @@ fn of_program(
 }
 
 fn job_of(drawing: Drawing, marking: &MarkingTable) -> Job {
-    Job {
-        drawing,
-        marking: how(marking),
-        rapid: None,
-        program: None,
-        ideal_only: None,
-        standing: None,
-        surface: None,
-        attitude: AttitudeLaw::Level,
-    }
+    Job { marking: how(marking), ..Job::of(drawing) }
 }
 
 fn how(table: &MarkingTable) -> Marking {

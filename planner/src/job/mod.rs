@@ -41,6 +41,22 @@ pub struct Job {
     pub attitude: crate::attitude::AttitudeLaw,
 }
 
+impl Job {
+    /// Marks `drawing` as the machine file has it: flat, with a level tool, from home.
+    pub fn of(drawing: Drawing) -> Self {
+        Self {
+            drawing,
+            marking: Marking::default(),
+            rapid: None,
+            program: None,
+            ideal_only: None,
+            standing: None,
+            surface: None,
+            attitude: crate::attitude::AttitudeLaw::Level,
+        }
+    }
+}
+
 /// How a job wants its lines marked; what is `None` the machine file's `[path]` table rules.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Marking {
