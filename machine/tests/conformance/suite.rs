@@ -78,6 +78,9 @@ fn positions<const N: usize, M: Mechanism<N>>(
     // The short ways lead to the same: to the bit, and to where an iteration ends.
     let solved = mechanism.assemble(&found, branch, None).unwrap();
     assert_eq!(back, mechanism.pose(&solved), "{context}");
+    let along = mechanism.locate(&beside, branch, Some(&solved));
+    let assembled = mechanism.assemble(&beside, branch, Some(&solved));
+    assert_eq!(along, assembled.map(|chain| mechanism.pose(&chain)), "{context}");
     let known = mechanism.assemble_at(pose, &found, branch, None).unwrap();
     near(distance(Freedom::Pose, &mechanism.pose(&known), &back), 0.0, 2e-12, 1.0, context);
     let again = mechanism.inverse(&back, branch, &found).unwrap();

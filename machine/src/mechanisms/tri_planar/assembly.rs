@@ -6,7 +6,7 @@ use nalgebra::{
 use signals::math;
 
 use super::struts::{CLOSED, State, Struts, invert, struts};
-use super::{Fold, Legs, OUTWARD, TriPlanar, dynamics};
+use super::{Fold, Legs, OUTWARD, TriPlanar};
 use crate::kinematics::{Jacobian, Joints, KinematicsError, Pose};
 
 /// A leg in an assembly; vectors in the machine frame.
@@ -41,8 +41,6 @@ pub struct TriPlanarAssembly {
     pub(super) legs: [Leg; 3],
     /// Twist of the platform per rate of the feet.
     pub(super) jacobian: Jacobian<6>,
-    pub(super) mass: SMatrix<f64, 6, 6>,
-    pub(super) gravity: Joints<6>,
     state: State,
     /// Inverse of the matrix of the struts, for the next solution near by.
     pub(super) loosened: SMatrix<f64, 6, 6>,
@@ -108,63 +106,34 @@ const LEVELS: [f64; 8] = [0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 0.97];
 /// Tangent of half the tilt of further starts, about 25°.
 const TILT: f64 = 0.22;
 
-/// Closes the chain at `q`.
-///
-/// Of the poses that close it, one has all corners above the stator (source 001), the platform not
-/// turned upside down; it is accepted if its legs lean as `branch` says, and nothing else is. Past
-/// 45° of tilt, and where legs of both kinds are mixed, there may be a second one: a cold start
-/// takes what Newton's method reaches from level, and an assembly near by goes on as it is.
+/// Closes the chain at `q`, as [`find`] says.
 ///
 /// # Errors
-/// `no_assembly` where no start leads to such a pose.
+/// `no_assembly` where no start leads to such a pose, or the platform has no stiffness in it.
 pub(super) fn assemble(
     mechanism: &TriPlanar,
     q: &Joints<6>,
     branch: Legs,
     near: Option<&TriPlanarAssembly>,
 ) -> Result<TriPlanarAssembly, KinematicsError> {
-    let (centroid, equations) = equations(mechanism, q);
-    let accept = |state: &State| complete(&equations, state, q, &centroid, branch);
-    if let Some(near) = near {
-        let start = State {
-            position: near.position - Vector3::new(centroid.x, centroid.y, 0.0),
-            ..near.state
-        };
-        let found = equations
-            .follow(start, &near.loosened)
-            .or_else(|| equations.solve(start))
-            .filter(|found| found.attitude.coords.dot(&start.attitude.coords).abs() > NEARBY);
-        // Handed on as it is: an assembly is worth copying once only.
-        if let Some(done) = found.as_ref().map(accept)
-            && done.is_ok()
-        {
-            return done;
-        }
-    }
+    let feet = Feet::of(mechanism, q);
+    find(&feet, branch, near, |stance| complete(&feet, stance, q))
+}
 
-    let mut starts = LEVELS.map(|level| {
-        let start = equations.level(level, branch);
-        (equations.residual(&start).norm(), start)
-    });
-    starts.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
-    for (_, start) in &starts {
-        if let Some(Ok(found)) = equations.solve(*start).as_ref().map(accept) {
-            return Ok(found);
-        }
-    }
-    for (_, start) in &starts {
-        for [x, y] in OUTWARD {
-            for tilt in [TILT, -TILT] {
-                let turn = Quaternion::new(1.0, x * tilt, y * tilt, 0.0);
-                let attitude = UnitQuaternion::new_normalize(turn * start.attitude.into_inner());
-                let start = State { attitude, ..*start };
-                if let Some(Ok(found)) = equations.solve(start).as_ref().map(accept) {
-                    return Ok(found);
-                }
-            }
-        }
-    }
-    Err(no_assembly(starts[0].0))
+/// The pose of [`assemble`].
+///
+/// # Errors
+/// `no_assembly` where no start leads to it.
+pub(super) fn locate(
+    mechanism: &TriPlanar,
+    q: &Joints<6>,
+    branch: Legs,
+    near: Option<&TriPlanarAssembly>,
+) -> Result<Pose, KinematicsError> {
+    let feet = Feet::of(mechanism, q);
+    find(&feet, branch, near, |stance| {
+        Ok(Pose { position: feet.position(&stance.state), rotation: stance.rotation })
+    })
 }
 
 /// The chain at `q` where `pose` is known to close it, to the rounding of both; `None` if it does not.
@@ -174,24 +143,114 @@ pub(super) fn assemble_at(
     q: &Joints<6>,
     branch: Legs,
 ) -> Option<TriPlanarAssembly> {
-    let (centroid, equations) = equations(mechanism, q);
+    let feet = Feet::of(mechanism, q);
     let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
     let start = State {
-        position: pose.position - Vector3::new(centroid.x, centroid.y, 0.0),
+        position: pose.position - feet.centroid,
         attitude: UnitQuaternion::from_rotation_matrix(&rotation),
     };
-    let found = equations.solve(start)?;
+    let found = feet.equations.solve(start)?;
     // A singular pose might lead elsewhere.
     let stays = found.attitude.coords.dot(&start.attitude.coords).abs() > NEARBY;
-    if stays { complete(&equations, &found, q, &centroid, branch).ok() } else { None }
+    if stays { complete(&feet, &stand(&feet, &found, branch)?, q).ok() } else { None }
 }
 
-/// The centroid of the feet `q`, and the equations of the struts counted from there: so rounding
-/// does not grow with the size of the stator.
-fn equations<'a>(mechanism: &'a TriPlanar, q: &Joints<6>) -> (Vector2<f64>, Struts<'a>) {
-    let centroid = Vector2::new(q[0] + q[2] + q[4], q[1] + q[3] + q[5]) / 3.0;
-    let feet = Joints::from_fn(|row, _| q[row] - centroid[row % 2]);
-    (centroid, Struts { mechanism, feet })
+/// Where the feet are.
+struct Feet<'a> {
+    /// The equations of the struts, counted from the centroid: so rounding does not grow with the
+    /// size of the stator.
+    equations: Struts<'a>,
+    /// The centroid, in the machine frame [m].
+    centroid: Vector3<f64>,
+}
+
+impl<'a> Feet<'a> {
+    fn of(mechanism: &'a TriPlanar, q: &Joints<6>) -> Self {
+        let centroid = Vector2::new(q[0] + q[2] + q[4], q[1] + q[3] + q[5]) / 3.0;
+        let feet = Joints::from_fn(|row, _| q[row] - centroid[row % 2]);
+        Self {
+            equations: Struts { mechanism, feet },
+            centroid: Vector3::new(centroid.x, centroid.y, 0.0),
+        }
+    }
+
+    /// The platform's centroid in the machine frame [m].
+    fn position(&self, state: &State) -> Vector3<f64> {
+        state.position + self.centroid
+    }
+}
+
+/// A solved pose that the machine can stand in.
+struct Stance {
+    state: State,
+    rotation: Matrix3<f64>,
+    /// From the centroid to the corners [m].
+    arms: [Vector3<f64>; 3],
+    legs: [Leg; 3],
+}
+
+/// What `accept` makes of the pose that closes the chain.
+///
+/// Of the poses that close it, one has all corners above the stator (source 001), the platform not
+/// turned upside down; it is accepted if its legs lean as `branch` says, and nothing else is. Past
+/// 45° of tilt, and where legs of both kinds are mixed, there may be a second one: a cold start
+/// takes what Newton's method reaches from level, and an assembly near by goes on as it is.
+///
+/// # Errors
+/// `no_assembly` where no start leads to such a pose.
+#[inline(always)] // What it finds would be copied on the way out.
+fn find<T>(
+    feet: &Feet<'_>,
+    branch: Legs,
+    near: Option<&TriPlanarAssembly>,
+    accept: impl Fn(&Stance) -> Result<T, KinematicsError>,
+) -> Result<T, KinematicsError> {
+    if let Some(near) = near {
+        let start = State { position: near.position - feet.centroid, ..near.state };
+        let found = feet
+            .equations
+            .follow(start, &near.loosened)
+            .or_else(|| feet.equations.solve(start))
+            .filter(|found| found.attitude.coords.dot(&start.attitude.coords).abs() > NEARBY);
+        if let Some(stance) = found.and_then(|found| stand(feet, &found, branch)) {
+            let done = accept(&stance);
+            if done.is_ok() {
+                return done;
+            }
+        }
+    }
+    let stance = search(feet, branch)?;
+    accept(&stance)
+}
+
+/// The stance that Newton's method reaches first from level and tilted starts, the best ahead.
+#[cold]
+#[inline(never)]
+fn search(feet: &Feet<'_>, branch: Legs) -> Result<Stance, KinematicsError> {
+    let equations = &feet.equations;
+    let reach = |start| stand(feet, &equations.solve(start)?, branch);
+    let mut starts = LEVELS.map(|level| {
+        let start = equations.level(level, branch);
+        (equations.residual(&start).norm(), start)
+    });
+    starts.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
+    for (_, start) in &starts {
+        if let Some(stance) = reach(*start) {
+            return Ok(stance);
+        }
+    }
+    for (_, start) in &starts {
+        for [x, y] in OUTWARD {
+            for tilt in [TILT, -TILT] {
+                let turn = Quaternion::new(1.0, x * tilt, y * tilt, 0.0);
+                let attitude = UnitQuaternion::new_normalize(turn * start.attitude.into_inner());
+                if let Some(stance) = reach(State { attitude, ..*start }) {
+                    return Ok(stance);
+                }
+            }
+        }
+    }
+    Err(no_assembly(starts[0].0))
 }
 
 /// The failure, with the best start's residual.
@@ -224,36 +283,36 @@ fn leg(equations: &Struts<'_>, state: &State, rotation: &Matrix3<f64>, index: us
     Leg { middle, hinge, shank, normal, turn }
 }
 
-/// Everything else that follows from a solved pose, if it is the one that the machine stands in: see
-/// [`assemble`].
-///
-/// # Errors
-/// `no_assembly` where it is not, or the platform has no stiffness.
-fn complete(
-    equations: &Struts<'_>,
-    state: &State,
-    q: &Joints<6>,
-    centroid: &Vector2<f64>,
-    branch: Legs,
-) -> Result<TriPlanarAssembly, KinematicsError> {
-    let mechanism = equations.mechanism;
+/// The stance of a solved pose, if it is the one that the machine stands in: see [`find`].
+fn stand(feet: &Feet<'_>, state: &State, branch: Legs) -> Option<Stance> {
+    let equations = &feet.equations;
     let rotation = state.attitude.to_rotation_matrix().into_inner();
-    let arms = mechanism.arms(&rotation);
+    let arms = equations.mechanism.arms(&rotation);
     let above = |arm: &Vector3<f64>| arm.z + state.position.z > 0.0;
     if !(rotation[(2, 2)] > 0.0 && above(&arms[0]) && above(&arms[1]) && above(&arms[2])) {
-        return Err(no_assembly(0.0));
+        return None;
     }
     let leg = |index: usize| leg(equations, state, &rotation, index);
     let legs = [leg(0), leg(1), leg(2)];
-    for (leg, fold) in legs.iter().zip(branch.0) {
-        if leg.normal.z.abs() > 0.0 && fold == leg.fold() {
-            continue;
-        }
-        return Err(no_assembly(0.0));
-    }
+    let leans = |(leg, fold): (&Leg, Fold)| leg.normal.z.abs() > 0.0 && fold == leg.fold();
+    let stands = legs.iter().zip(branch.0).all(leans);
+    stands.then_some(Stance { state: *state, rotation, arms, legs })
+}
 
-    let struts = struts(mechanism, &arms, &state.position, &equations.feet);
-    let loosened = invert(struts).ok_or_else(|| no_assembly(0.0))?;
+/// Everything else that follows from a stance on the feet `q`.
+///
+/// # Errors
+/// `no_assembly` where the platform has no stiffness.
+#[inline]
+fn complete(
+    feet: &Feet<'_>,
+    stance: &Stance,
+    q: &Joints<6>,
+) -> Result<TriPlanarAssembly, KinematicsError> {
+    let mechanism = feet.equations.mechanism;
+    let Stance { state, rotation, arms, legs } = stance;
+    let struts = struts(mechanism, arms, &state.position, &feet.equations.feet);
+    let Some(loosened) = invert(struts) else { return Err(no_assembly(0.0)) };
     // l·v + (r×l)·Ω = l·ḟ for each strut, in the units of the matrix.
     let mut jacobian = Jacobian::zeros();
     for column in 0..6 {
@@ -266,18 +325,13 @@ fn complete(
                 if row < 3 { rates[row] } else { rates[row] / mechanism.side };
         }
     }
-    let position = state.position + Vector3::new(centroid.x, centroid.y, 0.0);
-    let mut assembly = TriPlanarAssembly {
-        position,
-        rotation,
+    Ok(TriPlanarAssembly {
+        position: feet.position(state),
+        rotation: *rotation,
         feet: *q,
-        legs,
+        legs: *legs,
         jacobian,
-        mass: SMatrix::zeros(),
-        gravity: SVector::zeros(),
         state: *state,
         loosened,
-    };
-    (assembly.mass, assembly.gravity) = dynamics::inertia_and_gravity(mechanism, &assembly);
-    Ok(assembly)
+    })
 }

@@ -1,13 +1,13 @@
 //! Masses in motion: the platform, three hinged legs and three planar motors.
 //!
 //! Everything is gathered at the platform's twist and then seen from the feet through the
-//! Jacobian. With the platform's twist V, a leg turns at `turn·V` about its hinge besides.
+//! Jacobian. With the platform's twist V, a leg turns at `turn·V` about its hinge besides. The mass
+//! matrix is that of the composite body; the bias is Newton's and Euler's, body by body.
 
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::{TriPlanar, TriPlanarAssembly};
-use crate::kinematics::Joints;
-use crate::kinematics::STANDARD_GRAVITY;
+use crate::kinematics::{Joints, STANDARD_GRAVITY};
 
 type Twist = SVector<f64, 6>;
 
@@ -37,23 +37,21 @@ fn add_product(matrix: &mut SMatrix<f64, 6, 6>, a: &Twist, b: &Twist) {
     }
 }
 
-/// Mass matrix and efforts of gravity, in joint coordinates.
-pub(super) fn inertia_and_gravity(
+/// Mass matrix, in joint coordinates [kg].
+pub(super) fn mass_matrix(
     mechanism: &TriPlanar,
     assembly: &TriPlanarAssembly,
-) -> (SMatrix<f64, 6, 6>, Joints<6>) {
+) -> SMatrix<f64, 6, 6> {
     let third = mechanism.height() / 3.0;
     let plate = mechanism.leg_inertia();
-    let up = Vector3::new(0.0, 0.0, 1.0);
+    let rotation = &assembly.rotation;
 
     let total = mechanism.platform_mass + 3.0 * mechanism.leg_mass;
-    let mut weight = twist(&(up * mechanism.platform_mass), &Vector3::zeros());
     // Sums over the legs of m·d and, as a matrix, of m·(d·d − d·dᵀ): what moves with the platform.
     let mut moment = Vector3::zeros();
     let [x, y, z] = mechanism.platform_inertia;
-    let axes = assembly.rotation;
     let mut angular =
-        axes * nalgebra::Matrix3::from_diagonal(&Vector3::new(x, y, z)) * axes.transpose();
+        rotation * Matrix3::from_diagonal(&Vector3::new(x, y, z)) * rotation.transpose();
     let mut mass = SMatrix::<f64, 6, 6>::zeros();
     for leg in &assembly.legs {
         let center = leg.middle + leg.shank * third;
@@ -70,9 +68,6 @@ pub(super) fn inertia_and_gravity(
             + twist(&Vector3::zeros(), &(leg.hinge * plate));
         let square = third * third * mechanism.leg_mass + plate;
         add_product(&mut mass, &leg.turn, &(across + leg.turn * (square / 2.0)));
-
-        weight +=
-            wrench(&(up * mechanism.leg_mass), &center) + leg.turn * (swing.z * mechanism.leg_mass);
     }
     for axis in 0..3 {
         mass[(axis, axis)] += total;
@@ -88,12 +83,11 @@ pub(super) fn inertia_and_gravity(
     }
     mass.fill_upper_triangle_with_lower_triangle();
 
-    let jacobian = &assembly.jacobian;
-    let mut seen = seen_from_feet(&mass, jacobian);
+    let mut seen = seen_from_feet(&mass, &assembly.jacobian);
     for column in 0..6 {
         seen[(column, column)] += mechanism.inductor_mass;
     }
-    (seen, jacobian.tr_mul(&weight) * STANDARD_GRAVITY)
+    seen
 }
 
 /// `Jᵀ·M·J`, of which both halves are the same.
@@ -118,7 +112,20 @@ fn seen_from_feet(mass: &SMatrix<f64, 6, 6>, jacobian: &SMatrix<f64, 6, 6>) -> S
     seen
 }
 
-/// Coriolis, centrifugal and gravity efforts with the feet moving at `velocity` [N].
+/// How a leg goes on with the platform's twist and the foot's velocity as they are.
+struct Carried {
+    /// Angular velocity, and what of the angular acceleration is not about the hinge.
+    turning: Vector3<f64>,
+    carried: Vector3<f64>,
+    /// Acceleration of the hinge's middle, and of the shank's unit vector.
+    middle: Vector3<f64>,
+    shank: Vector3<f64>,
+    /// Angular acceleration about the hinge with which the foot stays in the stator plane.
+    turn: f64,
+}
+
+/// Coriolis, centrifugal and gravity efforts with the feet moving at `velocity` [N]: what the
+/// bodies' own inertia and weight ask for while the feet do not accelerate.
 pub(super) fn bias(
     mechanism: &TriPlanar,
     assembly: &TriPlanarAssembly,
@@ -129,41 +136,49 @@ pub(super) fn bias(
     let platform = assembly.jacobian * velocity;
     let spin = platform.fixed_rows::<3>(3).into_owned();
 
-    let local = assembly.rotation.tr_mul(&spin);
-    let momentum = local.component_mul(&Vector3::from(mechanism.platform_inertia));
-    let gyroscopic = assembly.rotation * local.cross(&momentum);
-    // Wrench that keeps the platform's twist as it is, and what the feet then accelerate by.
-    let mut effort = twist(&Vector3::zeros(), &gyroscopic);
+    // With the platform's twist as it is, the feet would accelerate by the drift.
     let mut drift = Joints::zeros();
-    for (index, leg) in assembly.legs.iter().enumerate() {
+    let mut carry = |index: usize| {
+        let leg = &assembly.legs[index];
         let rate = leg.turn.dot(&platform);
         let turning = spin + leg.hinge * rate;
         let carried = spin.cross(&leg.hinge) * rate;
-        // Acceleration of the hinge's middle, and of the shank's unit vector.
         let middle = spin.cross(&spin.cross(&leg.middle));
         let shank = carried.cross(&leg.shank) + turning.cross(&turning.cross(&leg.shank));
         let foot = middle + shank * (3.0 * third);
         let swing = leg.normal * (3.0 * third);
-        // The foot stays in the plane.
         let turn = -foot.z / swing.z;
         drift[2 * index] = foot.x + swing.x * turn;
         drift[2 * index + 1] = foot.y + swing.y * turn;
+        Carried { turning, carried, middle, shank, turn }
+    };
+    let carried = [carry(0), carry(1), carry(2)];
+    let platform = assembly.jacobian * -drift;
+    let linear = platform.fixed_rows::<3>(0) + Vector3::new(0.0, 0.0, STANDARD_GRAVITY);
+    let angular = platform.fixed_rows::<3>(3).into_owned();
 
+    let inertia = Vector3::from(mechanism.platform_inertia);
+    let local = assembly.rotation.tr_mul(&spin);
+    let torque = assembly.rotation.tr_mul(&angular).component_mul(&inertia)
+        + local.cross(&local.component_mul(&inertia));
+    let mut effort = twist(&(linear * mechanism.platform_mass), &(assembly.rotation * torque));
+    for (leg, own) in assembly.legs.iter().zip(&carried) {
+        let turn = own.turn + leg.turn.dot(&platform);
         let center = leg.middle + leg.shank * third;
-        let acceleration = middle + shank * third + leg.normal * (third * turn);
+        let acceleration = linear
+            + angular.cross(&center)
+            + own.middle
+            + own.shank * third
+            + leg.normal * (third * turn);
         let force = acceleration * mechanism.leg_mass;
-        let angular = leg.hinge * turn + carried;
-        let about_normal = turning.dot(&leg.normal);
+        let angular = angular + own.carried + leg.hinge * turn;
         let torque = (angular
             + leg.normal * leg.normal.dot(&angular)
-            + turning.cross(&leg.normal) * about_normal)
+            + own.turning.cross(&leg.normal) * own.turning.dot(&leg.normal))
             * plate;
         effort += wrench(&force, &center)
             + twist(&Vector3::zeros(), &torque)
             + leg.turn * (third * leg.normal.dot(&force) + leg.hinge.dot(&torque));
     }
-    // The feet must not accelerate: the platform does, against the drift. The planar motors'
-    // own mass has no part in it.
-    let against = assembly.mass * drift - drift * mechanism.inductor_mass;
-    assembly.jacobian.tr_mul(&effort) - against + assembly.gravity
+    assembly.jacobian.tr_mul(&effort)
 }

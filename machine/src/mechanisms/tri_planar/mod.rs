@@ -156,6 +156,15 @@ impl Mechanism<6> for TriPlanar {
         Pose { position: assembly.position, rotation: assembly.rotation }
     }
 
+    fn locate(
+        &self,
+        q: &Joints<6>,
+        branch: Legs,
+        near: Option<&TriPlanarAssembly>,
+    ) -> Result<Pose, KinematicsError> {
+        assembly::locate(self, q, branch, near)
+    }
+
     fn branch_of(&self, assembly: &TriPlanarAssembly) -> Legs {
         assembly.folds()
     }
@@ -195,7 +204,7 @@ impl Mechanism<6> for TriPlanar {
     }
 
     fn mass_matrix(&self, assembly: &TriPlanarAssembly) -> SMatrix<f64, 6, 6> {
-        assembly.mass
+        dynamics::mass_matrix(self, assembly)
     }
 
     fn bias(&self, assembly: &TriPlanarAssembly, velocity: &Joints<6>) -> Joints<6> {
@@ -203,7 +212,7 @@ impl Mechanism<6> for TriPlanar {
     }
 
     fn gravity(&self, assembly: &TriPlanarAssembly) -> Joints<6> {
-        assembly.gravity
+        dynamics::bias(self, assembly, &Joints::zeros())
     }
 
     fn stiffness(&self) -> Option<SMatrix<f64, 6, 6>> {
