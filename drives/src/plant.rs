@@ -363,10 +363,8 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
                 measurement.current[row] = steps * self.current_resolution;
             }
         }
-        match self.dynamics.assemble(&self.state.load) {
-            Ok(assembly) => {
-                measurement.tool = Some(self.dynamics.mechanism().pose(&assembly).position.into());
-            }
+        match self.dynamics.locate(&self.state.load) {
+            Ok(pose) => measurement.tool = Some(pose.position.into()),
             Err(error) => self.fail(0, error.value, error.limit),
         }
         measurement.laser = self.light;

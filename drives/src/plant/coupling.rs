@@ -18,6 +18,14 @@ use nalgebra::SMatrix;
 /// Solutions behind the newest one that the parabola goes through.
 const EARLIER: usize = 2;
 
+/// By the number of those, what the newest and they add to a line's slope and to half its
+/// curvature, per substep.
+const PARABOLA: [[[f64; 1 + EARLIER]; 2]; 1 + EARLIER] = [
+    [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
+    [[1.0, -1.0, 0.0], [0.0, 0.0, 0.0]],
+    [[1.5, -2.0, 0.5], [0.5, -1.0, 0.5]],
+];
+
 /// Why the equations of motion cannot be solved where the load is.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Unsolvable {
@@ -29,15 +37,21 @@ pub enum Unsolvable {
     Mass,
 }
 
-/// The load side at one instant.
+/// How the load answers to efforts at one instant.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LoadSide<const N: usize> {
-    /// Inertia in joint coordinates, with the rotors behind a rigid transmission [kg or kg·m²].
-    pub(super) inertia: SMatrix<f64, N, N>,
-    /// Its inverse.
+pub(super) struct Response<const N: usize> {
+    /// Inverse of the inertia in joint coordinates, with the rotors behind a rigid transmission
+    /// [1/kg or 1/(kg·m²)].
     pub(super) mobility: SMatrix<f64, N, N>,
     /// Coriolis, centrifugal and gravity efforts [N or N·m].
     pub(super) bias: Joints<N>,
+}
+
+/// The load side where the chain was solved.
+#[derive(Debug, Clone, Copy)]
+struct Solution<const N: usize> {
+    inertia: SMatrix<f64, N, N>,
+    response: Response<N>,
 }
 
 /// How the load side depends on where the load is.
@@ -48,13 +62,16 @@ pub(super) struct Coupling<const N: usize, M: Mechanism<N>> {
     assembly: M::Assembly,
     /// Inertia of the rotors that is the load's own, zero behind an elastic transmission.
     rotors: SMatrix<f64, N, N>,
-    middle: LoadSide<N>,
-    /// Change of it over one substep, and half the change of that.
-    slope: LoadSide<N>,
-    curvature: LoadSide<N>,
-    /// The middles before, newest first, and how many of them belong to this motion.
-    earlier: [LoadSide<N>; EARLIER],
+    /// Half-way through the substeps: the newest at `newest`, and from there on those before it.
+    solutions: [Solution<N>; 1 + EARLIER],
+    newest: usize,
+    /// How many of those before belong to the newest one's motion.
+    order: usize,
+    /// How many solutions, but for the oldest, a motion that goes on finds.
     known: usize,
+    /// Change of the newest response over one substep, and half the change of that.
+    slope: Response<N>,
+    curvature: Response<N>,
     /// Where the last substep ended, and its length [s]: a motion that goes on begins there.
     load: Joints<N>,
     load_speed: Joints<N>,
@@ -68,10 +85,8 @@ pub(super) struct Coupling<const N: usize, M: Mechanism<N>> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Law {
     Constant,
-    /// Position and velocity. Only a rigid transmission asks for the inertia besides its inverse.
-    Varying {
-        needs_inertia: bool,
-    },
+    /// Position and velocity.
+    Varying,
 }
 
 impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
@@ -84,17 +99,12 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
         home: M::Assembly,
         rotors: Option<SMatrix<f64, N, N>>,
     ) -> Result<Self, Unsolvable> {
-        let law = if mechanism.has_constant_mass() {
-            Law::Constant
-        } else {
-            Law::Varying { needs_inertia: rotors.is_some() }
-        };
+        let law = if mechanism.has_constant_mass() { Law::Constant } else { Law::Varying };
         let mut inertia = mechanism.mass_matrix(&home);
         if let Some(rotors) = rotors {
             inertia += rotors;
         }
-        let middle = LoadSide {
-            inertia,
+        let response = Response {
             mobility: inertia.try_inverse().ok_or(Unsolvable::Mass)?,
             bias: mechanism.bias(&home, &Joints::zeros()),
         };
@@ -102,11 +112,12 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
             law,
             assembly: home,
             rotors: rotors.unwrap_or_else(SMatrix::zeros),
-            middle,
-            slope: LoadSide::zero(),
-            curvature: LoadSide::zero(),
-            earlier: [middle; EARLIER],
+            solutions: [Solution { inertia, response }; 1 + EARLIER],
+            newest: 0,
+            order: 0,
             known: 0,
+            slope: Response::zero(),
+            curvature: Response::zero(),
             load: Joints::zeros(),
             load_speed: Joints::zeros(),
             step: 0.0,
@@ -120,14 +131,9 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
         &self.assembly
     }
 
-    /// Half-way through the newest substep.
-    pub(super) fn middle(&self) -> &LoadSide<N> {
-        &self.middle
-    }
-
-    /// Whether it is the same everywhere.
-    pub(super) fn is_constant(&self) -> bool {
-        self.law == Law::Constant
+    /// Inverse of the inertia half-way through the newest substep.
+    pub(super) fn mobility(&self) -> &SMatrix<f64, N, N> {
+        &self.solutions[self.newest].response.mobility
     }
 
     /// Solves for a substep of `step` [s] from `load` on, which moves at `load_speed`.
@@ -169,42 +175,37 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
             self.known = 0;
             return Err(Unsolvable::Mass);
         };
-        if self.known > 0 {
-            self.earlier.swap(0, 1);
-            self.earlier[0] = self.middle;
-        }
         let bias = mechanism.bias(&self.assembly, &speed);
-        self.middle = LoadSide { inertia, mobility, bias };
-        let [first, second] = &self.earlier;
-        match self.known {
-            0 => (self.slope, self.curvature) = (LoadSide::zero(), LoadSide::zero()),
-            1 => self.slope = self.middle.combine(1.0, first, -1.0, first, 0.0),
-            _ => {
-                self.slope = self.middle.combine(1.5, first, -2.0, second, 0.5);
-                self.curvature = self.middle.combine(0.5, first, -1.0, second, 0.5);
-            }
-        }
+        // In the place of the oldest.
+        self.newest = (self.newest + EARLIER) % self.solutions.len();
+        self.solutions[self.newest] = Solution { inertia, response: Response { mobility, bias } };
+        self.order = self.known;
+        let [own, first, second] = by_age(&self.solutions, self.newest).map(|one| &one.response);
+        let [slope, curvature] = PARABOLA[self.order];
+        self.slope = own.combine(slope[0], first, slope[1], second, slope[2]);
+        self.curvature = own.combine(curvature[0], first, curvature[1], second, curvature[2]);
         self.known = (self.known + 1).min(EARLIER);
         Ok(())
     }
 
-    /// The load side at the share `at` of the substep begun. Its inertia, which only joints with a held
-    /// motor ask for, is that of the middle unless it is `wanted`.
+    /// How the load answers at the share `at` of the substep begun.
     #[inline(always)] // Called in every stage.
-    pub(super) fn at(&self, at: f64, wanted: bool) -> LoadSide<N> {
-        let Law::Varying { needs_inertia } = self.law else { return self.middle };
-        let from = at - 0.5;
-        let square = from * from;
-        let (middle, slope, curvature) = (&self.middle, &self.slope, &self.curvature);
-        LoadSide {
-            inertia: if needs_inertia && wanted {
-                middle.inertia + slope.inertia * from + curvature.inertia * square
-            } else {
-                middle.inertia
-            },
-            mobility: middle.mobility + slope.mobility * from + curvature.mobility * square,
-            bias: middle.bias + slope.bias * from + curvature.bias * square,
+    pub(super) fn at(&self, at: f64) -> Response<N> {
+        let middle = &self.solutions[self.newest].response;
+        if self.law == Law::Constant {
+            return *middle;
         }
+        let from = at - 0.5;
+        middle.combine(1.0, &self.slope, from, &self.curvature, from * from)
+    }
+
+    /// The inertia at the share `at` of the substep begun [kg or kg·m²].
+    pub(super) fn inertia(&self, at: f64) -> SMatrix<f64, N, N> {
+        let [own, first, second] = by_age(&self.solutions, self.newest).map(|one| &one.inertia);
+        let [slope, curvature] = PARABOLA[self.order];
+        let from = at - 0.5;
+        let weight = |age: usize| slope[age] * from + curvature[age] * from * from;
+        own * (1.0 + weight(0)) + first * weight(1) + second * weight(2)
     }
 
     /// Ends the substep with the load at `load`, moving at `load_speed`, accelerated by
@@ -215,20 +216,28 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
         load_speed: &Joints<N>,
         acceleration: &Joints<N>,
     ) {
+        if self.law == Law::Constant {
+            return;
+        }
         (self.load, self.load_speed) = (*load, *load_speed);
         (self.acceleration_before, self.acceleration) = (self.acceleration, *acceleration);
     }
 }
 
-impl<const N: usize> LoadSide<N> {
+/// The newest of `solutions`, which is at `newest`, and those before it.
+fn by_age<T>(solutions: &[T; 1 + EARLIER], newest: usize) -> [&T; 1 + EARLIER] {
+    core::array::from_fn(|age| &solutions[(newest + age) % solutions.len()])
+}
+
+impl<const N: usize> Response<N> {
     fn zero() -> Self {
-        Self { inertia: SMatrix::zeros(), mobility: SMatrix::zeros(), bias: Joints::zeros() }
+        Self { mobility: SMatrix::zeros(), bias: Joints::zeros() }
     }
 
     /// A weighted sum of three.
+    #[inline(always)] // By value through memory it costs as much as the sum.
     fn combine(&self, own: f64, first: &Self, one: f64, second: &Self, two: f64) -> Self {
         Self {
-            inertia: self.inertia * own + first.inertia * one + second.inertia * two,
             mobility: self.mobility * own + first.mobility * one + second.mobility * two,
             bias: self.bias * own + first.bias * one + second.bias * two,
         }

@@ -17,13 +17,13 @@
 //! [`friction`](super::friction) sees to that. How the inertia of the load changes during it says
 //! [`coupling`](super::coupling).
 
-use machine::kinematics::{Joints, KinematicsError};
+use machine::kinematics::{Joints, KinematicsError, Pose};
 use machine::transmission::backlash;
 use machine::{Axis, DcMotor, Mechanism};
 use nalgebra::{SMatrix, SVector};
 
 use super::PlantError;
-use super::coupling::{Coupling, LoadSide, Unsolvable};
+use super::coupling::{Coupling, Response, Unsolvable};
 use super::friction::Contacts;
 use super::stepping::Field;
 use super::winding::{Weights, Windings};
@@ -134,6 +134,16 @@ pub struct Dynamics<const N: usize, M: Mechanism<N>> {
     turns: SVector<f64, N>,
 }
 
+/// Where a step has led.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reached<const N: usize> {
+    /// Where the plant is.
+    pub state: State<N>,
+    /// Acceleration of the load in the step's last stage, which is third-order close to where it
+    /// ended [m/s² or rad/s²].
+    pub acceleration: Joints<N>,
+}
+
 /// The part of a substep that a step takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
@@ -188,12 +198,12 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         &self.mechanism
     }
 
-    /// Solves the chain at `load` [m or rad], starting from where it was last.
+    /// Where the tool is with the load at `load` [m or rad], the chain solved from where it was last.
     ///
     /// # Errors
     /// Where it cannot close.
-    pub fn assemble(&self, load: &Joints<N>) -> Result<M::Assembly, KinematicsError> {
-        self.mechanism.assemble(load, self.mechanism.branch(), Some(self.coupling.assembly()))
+    pub fn locate(&self, load: &Joints<N>) -> Result<Pose, KinematicsError> {
+        self.mechanism.locate(load, self.mechanism.branch(), Some(self.coupling.assembly()))
     }
 
     /// The same with steppers, which turn in `field`.
@@ -235,7 +245,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         };
         let Transmission::Elastic { stiffness, damping, .. } = &self.transmission else {
             // Motors and load are one inertia: what acts at the shafts acts on all of it.
-            let mobility = self.coupling.middle().mobility;
+            let mobility = self.coupling.mobility();
             let square = motors.ratio.component_mul(&motors.ratio);
             let seen = |at_shaft: &SVector<f64, N>| {
                 row_sum(mobility * SMatrix::from_diagonal(&at_shaft.component_div(&square)))
@@ -252,7 +262,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             drag += field.damping().component_div(&motors.inertia).amax();
             spring = field.stiffness().component_div(&motors.inertia).amax();
         }
-        let admittance = self.coupling.middle().mobility
+        let admittance = self.coupling.mobility()
             + SMatrix::from_diagonal(
                 &motors.ratio.component_mul(&motors.ratio).component_div(&motors.inertia),
             );
@@ -269,14 +279,16 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         self.coupling.begin(&self.mechanism, &state.load, &state.load_speed, step)
     }
 
-    /// Ends the substep in `state`, which the next one begins in.
-    pub fn end(&mut self, state: &State<N>, contacts: &Contacts<N>) {
-        if self.coupling.is_constant() {
-            return;
-        }
-        let (_, acceleration) =
-            self.accelerations(state, contacts, &self.coupling.at(1.0, contacts.any_held()));
-        self.coupling.end(&state.load, &state.load_speed, &acceleration);
+    /// The end of the substep begun, where `contacts` have changed just there.
+    pub fn turn(&self, state: &State<N>, contacts: &Contacts<N>) -> Reached<N> {
+        let response = self.coupling.at(1.0);
+        let (_, acceleration) = self.accelerations(state, contacts, &response, 1.0);
+        Reached { state: *state, acceleration }
+    }
+
+    /// Ends the substep as `reached`, where the next one begins.
+    pub fn end(&mut self, reached: &Reached<N>) {
+        self.coupling.end(&reached.state.load, &reached.state.load_speed, &reached.acceleration);
     }
 
     /// Torque that turns each motor at the share `at` of the substep begun, Coulomb friction left
@@ -289,10 +301,10 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
                 shaft - motors.ratio.component_mul(&self.transmitted(state))
             }
             Transmission::Rigid => {
-                let side = self.coupling.at(at, true);
-                let (_, load) = self.accelerations(state, contacts, &side);
+                let response = self.coupling.at(at);
+                let (_, load) = self.accelerations(state, contacts, &response, at);
                 // A held motor bears what the others' acceleration puts on its joint.
-                let load_side = side.inertia * load + side.bias;
+                let load_side = self.coupling.inertia(at) * load + response.bias;
                 shaft - motors.ratio.component_mul(&load_side)
             }
         }
@@ -324,13 +336,15 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         }
     }
 
-    /// Accelerations of motors [rad/s²] and load [m/s² or rad/s²].
+    /// Accelerations of motors [rad/s²] and load [m/s² or rad/s²] at the share `at` of the substep
+    /// begun, where the load has this `response`.
     #[inline(always)] // Four calls a step through memory cost as much as the arithmetic.
     fn accelerations(
         &self,
         state: &State<N>,
         contacts: &Contacts<N>,
-        side: &LoadSide<N>,
+        response: &Response<N>,
+        at: f64,
     ) -> (SVector<f64, N>, Joints<N>) {
         let motors = &self.motors;
         let torque =
@@ -341,15 +355,15 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
                 let motor = (self.mobility.component_mul(&torque)
                     - self.reaction.component_mul(&effort))
                 .component_mul(contacts.free());
-                (motor, side.mobility * (effort - side.bias))
+                (motor, response.mobility * (effort - response.bias))
             }
             Transmission::Rigid => {
-                let push =
-                    (torque.component_mul(&self.turns) - side.bias).component_mul(contacts.free());
+                let push = (torque.component_mul(&self.turns) - response.bias)
+                    .component_mul(contacts.free());
                 let load = if contacts.any_held() {
-                    partly_held(&side.inertia, &push, contacts.free())
+                    partly_held(&self.coupling.inertia(at), &push, contacts.free())
                 } else {
-                    side.mobility * push
+                    response.mobility * push
                 };
                 (load.component_mul(&self.turns), load)
             }
@@ -369,7 +383,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         phases: &Phases<N>,
         weights: &Weights<N>,
         part: Part,
-    ) -> State<N> {
+    ) -> Reached<N> {
         let step = weights.step;
         let half = 0.5 * step;
         let course = match phases {
@@ -383,15 +397,13 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
              speed: &SVector<f64, N>| {
                 course.as_ref().map_or_else(SVector::zeros, |course| value(course, weights, speed))
             };
-        let holds = contacts.any_held();
-        let side = self.coupling.at(part.from, holds);
-        let halfway = self.coupling.at(part.from + 0.5 * part.length, holds);
-        let last = self.coupling.at(part.end(), holds);
+        let shares = [part.from, part.from + 0.5 * part.length, part.end()];
+        let [at_start, halfway, at_end] = shares.map(|at| self.coupling.at(at));
         let mut first = *start;
         if course.is_none() {
             first.current = SVector::zeros();
         }
-        let (motor_1, load_1) = self.accelerations(&first, contacts, &side);
+        let (motor_1, load_1) = self.accelerations(&first, contacts, &at_start, shares[0]);
 
         let mut second = State {
             current: current(|course, weights, _| course.second(weights), &first.speed),
@@ -401,7 +413,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             load_speed: first.load_speed + load_1 * half,
         };
         self.couple(&mut second);
-        let (motor_2, load_2) = self.accelerations(&second, contacts, &halfway);
+        let (motor_2, load_2) = self.accelerations(&second, contacts, &halfway, shares[1]);
 
         let mut third = State {
             current: current(super::winding::Course::third, &second.speed),
@@ -411,7 +423,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             load_speed: first.load_speed + load_2 * half,
         };
         self.couple(&mut third);
-        let (motor_3, load_3) = self.accelerations(&third, contacts, &halfway);
+        let (motor_3, load_3) = self.accelerations(&third, contacts, &halfway, shares[1]);
 
         let mut fourth = State {
             current: current(super::winding::Course::fourth, &third.speed),
@@ -421,7 +433,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             load_speed: first.load_speed + load_3 * step,
         };
         self.couple(&mut fourth);
-        let (motor_4, load_4) = self.accelerations(&fourth, contacts, &last);
+        let (motor_4, load_4) = self.accelerations(&fourth, contacts, &at_end, shares[2]);
 
         let sixth = step / 6.0;
         let between = second.speed + third.speed;
@@ -439,7 +451,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             load_speed: first.load_speed + (load_1 + (load_2 + load_3) * 2.0 + load_4) * sixth,
         };
         self.couple(&mut end);
-        end
+        Reached { state: end, acceleration: load_4 }
     }
 }
 

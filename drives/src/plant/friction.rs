@@ -146,10 +146,10 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
     // Every motor may stop and start again within a step; more than that is chatter.
     for _ in 0..2 * N + 2 {
         let end = dynamics.step(&state, &contacts, phases, &weights, part);
-        let after = contacts.margins(dynamics, &end, part.end());
+        let after = contacts.margins(dynamics, &end.state, part.end());
         if after.iter().all(|margin| *margin >= 0.0) {
-            dynamics.end(&end, &contacts);
-            return Ok(end);
+            dynamics.end(&end);
+            return Ok(end.state);
         }
         let before = contacts.margins(dynamics, &state, part.from);
         let first = earliest(&before, &after);
@@ -160,7 +160,7 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
         if share > 0.0 {
             weights = dynamics.motors().windings.weights(weights.step * share);
             part.length = weights.step / whole;
-            state = dynamics.step(&state, &contacts, phases, &weights, part);
+            state = dynamics.step(&state, &contacts, phases, &weights, part).state;
             part.from = part.end();
         }
         let coulomb = dynamics.motors().coulomb[motor];
@@ -180,7 +180,7 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
             }
         }
         if rest <= weights.step * TIME_RESOLUTION {
-            dynamics.end(&state, &contacts);
+            dynamics.end(&dynamics.turn(&state, &contacts));
             return Ok(state);
         }
         weights = dynamics.motors().windings.weights(rest);
@@ -193,8 +193,8 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
         }
     }
     let end = dynamics.step(&state, &contacts, phases, &weights, part);
-    dynamics.end(&end, &contacts);
-    Ok(end)
+    dynamics.end(&end);
+    Ok(end.state)
 }
 
 /// The motor whose contact ends first, with the share of the step at which it does, by the chord.
@@ -234,7 +234,7 @@ fn locate<const N: usize, M: Mechanism<N>>(
         }
         let part = dynamics.motors().windings.weights(weights.step * share);
         let reached = Part { length: whole.length * share, ..whole };
-        let there = dynamics.step(state, contacts, phases, &part, reached);
+        let there = dynamics.step(state, contacts, phases, &part, reached).state;
         let margin = contacts.margins(dynamics, &there, reached.end())[motor];
         if margin >= 0.0 {
             low = (share, margin);
