@@ -160,3 +160,27 @@ fn the_polar_machine_marks_through_the_centre_of_its_table_and_beside_it() {
     let slowest = |summary| number(summary, "/marks/speed_min");
     assert!(slowest(&beside) < 0.5 * slowest(&through), "{}", slowest(&beside));
 }
+
+/// Half circles that grow from 20 to 44 mm about the table's centre, six turns of it in one stroke.
+fn spiral() -> String {
+    let mut job = "G21 G90 G17\nG0 X20 Y0\nM3 S1000\nF3000\n".to_owned();
+    let mut from = 20.0;
+    for index in 0..12 {
+        let to = -(from + if index % 2 == 0 { 2.0 } else { -2.0 });
+        job.push_str(&format!("G3 X{to} Y0 I{} J0\n", (to - from) / 2.0));
+        from = to;
+    }
+    job + "M5\nM2\n"
+}
+
+#[test]
+fn a_stroke_marked_in_parts_has_no_step_where_the_table_was_turned_back() {
+    let place = Place::new();
+    let job = place.file("spiral.ngc", &spiral());
+    let travel = "machine.axis.th2.limits.position=[\"-540 deg\", \"540 deg\"]";
+    let summary = simulate(&place, "polar", &[job.to_str().unwrap(), "--set", travel]);
+    // While the table turns back for two seconds, the arm creeps by less than a count of its encoder:
+    // nothing may wind up in its loop.
+    assert_done("the spiral", &summary, 5e-6);
+    assert_eq!(summary["job"]["strokes"], 3);
+}

@@ -122,8 +122,8 @@ impl Cascade {
         }
     }
 
-    /// One cycle. With `integrating` off the velocity integral stays as it is: at rest within an
-    /// encoder count the friction holds the axis, and integrating the count would make it hunt.
+    /// One cycle. With `integrating` off the velocity integral stays as it is: where friction holds
+    /// an axis to within its encoder's counts, integrating them would make it hunt.
     pub fn step(
         &mut self,
         reference: &Reference,

@@ -19,8 +19,8 @@ use signals::time::CYCLE_TIME;
 use signals::{AxisArray, MAX_AXES};
 
 /// Planned speed below which a motor counts as standing [rad/s]: less than a count of any usual
-/// encoder over the time in which a transmission comes to rest.
-const STANDING: f64 = 0.01;
+/// encoder in a minute. However slowly it creeps above that, friction is against it.
+const STANDING: f64 = 1e-6;
 
 /// What the plan asks of the motors at one instant.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -225,12 +225,11 @@ impl Feedforward {
         }
     }
 
-    /// Whether the plan has this motor standing at the measurement and until the command ends.
-    pub fn stands(&self, index: usize) -> bool {
-        [&self.now, &self.next, &self.after]
-            .iter()
-            .all(|planned| direction(planned.speed[index]) == 0.0)
-            && self.after.angle[index] == self.now.angle[index]
+    /// The fastest that the plan has this motor turn between the measurement and the end of the
+    /// command [rad/s].
+    pub fn fastest(&self, index: usize) -> f64 {
+        let instants = [&self.now, &self.next, &self.after];
+        instants.iter().map(|planned| planned.speed[index].abs()).fold(0.0, f64::max)
     }
 
     /// Direction of the planned motion at the start of the cycle in which the command acts, its

@@ -84,8 +84,12 @@ impl Controller {
             }
             command.following_error[index] = error;
             let Some(cascade) = cascade else { continue };
-            let held_by_friction =
-                self.feedforward.stands(index) && error.abs() <= axis.encoder.resolution();
+            // In the time in which the position loop answers, a motor that creeps moves less than
+            // a count. Friction holds it, and it slips by a count now and then: what is within
+            // two, the integral would only wind itself up with until the axis leaves.
+            let count = axis.encoder.resolution();
+            let creeps = self.feedforward.fastest(index) <= count * axis.gains.position;
+            let held_by_friction = creeps && error.abs() <= 2.0 * count;
             let drive = cascade.step(&reference, &measured, !held_by_friction);
             command.voltage[index] = drive.voltage;
             if self.playing != 0 {
