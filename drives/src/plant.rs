@@ -260,10 +260,8 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         let step = self.weights.step;
         for index in 0..self.substeps {
             if let (Some(stepping), Some(field)) = (&self.stepping, self.dynamics.field_mut()) {
-                // A pulse in the first half of a substep counts for all of it, one in the second
-                // half for nothing of it: in the mean, none is early or late.
-                let at = (f64::from(index) + 0.5) / f64::from(self.substeps);
-                stepping.drive(field, at, actuation.mode);
+                let share = |index: u32| f64::from(index) / f64::from(self.substeps);
+                stepping.drive(field, [share(index), share(index + 1)], actuation.mode);
                 if let Err(stall) = stepping.in_step(field, &self.state) {
                     self.fail(stall.axis as u32 + 1, stall.value, stall.limit);
                 }

@@ -87,6 +87,22 @@ impl Segment {
         (angle, speed)
     }
 
+    /// The count of pulses in the mean over the shares `from` to `to` of the cycle, where the speed
+    /// changes little in between: each pulse counts from its instant on.
+    pub fn mean_count(&self, per_radian: f64, from: f64, to: f64) -> f64 {
+        let first = per_radian * self.at(from).0;
+        let last = per_radian * self.at(to).0;
+        let count = nearest(first);
+        // From this count on, so that nothing cancels far from home.
+        let (first, last) = (first - count as f64, last - count as f64);
+        let passed = nearest(last) as f64;
+        if passed == 0.0 {
+            return count as f64;
+        }
+        // The integral of the count along a line: passed·u − passed²/2, which is 0 at `first`.
+        count as f64 + passed * (last - passed / 2.0) / (last - first)
+    }
+
     /// The largest |speed| inside it [rad/s].
     pub fn fastest(&self) -> f64 {
         let (_, square, cube) = self.coefficients();
@@ -182,6 +198,39 @@ mod tests {
         for (up, down) in pulses[..3].iter().zip(pulses[3..].iter().rev()) {
             assert!((up.offset.0 + down.offset.0 - 1_000_000).abs() <= 1, "{up:?} {down:?}");
         }
+    }
+
+    #[test]
+    fn the_mean_count_is_that_of_the_pulses_at_their_instants() {
+        let unit = 1.0 / PER_RADIAN;
+        let speed = |pulses: f64| pulses * unit / CYCLE_TIME;
+        // Far from home, at rates from one pulse in some cycles to many in a twentieth of one.
+        for (rise, from_speed, to_speed) in
+            [(0.7, 0.7, 0.7), (-3.4, -3.0, -3.8), (150.3, 150.3, 150.3), (9.0, 5.0, 12.0)]
+        {
+            let from = 1e6 + 0.3;
+            let segment = Segment {
+                from: from * unit,
+                from_speed: speed(from_speed),
+                to: (from + rise) * unit,
+                to_speed: speed(to_speed),
+            };
+            let pulses = all(&segment);
+            let start = count(PER_RADIAN, segment.from) as f64;
+            for index in 0..20 {
+                let (low, high) = (f64::from(index) / 20.0, f64::from(index + 1) / 20.0);
+                let mut mean = start;
+                for pulse in &pulses {
+                    let step = if pulse.direction == Direction::Up { 1.0 } else { -1.0 };
+                    let at = pulse.offset.0 as f64 * 1e-6;
+                    mean += step * ((high - at) / (high - low)).clamp(0.0, 1.0);
+                }
+                let found = segment.mean_count(PER_RADIAN, low, high);
+                assert!((found - mean).abs() < 2e-2, "{rise} {index}: {found} {mean}");
+            }
+        }
+        assert_eq!(Segment::rest(0.0).mean_count(PER_RADIAN, 0.0, 0.05), 0.0);
+        assert!(Segment::rest(f64::NAN).mean_count(PER_RADIAN, 0.0, 0.05).abs() < 1.0);
     }
 
     #[test]

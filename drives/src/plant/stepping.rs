@@ -147,12 +147,14 @@ impl<const N: usize> Stepping<N> {
         Ok(())
     }
 
-    /// Puts the field where the pulses have it at the share `at` of the cycle.
-    pub(super) fn drive(&self, field: &mut Field<N>, at: f64, mode: CommandMode) {
+    /// Puts the field where the pulses have it between the shares `from` and `to` of the cycle: in
+    /// the mean, so that each pulse counts from its instant on.
+    pub(super) fn drive(&self, field: &mut Field<N>, [from, to]: [f64; 2], mode: CommandMode) {
         field.powered = mode != CommandMode::Disabled;
         for (row, segment) in self.segments.iter().enumerate() {
-            let (angle, speed) = segment.at(at);
-            field.angle[row] = self.origin[row] + self.stepped(row, angle);
+            let pulses = segment.mean_count(self.per_radian(row), from, to);
+            let (_, speed) = segment.at(0.5 * (from + to));
+            field.angle[row] = self.origin[row] + pulses / self.per_radian(row);
             field.speed[row] = speed;
             field.most[row] = self.motors[row].pull_out_torque(speed);
         }
@@ -187,10 +189,5 @@ impl<const N: usize> Stepping<N> {
 
     fn per_radian(&self, row: usize) -> f64 {
         self.motors[row].pulses_per_radian()
-    }
-
-    /// `angle` from home as whole pulses [rad].
-    fn stepped(&self, row: usize, angle: f64) -> f64 {
-        count(self.per_radian(row), angle) as f64 / self.per_radian(row)
     }
 }
