@@ -6,9 +6,9 @@
 use crate::feedforward::Planned;
 use machine::Machine;
 use machine::motor::StepperMotor;
-use signals::{AxisArray, FaultCode, MAX_AXES};
+use signals::{AxisArray, Fault, FaultCode, FaultQuantity, MAX_AXES};
 
-use crate::supervision::{Finding, Tracking};
+use crate::supervision::Finding;
 
 /// Encoder counts that a stream may start away from where an axis stands.
 const TOLERANCE: f64 = 16.0;
@@ -37,8 +37,9 @@ impl Alignment {
             let limit = (TOLERANCE * axis.encoder.resolution()).max(load_angle);
             if offset[index].abs() > limit || offset[index].is_nan() {
                 let (value, limit) = (offset[index].abs() * axis.ratio, limit * axis.ratio);
-                let code = FaultCode::StreamStart;
-                return Err(Finding::on(index, code, value, limit, Tracking::Sound));
+                let fault = Fault::new(FaultCode::StreamStart).on(index);
+                let quantity = FaultQuantity::StartDistance;
+                return Err(Finding::sound(fault.beyond(quantity, value, limit)));
             }
         }
         let aligned = offset.iter().all(|offset| *offset == 0.0);

@@ -53,8 +53,8 @@ use answer::PROGRESS_INTERVAL;
 use machine::{Axis, Machine, Motor};
 use signals::feedback::status;
 use signals::{
-    CommandMode, ControllerReport, Fault, FaultCode, Feedback, LaserCycle, MAX_AXES, Nanoseconds,
-    RealtimeFacts,
+    CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity, Feedback, LaserCycle, MAX_AXES,
+    Nanoseconds, RealtimeFacts,
 };
 
 /// Cycles between two reports.
@@ -145,13 +145,13 @@ impl Controller {
         (outputs.progress, outputs.report, outputs.reply) = (None, None, None);
         for setpoint in inputs.setpoints {
             if let Err(finding) = self.intake.take(setpoint, inputs.received, &self.supervision) {
-                self.fail(finding.at(now));
+                self.fail(finding, now);
             }
         }
-        let elapsed = self.check(feedback, inputs.peers).unwrap_or_else(|finding| {
-            self.fail(finding.at(now));
-            Elapsed::ONE
-        });
+        let (elapsed, finding) = self.check(feedback, inputs.peers);
+        if let Some(finding) = finding {
+            self.fail(finding, now);
+        }
         self.make_up(elapsed, now);
         outputs.reply = inputs.request.map(|request| self.request(&request, feedback.cycle));
         self.transition(now, feedback);
@@ -161,7 +161,7 @@ impl Controller {
         if self.state.follows()
             && let Err(finding) = self.supervision.motion(feedback, &self.feedforward.now().angle)
         {
-            self.fail(finding.at(now));
+            self.fail(finding, now);
         }
         self.command(now, inputs, &mut outputs.command);
         let targets = match self.drive {
@@ -169,9 +169,8 @@ impl Controller {
             _ => &outputs.command.voltage,
         };
         if let Some(index) = targets.iter().position(|target| !target.is_finite()) {
-            let value = targets[index];
-            let code = FaultCode::NotFinite;
-            self.fail(Finding::on(index, code, value, 0.0, Tracking::Lost).at(now));
+            let fault = Fault::new(FaultCode::NotFinite).on(index);
+            self.fail(Finding::lost(fault.with(FaultQuantity::Number, targets[index])), now);
             self.command(now, inputs, &mut outputs.command);
         }
         if self.playing != 0 {
@@ -196,7 +195,7 @@ impl Controller {
         if self.state.mode() == CommandMode::Disabled {
             return;
         }
-        self.fail(Finding::new(FaultCode::DrivesLost, 0.0, 0.0, Tracking::Lost).at(now));
+        self.fail(Finding::lost(Fault::new(FaultCode::DrivesLost)), now);
         self.end_in_fault(outputs.command.cycle);
         outputs.report = self.ended.take();
         outputs.command.laser = LaserCycle::OFF;
@@ -207,31 +206,31 @@ impl Controller {
         outputs.progress = Some(self.progress(now, &outputs.command));
     }
 
-    /// Looks at the feedback and the peers: what went by.
-    fn check(&mut self, feedback: &Feedback, peers: Peers) -> Result<Elapsed, Finding> {
+    /// Looks at the feedback and the peers: what went by, and the worst of what is wrong.
+    fn check(&mut self, feedback: &Feedback, peers: Peers) -> (Elapsed, Option<Finding>) {
         let seen = self.supervision.feedback(feedback);
+        let elapsed = seen.unwrap_or(Elapsed::ONE);
         if self.state.mode() == CommandMode::Disabled {
             // Unpowered, nothing that drives says is a fault; enabling looks again.
-            return Ok(seen.unwrap_or(Elapsed::ONE));
+            return (elapsed, None);
         }
-        let lost = |peer: Presence, code: FaultCode, tracking: Tracking| match peer {
-            Presence::Present => Ok(()),
-            Presence::Lost => Err(Finding::new(code, 0.0, 0.0, tracking)),
-        };
-        lost(peers.drives, FaultCode::DrivesLost, Tracking::Lost)?;
-        lost(peers.supervisor, FaultCode::SupervisorLost, Tracking::Sound)?;
-        if self.intake.started() != 0 {
-            lost(peers.planner, FaultCode::PlannerLost, Tracking::Sound)?;
-        }
-        let elapsed = seen?;
-        if self.state.follows() {
-            self.supervision.drives(feedback)?;
-        }
-        if self.playing != 0 && feedback.has(status::GATE_INHIBITED) {
-            // Drives keeps the gate closed: going on would leave marks out.
-            return Err(Finding::new(FaultCode::DriveFault, 0.0, 0.0, Tracking::Sound));
-        }
-        Ok(elapsed)
+        let gone =
+            |peer: Presence, code: FaultCode| (peer == Presence::Lost).then(|| Fault::new(code));
+        let begun = self.intake.started() != 0;
+        // Drives keeps the gate closed: going on would leave marks out.
+        let inhibited = self.playing != 0 && feedback.has(status::GATE_INHIBITED);
+        let findings = [
+            gone(peers.drives, FaultCode::DrivesLost).map(Finding::lost),
+            gone(peers.supervisor, FaultCode::SupervisorLost).map(Finding::sound),
+            gone(peers.planner, FaultCode::PlannerLost).filter(|_| begun).map(Finding::sound),
+            seen.err(),
+            self.state.follows().then(|| self.supervision.drives(feedback).err()).flatten(),
+            inhibited.then(|| Finding::sound(Fault::new(FaultCode::DriveFault))),
+        ];
+        // A peer that is lost stays lost: what is worse must be heard beside it.
+        let worse = |finding: &Finding| finding.tracking == Tracking::Lost;
+        let found = || findings.iter().flatten();
+        (elapsed, found().find(|finding| worse(finding)).or_else(|| found().next()).copied())
     }
 
     /// Where drives kept cycles dark for want of a command, the light lost in them is owed.
@@ -245,17 +244,18 @@ impl Controller {
         self.lost_at = from;
         if self.losses > MOST_LOSSES {
             let (value, limit) = (f64::from(self.losses), f64::from(MOST_LOSSES));
-            let code = FaultCode::StaleCommand;
-            self.fail(Finding::new(code, value, limit, Tracking::Sound).at(now));
+            let fault = Fault::new(FaultCode::StaleCommand);
+            self.fail(Finding::sound(fault.beyond(FaultQuantity::Losses, value, limit)), now);
         } else if self.state == State::Running {
             self.state = State::Holding(AfterRest::Resume);
         }
     }
 
-    /// Laser off and axes to rest; the first finding is the fault.
-    fn fail(&mut self, finding: Finding) {
+    /// Laser off and axes to rest; the first finding is the fault, found at `now` unless somebody
+    /// found it before.
+    fn fail(&mut self, finding: Finding, now: Nanoseconds) {
         if !self.fault.is_some() {
-            self.fault = finding.fault;
+            self.fault = finding.fault.at(now);
         }
         self.player.hold();
         self.state = match self.state {

@@ -7,9 +7,9 @@
 use crate::lookahead::Lookahead;
 use crate::rate_limit::RateLimit;
 use crate::stream_time::StreamTime;
-use crate::supervision::{Finding, Supervision, Tracking};
+use crate::supervision::{Finding, Supervision};
 use machine::Machine;
-use signals::{FaultCode, Nanoseconds, Setpoint};
+use signals::{Fault, FaultCode, FaultQuantity, Nanoseconds, Setpoint};
 
 /// Setpoints that must be in hand before a stream begins, unless it is shorter.
 pub const BEGINNING: u64 = 250;
@@ -124,7 +124,8 @@ impl Intake {
         let largest_rate = self.rate_limit.of(setpoint);
         self.lookahead.accept(setpoint, received, largest_rate).map_err(|broken| {
             let (value, limit) = (broken.sequence as f64, broken.expected as f64);
-            Finding::new(FaultCode::StreamBroken, value, limit, Tracking::Sound)
+            let fault = Fault::new(FaultCode::StreamBroken);
+            Finding::sound(fault.beyond(FaultQuantity::Setpoint, value, limit))
         })
     }
 }

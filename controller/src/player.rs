@@ -17,6 +17,7 @@ use crate::rate_limit::LARGEST_RATE;
 use crate::stream_time::{ONE, StreamTime};
 use crate::supervision::Elapsed;
 use signals::LaserCycle;
+use signals::command::MOST_MISSES;
 use signals::setpoint::flags;
 use signals::time::CYCLE_TIME;
 
@@ -26,10 +27,6 @@ pub const SMALLEST_RATE: f64 = 0.1;
 /// How far ahead rates are limited: slowing from the largest rate to the planned one may begin 878
 /// setpoints before.
 const HORIZON: StreamTime = StreamTime(960 * ONE);
-
-/// Cycles without a command after which drives has stopped the axes, and more than supervision
-/// lets go by.
-const MOST_MISSED: u64 = 3;
 
 /// Setpoints never played into while more may come: the neighbours of an interpolation.
 const RESERVE: StreamTime = StreamTime(2 * ONE);
@@ -181,7 +178,7 @@ impl Player {
         // The command given last acts from `next` to `after`; for later cycles there was none.
         let sent = elapsed.missed >= elapsed.cycles && self.marking;
         let unsent = elapsed.cycles > 1 && matches!(self.activity, Activity::Playing(_));
-        let cycles = elapsed.cycles.saturating_sub(1).min(MOST_MISSED) as i64;
+        let cycles = elapsed.cycles.saturating_sub(1).min(MOST_MISSES) as i64;
         let from = if sent { self.next.time } else { self.after.time };
         let from = from.max(self.dark_until);
         let to = self.after.time + StreamTime(cycles * LARGEST_RATE as i64 * ONE);

@@ -4,13 +4,11 @@
 //! so they come to rest along the path, else the drives brake them.
 
 use machine::{Axis, DcMotor, Machine, Motor};
+use signals::command::MOST_MISSES;
 use signals::feedback::status;
 use signals::setpoint::flags;
 use signals::time::CYCLE_TIME;
-use signals::{AxisArray, Cycle, Fault, FaultCode, Feedback, MAX_AXES, Nanoseconds, Setpoint};
-
-/// Feedback cycles that may be missing in a row.
-const LARGEST_GAP: u64 = 3;
+use signals::{AxisArray, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, Setpoint};
 
 /// Overruns in a row that a clock which does not slip may have.
 const OVERRUNS: u64 = 3;
@@ -55,24 +53,14 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// A finding that belongs to no axis.
-    pub fn new(code: FaultCode, value: f64, limit: f64, tracking: Tracking) -> Self {
-        Self { fault: Fault { code: code as u32, value, limit, ..Fault::default() }, tracking }
+    /// A fault with which the axes can still come to rest along the path.
+    pub fn sound(fault: Fault) -> Self {
+        Self { fault, tracking: Tracking::Sound }
     }
 
-    /// A finding on the axis with this index.
-    pub fn on(index: usize, code: FaultCode, value: f64, limit: f64, tracking: Tracking) -> Self {
-        let mut finding = Self::new(code, value, limit, tracking);
-        finding.fault.axis = index as u32 + 1;
-        finding
-    }
-
-    /// The same, found at `now` unless somebody found it before.
-    pub fn at(mut self, now: Nanoseconds) -> Self {
-        if self.fault.at == Nanoseconds(0) {
-            self.fault.at = now;
-        }
-        self
+    /// A fault after which the drives must brake the axes.
+    pub fn lost(fault: Fault) -> Self {
+        Self { fault, tracking: Tracking::Lost }
     }
 }
 
@@ -145,22 +133,25 @@ impl Supervision {
         };
         let before = self.seen.replace(seen);
         self.watch_standing(feedback);
+        let same_run = before.filter(|before| before.epoch == seen.epoch);
+        let gap = same_run.map_or(1, |before| seen.cycle.0.saturating_sub(before.cycle.0));
+        self.heat(feedback, gap);
         if let Some(index) = not_finite(feedback, self.axes.len()) {
-            let value = feedback.position.get(index).copied().unwrap_or_default();
-            return Err(Finding::on(index, FaultCode::NotFinite, value, 0.0, Tracking::Lost));
+            let fault = Fault::new(FaultCode::NotFinite).on(index);
+            return Err(Finding::lost(fault.with(FaultQuantity::Number, f64::NAN)));
         }
         let Some(before) = before else { return Ok(Elapsed::ONE) };
-        let gap = seen.cycle.0.saturating_sub(before.cycle.0);
-        if before.epoch != seen.epoch || gap == 0 || gap > LARGEST_GAP {
-            let limit = LARGEST_GAP as f64;
-            let stale = FaultCode::StaleFeedback;
-            return Err(Finding::new(stale, gap as f64, limit, Tracking::Lost));
+        if before.epoch != seen.epoch || gap == 0 || gap > MOST_MISSES {
+            let (value, limit) = (gap as f64, MOST_MISSES as f64);
+            let fault = Fault::new(FaultCode::StaleFeedback);
+            return Err(Finding::lost(fault.beyond(FaultQuantity::Cycles, value, limit)));
         }
         let overran = seen.overruns > before.overruns && !feedback.has(status::SLIPPING);
         self.overruns = if overran { self.overruns + 1 } else { 0 };
         if self.overruns > OVERRUNS {
             let (value, limit) = (self.overruns as f64, OVERRUNS as f64);
-            return Err(Finding::new(FaultCode::Overrun, value, limit, Tracking::Sound));
+            let fault = Fault::new(FaultCode::Overrun);
+            return Err(Finding::sound(fault.beyond(FaultQuantity::Overruns, value, limit)));
         }
         // Nobody answered the feedbacks in between.
         let missed = seen.missed.saturating_sub(before.missed).clamp(gap - 1, gap);
@@ -173,46 +164,45 @@ impl Supervision {
     /// Its own fault, or that it stopped the axes alone.
     pub fn drives(&self, feedback: &Feedback) -> Result<(), Finding> {
         if feedback.fault.is_some() {
-            return Err(Finding { fault: feedback.fault, tracking: Tracking::Lost });
+            return Err(Finding::lost(feedback.fault));
         }
         if feedback.has(status::STOPPED_ALONE) {
-            let missed = feedback.missed as f64;
-            return Err(Finding::new(FaultCode::StaleCommand, missed, 3.0, Tracking::Lost));
+            return Err(Finding::lost(Fault::new(FaultCode::StaleCommand)));
         }
         if !feedback.has(status::POWERED) {
-            return Err(Finding::new(FaultCode::DriveFault, 0.0, 0.0, Tracking::Lost));
+            return Err(Finding::lost(Fault::new(FaultCode::DriveFault)));
         }
         Ok(())
     }
 
-    /// Whether the axes follow `angle` [rad at the motor] inside their limits, and stay cool.
+    /// Whether the axes follow `angle` [rad at the motor] inside their limits, and are cool.
     ///
     /// # Errors
     /// Following error, soft limit or overload, with the axis.
-    pub fn motion(&mut self, feedback: &Feedback, angle: &AxisArray) -> Result<(), Finding> {
+    pub fn motion(&self, feedback: &Feedback, angle: &AxisArray) -> Result<(), Finding> {
         for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
             let limits = &axis.limits;
             let measured = feedback.position[index] * axis.ratio;
             let error = (angle[index] * axis.ratio - measured).abs();
             if error > limits.following_error || error.is_nan() {
-                let (code, limit) = (FaultCode::FollowingError, limits.following_error);
-                return Err(Finding::on(index, code, error, limit, Tracking::Lost));
+                let fault = Fault::new(FaultCode::FollowingError).on(index);
+                let quantity = FaultQuantity::FollowingError;
+                return Err(Finding::lost(fault.beyond(quantity, error, limits.following_error)));
             }
             // A plan may go right up to the limit, and the axis follows it with some error.
             let [lower, upper] = limits.position;
             let margin = limits.following_error;
             if measured < lower - margin || measured > upper + margin {
                 let limit = if measured < lower { lower } else { upper };
-                let code = FaultCode::PositionLimit;
-                return Err(Finding::on(index, code, measured, limit, Tracking::Lost));
+                let fault = Fault::new(FaultCode::PositionLimit).on(index);
+                return Err(Finding::lost(fault.beyond(FaultQuantity::Position, measured, limit)));
             }
             if let Some(continuous) = axis.motor.dc().and_then(|motor| motor.continuous_current) {
-                let current = feedback.current[index];
-                let heating = &mut self.heating[index];
-                *heating = DcMotor::heated(*heating, current, CYCLE_TIME, DcMotor::HEATING_TIME);
-                if *heating > continuous * continuous {
-                    let (code, value) = (FaultCode::Overload, heating.sqrt());
-                    return Err(Finding::on(index, code, value, continuous, Tracking::Sound));
+                let heating = self.heating[index];
+                if heating > continuous * continuous {
+                    let fault = Fault::new(FaultCode::Overload).on(index);
+                    let (quantity, value) = (FaultQuantity::Heating, heating.sqrt());
+                    return Err(Finding::sound(fault.beyond(quantity, value, continuous)));
                 }
             }
         }
@@ -224,12 +214,14 @@ impl Supervision {
     /// # Errors
     /// A number that is not finite, or a value beyond its axis' limit.
     pub fn setpoint(&self, setpoint: &Setpoint) -> Result<(), Finding> {
-        let sound = Tracking::Sound;
         let scalars = [setpoint.path_velocity, setpoint.path_acceleration, setpoint.path_jerk];
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
-        if !finite(&setpoint.tool) || !finite(&scalars) || !setpoint.laser.is_valid() {
-            let sequence = setpoint.sequence as f64;
-            return Err(Finding::new(FaultCode::NotFinite, sequence, 0.0, sound));
+        let not_finite = Fault::new(FaultCode::NotFinite);
+        if !finite(&setpoint.tool) || !finite(&scalars) {
+            return Err(Finding::sound(not_finite.with(FaultQuantity::Number, f64::NAN)));
+        }
+        if !setpoint.laser.is_valid() {
+            return Err(Finding::sound(impossible_light(setpoint)));
         }
         for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
             let limits = &axis.limits;
@@ -240,14 +232,16 @@ impl Supervision {
                 setpoint.jerk[index],
                 setpoint.lead[index],
                 setpoint.lead_momentum[index],
+                setpoint.static_lead[index],
                 setpoint.effort[index],
                 setpoint.static_effort[index],
                 setpoint.momentum[index],
             ];
             if let Some(value) = numbers.iter().find(|value| !value.is_finite()) {
-                return Err(Finding::on(index, FaultCode::NotFinite, *value, 0.0, sound));
+                let fault = not_finite.on(index).with(FaultQuantity::Number, *value);
+                return Err(Finding::sound(fault));
             }
-            let [position, velocity, acceleration, jerk, _, _, effort, ..] = numbers;
+            let [position, velocity, acceleration, jerk, _, _, _, effort, ..] = numbers;
             let friction =
                 axis.friction.coulomb + axis.friction.viscous * (velocity / axis.ratio).abs();
             let torque = friction
@@ -256,23 +250,22 @@ impl Supervision {
                     Motor::Stepper(motor) => motor.holding_torque,
                 };
             let [lower, upper] = limits.position;
-            let broken = [
-                (lower - position, ROUNDING, position, lower),
-                (position - upper, ROUNDING, position, upper),
-                (velocity.abs(), limits.velocity * EXCESS, velocity, limits.velocity),
-                (
-                    acceleration.abs(),
-                    limits.acceleration * EXCESS,
-                    acceleration,
-                    limits.acceleration,
-                ),
-                (jerk.abs(), limits.jerk * EXCESS, jerk, limits.jerk),
-                (effort.abs(), torque * EXCESS, effort, torque),
+            let sizes = [
+                (FaultQuantity::Velocity, velocity, limits.velocity),
+                (FaultQuantity::Acceleration, acceleration, limits.acceleration),
+                (FaultQuantity::Jerk, jerk, limits.jerk),
+                (FaultQuantity::Torque, effort, torque),
             ];
-            if let Some((_, _, value, limit)) = broken.iter().find(|(size, most, ..)| size > most) {
-                let code = FaultCode::SetpointLimit;
-                return Err(Finding::on(index, code, *value, *limit, sound));
-            }
+            let too_large = sizes.iter().find(|(_, value, limit)| value.abs() > limit * EXCESS);
+            let nearest = position.max(lower).min(upper);
+            let broken = match too_large {
+                None if (position - nearest).abs() <= ROUNDING => continue,
+                None => (FaultQuantity::Position, position, nearest),
+                Some(broken) => *broken,
+            };
+            let (quantity, value, limit) = broken;
+            let fault = Fault::new(FaultCode::SetpointLimit).on(index);
+            return Err(Finding::sound(fault.beyond(quantity, value, limit)));
         }
         Ok(())
     }
@@ -287,10 +280,9 @@ impl Supervision {
         before: Option<&Setpoint>,
         setpoint: &Setpoint,
     ) -> Result<(), Finding> {
-        let (code, sound) = (FaultCode::SetpointLimit, Tracking::Sound);
         let ends = setpoint.has(flags::LAST) || setpoint.has(flags::PAUSE);
         if ends && setpoint.laser.is_lit() {
-            return Err(Finding::new(code, setpoint.sequence as f64, 0.0, sound));
+            return Err(Finding::sound(impossible_light(setpoint)));
         }
         for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
             let unit = axis.limits.following_error;
@@ -302,13 +294,29 @@ impl Supervision {
             });
             let rests = ends || before.is_none();
             let creep = if rests { setpoint.velocity[index] * CYCLE_TIME } else { 0.0 };
-            let shares = [(jump, DISCONTINUITY), (step, LEAD_STEP), (creep, CREEP)];
-            let broken = shares.iter().find(|(value, share)| value.abs() > share * unit);
-            if let Some((value, share)) = broken {
-                return Err(Finding::on(index, code, *value, share * unit, sound));
+            let steps = [
+                (FaultQuantity::Jump, jump, DISCONTINUITY * unit),
+                (FaultQuantity::LeadJump, step, LEAD_STEP * unit),
+                (FaultQuantity::Creep, creep, CREEP * unit),
+            ];
+            let broken = steps.iter().find(|(_, value, limit)| value.abs() > *limit);
+            if let Some((quantity, value, limit)) = broken {
+                let fault = Fault::new(FaultCode::SetpointLimit).on(index);
+                return Err(Finding::sound(fault.beyond(*quantity, *value, *limit)));
             }
         }
         Ok(())
+    }
+
+    /// Warms the windings by the current measured for `cycles`, or lets them cool: powered or not,
+    /// or they would stay warm for as long as a fault lasts.
+    fn heat(&mut self, feedback: &Feedback, cycles: u64) {
+        let time = (cycles as f64 * CYCLE_TIME).min(DcMotor::HEATING_TIME);
+        for (heating, current) in self.heating.iter_mut().zip(&feedback.current) {
+            if current.is_finite() {
+                *heating = DcMotor::heated(*heating, *current, time, DcMotor::HEATING_TIME);
+            }
+        }
     }
 
     fn watch_standing(&mut self, feedback: &Feedback) {
@@ -317,6 +325,12 @@ impl Supervision {
         });
         self.standing = if stands { self.standing.saturating_add(1) } else { 0 };
     }
+}
+
+/// A laser cycle that makes no sense, or light where the stream rests.
+fn impossible_light(setpoint: &Setpoint) -> Fault {
+    let sequence = setpoint.sequence as f64;
+    Fault::new(FaultCode::SetpointLimit).with(FaultQuantity::Light, sequence)
 }
 
 /// The first axis with a measured number that is not finite.

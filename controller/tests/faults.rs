@@ -9,7 +9,8 @@ use machine::Machine;
 use signals::feedback::status;
 use signals::setpoint::flags;
 use signals::{
-    CommandMode, ControllerState, Fault, FaultCode, Feedback, Nanoseconds, OperatorVerb, Setpoint,
+    CommandMode, ControllerState, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds,
+    OperatorVerb, Setpoint,
 };
 use support::{Bench, Job, two_marks};
 
@@ -135,7 +136,7 @@ fn a_lost_peer_stops_the_axes_along_the_path() {
 #[test]
 fn setpoints_that_break_the_stream_or_a_limit_are_never_played() {
     type Spoil = fn(&mut Setpoint);
-    let cases: [(FaultCode, Spoil); 12] = [
+    let cases: [(FaultCode, Spoil); 13] = [
         (FaultCode::StreamBroken, |setpoint| setpoint.sequence += 1),
         (FaultCode::StreamBroken, |setpoint| setpoint.stream = 2),
         (FaultCode::SetpointLimit, |setpoint| setpoint.velocity[1] = 0.7),
@@ -149,7 +150,8 @@ fn setpoints_that_break_the_stream_or_a_limit_are_never_played() {
         (FaultCode::SetpointLimit, |setpoint| setpoint.flags |= flags::LAST),
         (FaultCode::NotFinite, |setpoint| setpoint.jerk[0] = f64::NAN),
         (FaultCode::NotFinite, |setpoint| setpoint.tool[0] = f64::NAN),
-        (FaultCode::NotFinite, |setpoint| setpoint.laser.power = 1.5),
+        (FaultCode::NotFinite, |setpoint| setpoint.static_lead[1] = f64::INFINITY),
+        (FaultCode::SetpointLimit, |setpoint| setpoint.laser.power = 1.5),
     ];
     for (code, spoil) in cases {
         let machine = Machine::builtin();
@@ -198,7 +200,37 @@ fn an_overloaded_winding_stops_the_machine() {
     let mut bench = Bench::enabled(&machine);
     assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
     bench.until(Some(&job), ControllerState::Stopping, 700);
-    assert_eq!(bench.last().command.fault.code(), FaultCode::Overload);
+    let fault = bench.last().command.fault;
+    assert_eq!((fault.code(), fault.quantity()), (FaultCode::Overload, FaultQuantity::Heating));
+    bench.until(Some(&job), ControllerState::Faulted, 1100);
+    // Unpowered, the windings cool: enabled again after a while, the machine stays so.
+    bench.run(None, 10_000);
+    assert!(bench.ask(None, OperatorVerb::Reset, 0.0));
+    assert!(bench.ask(None, OperatorVerb::Enable, 0.0));
+    bench.until(None, ControllerState::Idle, 60);
+    bench.run(None, 100);
+    assert_eq!(bench.state(), ControllerState::Idle);
+}
+
+#[test]
+fn a_planner_that_is_lost_hides_nothing_that_drives_says() {
+    let machine = Machine::builtin();
+    let job = two_marks(&machine, 0.25, 0.5);
+    let mut bench = marking(&machine, &job);
+    bench.peers.planner = Presence::Lost;
+    bench.run(Some(&job), 2);
+    assert_eq!(bench.last().command.mode(), CommandMode::Voltage);
+    // Two feedbacks lost on the way to rest: the plan goes on by three cycles, not by one.
+    let before = bench.last().command.stream_time;
+    bench.skip(2);
+    bench.run(Some(&job), 1);
+    let gone = bench.last().command.stream_time - before;
+    assert!(gone > 2.9e-3, "{gone}");
+    // And what is worse brakes the axes at once, under the fault that came first.
+    bench.cycle(Some(&job), None, |feedback| feedback.fault = Fault::new(FaultCode::DriveFault));
+    let command = bench.last().command;
+    assert_eq!(command.mode(), CommandMode::QuickStop);
+    assert_eq!(command.fault.code(), FaultCode::PlannerLost);
 }
 
 #[test]

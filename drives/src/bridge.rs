@@ -121,8 +121,7 @@ impl Bridge {
 
     /// Stops the axes by the drive's own brake, from the next begin on, until a person resets.
     pub fn stop(&mut self, cause: FaultCode, now: Nanoseconds) {
-        let code = cause as u32;
-        self.watchdog.stop(Fault { code, axis: 0, value: 0.0, limit: 0.0, at: now });
+        self.watchdog.stop(Fault::new(cause).at(now));
     }
 
     /// Leaves the port dark and unpowered; the last thing that a service does.

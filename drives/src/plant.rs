@@ -38,9 +38,12 @@ use machine::transmission::rest;
 use machine::{Axis, LaserSource, Machine, Mechanism, MechanismVisitor};
 use nalgebra::SVector;
 use signals::time::CYCLE_TIME;
-use signals::{AxisArray, CommandMode, Fault, FaultCode, LaserCycle, MAX_AXES, Nanoseconds};
+use signals::{
+    AxisArray, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, MAX_AXES, Nanoseconds,
+};
 
 use crate::port::{Actuation, Freshness, Measurement, Port, Power};
+use crate::watchdog::impossible_light;
 use brake::Brake;
 use coupling::Unsolvable;
 use dynamics::{Dynamics, Motors, Phases, State};
@@ -263,7 +266,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
                 let share = |index: u32| f64::from(index) / f64::from(self.substeps);
                 stepping.drive(field, [share(index), share(index + 1)], actuation.mode);
                 if let Err(stall) = stepping.in_step(field, &self.state) {
-                    self.fail(stall.axis as u32 + 1, stall.value, stall.limit);
+                    self.fail(stall);
                 }
             }
             let phases = match actuation.mode {
@@ -308,11 +311,8 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             ..self.passed
         };
         match unsolvable {
-            Unsolvable::Chain(error) => {
-                let axis = error.axis.map_or(0, |axis| axis as u32 + 1);
-                self.fail(axis, error.value, error.limit);
-            }
-            Unsolvable::Mass => self.fail(0, 0.0, 0.0),
+            Unsolvable::Chain(error) => self.fail(out_of_reach(error)),
+            Unsolvable::Mass => self.fail(Fault::new(FaultCode::DriveFault)),
         }
     }
 
@@ -323,7 +323,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             return Actuation { laser: LaserCycle::OFF, ..*actuation };
         }
         if !self.fault.is_some() {
-            self.fault = self.refusal(actuation);
+            self.fault = self.refusal(actuation).unwrap_or_default();
         }
         if self.fault.is_some() {
             return self.stopped();
@@ -363,7 +363,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         }
         match self.dynamics.locate(&self.state.load) {
             Ok(pose) => measurement.tool = Some(pose.position.into()),
-            Err(error) => self.fail(0, error.value, error.limit),
+            Err(error) => self.fail(out_of_reach(&error)),
         }
         measurement.laser = self.light;
     }
@@ -377,38 +377,29 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
     }
 
     /// Why this plant cannot carry `actuation` out, if it cannot.
-    fn refusal(&self, actuation: &Actuation) -> Fault {
-        let fault = |code: FaultCode, axis, value| Fault {
-            code: code as u32,
-            axis,
-            value,
-            limit: 0.0,
-            at: Nanoseconds(0),
-        };
+    fn refusal(&self, actuation: &Actuation) -> Option<Fault> {
         let targets: &[&AxisArray] = match actuation.mode {
             CommandMode::Disabled | CommandMode::QuickStop => &[],
             mode if mode != self.following() => {
-                return fault(FaultCode::DriveFault, 0, f64::from(mode as u32));
+                let fault = Fault::new(FaultCode::DriveFault);
+                return Some(fault.with(FaultQuantity::Mode, f64::from(mode as u32)));
             }
             CommandMode::Position => &[&actuation.position, &actuation.velocity],
             _ => &[&actuation.voltage],
         };
         for values in targets {
             if let Some(axis) = values.iter().take(N).position(|value| !value.is_finite()) {
-                return fault(FaultCode::NotFinite, axis as u32 + 1, values[axis]);
+                let fault = Fault::new(FaultCode::NotFinite).on(axis);
+                return Some(fault.with(FaultQuantity::Number, values[axis]));
             }
         }
-        if actuation.laser.is_valid() {
-            Fault::default()
-        } else {
-            fault(FaultCode::DriveFault, 0, f64::from(actuation.laser.edge_count))
-        }
+        (!actuation.laser.is_valid()).then(|| impossible_light(&actuation.laser))
     }
 
-    fn fail(&mut self, axis: u32, value: f64, limit: f64) {
+    /// Reports `fault` unless there is an earlier one.
+    fn fail(&mut self, fault: Fault) {
         if !self.fault.is_some() {
-            let code = FaultCode::DriveFault as u32;
-            self.fault = Fault { code, axis, value, limit, at: Nanoseconds(0) };
+            self.fault = fault;
         }
     }
 }
@@ -429,7 +420,7 @@ impl<const N: usize, M: Mechanism<N>> Port for Plant<N, M> {
             match self.source.cycle(&in_force.laser) {
                 Ok(light) => self.light = light,
                 Err(source::TooManyEdges) => {
-                    self.fail(0, f64::from(in_force.laser.edge_count), signals::MAX_EDGES as f64);
+                    self.fail(impossible_light(&in_force.laser));
                 }
             }
         }
@@ -438,7 +429,7 @@ impl<const N: usize, M: Mechanism<N>> Port for Plant<N, M> {
         if let Some(stepping) = &mut self.stepping
             && let Err(beyond) = stepping.engage(&admitted, &self.state)
         {
-            self.fail(beyond.axis as u32 + 1, beyond.value, beyond.limit);
+            self.fail(beyond);
             admitted = self.stopped();
             if let Some(stepping) = &mut self.stepping {
                 stepping.brake();
@@ -456,10 +447,18 @@ impl<const N: usize, M: Mechanism<N>> Port for Plant<N, M> {
     }
 }
 
+/// The fault of a place that the mechanism cannot reach.
+fn out_of_reach(error: &KinematicsError) -> Fault {
+    let fault = Fault::new(FaultCode::DriveFault);
+    let fault = error.axis.map_or(fault, |axis| fault.on(axis));
+    fault.beyond(FaultQuantity::Mechanism, error.value, error.limit)
+}
+
 /// `value` within ±`limit`.
 fn saturate(value: f64, limit: f64) -> f64 {
     value.max(-limit).min(limit)
 }
+
 /// A phase −0.5..0.5 [counts] for an encoder, 0 for seed 0 (SplitMix64, Steele et al. 2014).
 fn encoder_phase(seed: u64, axis: u64) -> f64 {
     if seed == 0 {

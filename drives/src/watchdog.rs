@@ -21,13 +21,11 @@
 //! the motors' safe torque off are wired.
 
 use signals::{
-    AxisArray, Command, CommandMode, Fault, FaultCode, LaserCycle, Nanoseconds, axis::MAX_AXES,
+    AxisArray, Command, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, MAX_EDGES,
+    Nanoseconds, axis::MAX_AXES, command::MOST_MISSES,
 };
 
 use crate::port::{Actuation, Freshness};
-
-/// Cycles in a row without a fresh command after which the axes are stopped.
-pub const MOST_MISSES: u32 = 3;
 
 /// Whether the gate may open in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -66,7 +64,7 @@ pub struct Counts {
 pub struct Watchdog {
     axes: usize,
     watch: Watch,
-    misses: u32,
+    misses: u64,
     reset: u64,
     fault: Fault,
     last: Actuation,
@@ -137,15 +135,14 @@ impl Watchdog {
             }
             Watch::Waiting => {
                 self.reset = command.reset;
-                let code = FaultCode::DriveFault as u32;
-                let value = f64::from(command.mode);
-                self.stop(Fault { code, axis: 0, value, limit: 0.0, at: now });
+                let fault = Fault::new(FaultCode::DriveFault);
+                let mode = f64::from(command.mode);
+                self.stop(fault.with(FaultQuantity::Mode, mode).at(now));
             }
             Watch::Following => {
                 self.reset = command.reset;
-                let doubt = doubt(command, self.axes, now);
-                if doubt.is_some() {
-                    self.stop(doubt);
+                if let Some(doubt) = doubt(command, self.axes) {
+                    self.stop(doubt.at(now));
                 }
             }
             Watch::Stopped if mode == CommandMode::Disabled => {
@@ -176,13 +173,9 @@ impl Watchdog {
                 self.watch = Watch::Waiting;
                 self.last = Actuation::DISABLED;
             } else {
-                self.stop(Fault {
-                    code: FaultCode::StaleCommand as u32,
-                    axis: 0,
-                    value: f64::from(self.misses),
-                    limit: f64::from(MOST_MISSES),
-                    at: now,
-                });
+                let (value, limit) = (self.misses as f64, MOST_MISSES as f64);
+                let fault = Fault::new(FaultCode::StaleCommand);
+                self.stop(fault.beyond(FaultQuantity::Cycles, value, limit).at(now));
             }
         }
     }
@@ -226,14 +219,7 @@ fn actuation(command: &Command, mode: CommandMode) -> Actuation {
 
 /// What makes `command` impossible to carry out, if anything: a target of its mode that is not
 /// finite, or a laser cycle that makes no sense.
-fn doubt(command: &Command, axes: usize, now: Nanoseconds) -> Fault {
-    let fault = |code: FaultCode, axis, value, limit| Fault {
-        code: code as u32,
-        axis,
-        value,
-        limit,
-        at: now,
-    };
+fn doubt(command: &Command, axes: usize) -> Option<Fault> {
     let targets: Option<&AxisArray> = match command.mode() {
         CommandMode::Disabled | CommandMode::QuickStop => None,
         CommandMode::Position => Some(&command.position),
@@ -245,11 +231,17 @@ fn doubt(command: &Command, axes: usize, now: Nanoseconds) -> Fault {
         targets.iter().take(axes).enumerate().find(|(_, target)| !target.is_finite())
     });
     if let Some((axis, target)) = broken {
-        return fault(FaultCode::NotFinite, axis as u32 + 1, *target, 0.0);
+        let fault = Fault::new(FaultCode::NotFinite).on(axis);
+        return Some(fault.with(FaultQuantity::Number, *target));
     }
     if !command.laser.is_valid() {
-        let edges = f64::from(command.laser.edge_count);
-        return fault(FaultCode::DriveFault, 0, edges, signals::MAX_EDGES as f64);
+        return Some(impossible_light(&command.laser));
     }
-    Fault::default()
+    None
+}
+
+/// The fault of a laser cycle that makes no sense: too many edges, or edges out of order.
+pub(crate) fn impossible_light(laser: &LaserCycle) -> Fault {
+    let (edges, limit) = (f64::from(laser.edge_count), MAX_EDGES as f64);
+    Fault::new(FaultCode::DriveFault).beyond(FaultQuantity::Edges, edges, limit)
 }

@@ -27,7 +27,7 @@ pub mod time;
 
 pub use axis::{AxisArray, AxisIndex, MAX_AXES};
 pub use command::{Command, CommandMode};
-pub use fault::{Fault, FaultCode};
+pub use fault::{Fault, FaultCode, FaultQuantity};
 pub use feedback::Feedback;
 pub use job::{JobOffer, PlannerPhase, PlannerReport};
 pub use laser::{GateEdge, LaserCycle, MAX_EDGES};

@@ -5,9 +5,10 @@ use crate::cascade::Measurement;
 use crate::exchange::Inputs;
 use crate::gate::TooManyEdges;
 use crate::state::State;
-use crate::supervision::{Finding, Tracking};
+use crate::supervision::Finding;
 use signals::{
-    Command, CommandMode, FaultCode, LaserCycle, MAX_AXES, MAX_EDGES, Nanoseconds, Progress,
+    Command, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, MAX_AXES, MAX_EDGES,
+    Nanoseconds, Progress,
 };
 
 /// Cycles between two progress samples.
@@ -23,8 +24,9 @@ impl Controller {
         };
         let laser = light.unwrap_or_else(|TooManyEdges| {
             let limit = MAX_EDGES as f64;
-            let code = FaultCode::SetpointLimit;
-            self.fail(Finding::new(code, limit + 1.0, limit, Tracking::Sound).at(now));
+            let fault = Fault::new(FaultCode::SetpointLimit);
+            let fault = fault.beyond(FaultQuantity::Edges, limit + 1.0, limit);
+            self.fail(Finding::sound(fault), now);
             LaserCycle::OFF
         });
         let lookahead = self.intake.lookahead();

@@ -5,7 +5,7 @@ use crate::alignment::Alignment;
 use crate::state::{AfterRest, State};
 use crate::supervision::{Finding, Tracking};
 use signals::feedback::status;
-use signals::{Cycle, FaultCode, Feedback, Nanoseconds};
+use signals::{Cycle, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds};
 
 /// Cycles of standing still before an axis counts as at rest without a plan, and of holding
 /// before it counts as enabled.
@@ -72,8 +72,8 @@ impl Controller {
         };
         if waited >= PATIENCE {
             let (value, limit) = (f64::from(waited), f64::from(PATIENCE));
-            let finding = Finding::new(FaultCode::DriveFault, value, limit, Tracking::Lost);
-            self.fail(finding.at(now));
+            let fault = Fault::new(FaultCode::DriveFault);
+            self.fail(Finding::lost(fault.beyond(FaultQuantity::Cycles, value, limit)), now);
         }
     }
 
@@ -86,8 +86,8 @@ impl Controller {
         };
         if waited >= SUPPLY_PATIENCE {
             let time = self.player.after().time.seconds();
-            let code = FaultCode::StreamStarved;
-            self.fail(Finding::new(code, time, 0.0, Tracking::Sound).at(now));
+            let fault = Fault::new(FaultCode::StreamStarved);
+            self.fail(Finding::sound(fault.with(FaultQuantity::StreamTime, time)), now);
         }
     }
 
@@ -107,7 +107,7 @@ impl Controller {
                     self.player.resume(lookahead);
                 }
             }
-            Err(finding) => self.fail(finding.at(now)),
+            Err(finding) => self.fail(finding, now),
         }
     }
 

@@ -11,7 +11,7 @@
 
 use machine::{Axis, StepperMotor};
 use nalgebra::SVector;
-use signals::CommandMode;
+use signals::{CommandMode, Fault, FaultCode, FaultQuantity};
 
 use super::brake;
 use super::dynamics::State;
@@ -68,14 +68,6 @@ impl<const N: usize> Field<N> {
     }
 }
 
-/// Something that the drivers or the rotors cannot do.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Failure {
-    pub(super) axis: usize,
-    pub(super) value: f64,
-    pub(super) limit: f64,
-}
-
 /// The drivers of all axes.
 #[derive(Debug, Clone)]
 pub(super) struct Stepping<const N: usize> {
@@ -121,11 +113,7 @@ impl<const N: usize> Stepping<N> {
     ///
     /// # Errors
     /// A pulse rate beyond a driver's limit; the cycle is then left as it was.
-    pub(super) fn engage(
-        &mut self,
-        actuation: &Actuation,
-        state: &State<N>,
-    ) -> Result<(), Failure> {
+    pub(super) fn engage(&mut self, actuation: &Actuation, state: &State<N>) -> Result<(), Fault> {
         let mut segments = self.segments;
         for (row, segment) in segments.iter_mut().enumerate() {
             let motor = &self.motors[row];
@@ -140,7 +128,8 @@ impl<const N: usize> Stepping<N> {
             let rate = segment.fastest() * motor.pulses_per_radian();
             let follows = actuation.mode == CommandMode::Position;
             if follows && (rate > motor.pulse_rate * EXCESS || rate.is_nan()) {
-                return Err(Failure { axis: row, value: rate, limit: motor.pulse_rate });
+                let fault = Fault::new(FaultCode::DriveFault).on(row);
+                return Err(fault.beyond(FaultQuantity::PulseRate, rate, motor.pulse_rate));
             }
         }
         self.segments = segments;
@@ -164,12 +153,13 @@ impl<const N: usize> Stepping<N> {
     ///
     /// # Errors
     /// One that is not, with how far it is off [rad].
-    pub(super) fn in_step(&self, field: &Field<N>, state: &State<N>) -> Result<(), Failure> {
+    pub(super) fn in_step(&self, field: &Field<N>, state: &State<N>) -> Result<(), Fault> {
         for (row, motor) in self.motors.iter().enumerate() {
             let lag = (field.angle[row] - state.angle[row]).abs();
             let limit = motor.stall_angle();
             if field.powered && (lag > limit || lag.is_nan()) {
-                return Err(Failure { axis: row, value: lag, limit });
+                let fault = Fault::new(FaultCode::DriveFault).on(row);
+                return Err(fault.beyond(FaultQuantity::Lag, lag, limit));
             }
         }
         Ok(())
