@@ -144,7 +144,7 @@ impl Controller {
         self.cycles += 1;
         (outputs.progress, outputs.report, outputs.reply) = (None, None, None);
         for setpoint in inputs.setpoints {
-            if let Err(finding) = self.intake.take(setpoint, inputs.received, &self.supervision) {
+            if let Err(finding) = self.intake.take(setpoint, &self.supervision) {
                 self.fail(finding, now);
             }
         }

@@ -91,7 +91,7 @@ fn push(cycle: &mut LaserCycle, offset: f64, gate: u32, power: f64) -> Result<()
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use signals::{Nanoseconds, Setpoint};
+    use signals::Setpoint;
 
     /// Dark, then stroke 3 from 1.25 to 3.5 in stream time, at power 0.4.
     fn ring() -> Lookahead {
@@ -109,7 +109,7 @@ mod tests {
                 }
                 _ => {}
             }
-            ring.accept(&setpoint, Nanoseconds(0), 2.0).unwrap();
+            ring.accept(&setpoint, 2.0).unwrap();
         }
         ring
     }
@@ -195,7 +195,7 @@ mod tests {
                 let edge = GateEdge { offset: slot * 100_000, gate, power: f64::from(gate) };
                 assert!(setpoint.laser.push(edge));
             }
-            ring.accept(&setpoint, Nanoseconds(0), 2.0).unwrap();
+            ring.accept(&setpoint, 2.0).unwrap();
         }
         let play = |from, to| laser(&ring, Stretch { from: at(from), to: at(to) }, StreamTime(0));
         assert_eq!(play(0.0, 1.0).unwrap().edges().len(), 10);

@@ -9,7 +9,7 @@ use crate::rate_limit::RateLimit;
 use crate::stream_time::StreamTime;
 use crate::supervision::{Finding, Supervision};
 use machine::Machine;
-use signals::{Fault, FaultCode, FaultQuantity, Nanoseconds, Setpoint};
+use signals::{Fault, FaultCode, FaultQuantity, Setpoint};
 
 /// Setpoints that must be in hand before a stream begins, unless it is shorter.
 pub const BEGINNING: u64 = 250;
@@ -93,12 +93,7 @@ impl Intake {
     ///
     /// # Errors
     /// One that breaks a limit, or breaks the stream that was started.
-    pub fn take(
-        &mut self,
-        setpoint: &Setpoint,
-        received: Nanoseconds,
-        supervision: &Supervision,
-    ) -> Result<(), Finding> {
+    pub fn take(&mut self, setpoint: &Setpoint, supervision: &Supervision) -> Result<(), Finding> {
         if setpoint.stream <= self.finished && setpoint.stream != 0 {
             return Ok(());
         }
@@ -122,7 +117,7 @@ impl Intake {
             supervision.continuity(before, setpoint)?;
         }
         let largest_rate = self.rate_limit.of(setpoint);
-        self.lookahead.accept(setpoint, received, largest_rate).map_err(|broken| {
+        self.lookahead.accept(setpoint, largest_rate).map_err(|broken| {
             let (value, limit) = (broken.sequence as f64, broken.expected as f64);
             let fault = Fault::new(FaultCode::StreamBroken);
             Finding::sound(fault.beyond(FaultQuantity::Setpoint, value, limit))

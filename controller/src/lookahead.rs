@@ -4,7 +4,7 @@
 use crate::rate_limit::LARGEST_RATE;
 use crate::stream_time::StreamTime;
 use signals::setpoint::flags;
-use signals::{Nanoseconds, Setpoint};
+use signals::Setpoint;
 
 /// Setpoints in the ring; a power of two.
 pub const CAPACITY: usize = 2048;
@@ -44,7 +44,6 @@ pub struct StreamBroken {
 #[derive(Debug)]
 pub struct Lookahead {
     setpoints: Box<[Setpoint; CAPACITY]>,
-    received: Box<[Nanoseconds; CAPACITY]>,
     blocks: [Block; BLOCKS],
     stream: u64,
     accepted: u64,
@@ -57,7 +56,6 @@ impl Lookahead {
     pub fn new() -> Self {
         Self {
             setpoints: boxed(Setpoint::default()),
-            received: boxed(Nanoseconds(0)),
             blocks: [Block { largest_rate: LARGEST_RATE, lit: false }; BLOCKS],
             stream: 0,
             accepted: 0,
@@ -75,12 +73,7 @@ impl Lookahead {
     ///
     /// # Errors
     /// A gap, a repetition, another stream, or no room.
-    pub fn accept(
-        &mut self,
-        setpoint: &Setpoint,
-        received: Nanoseconds,
-        largest_rate: f64,
-    ) -> Result<(), StreamBroken> {
+    pub fn accept(&mut self, setpoint: &Setpoint, largest_rate: f64) -> Result<(), StreamBroken> {
         let continues = setpoint.sequence == self.accepted
             && (setpoint.stream == self.stream || self.stream == 0);
         if !continues || setpoint.stream == 0 || self.complete || self.room() == 0 {
@@ -93,7 +86,6 @@ impl Lookahead {
         self.stream = setpoint.stream;
         let slot = self.accepted as usize % CAPACITY;
         self.setpoints[slot] = *setpoint;
-        self.received[slot] = received;
         let block = &mut self.blocks[slot / BLOCK];
         if slot.is_multiple_of(BLOCK) {
             *block = Block { largest_rate, lit: false };
@@ -149,12 +141,6 @@ impl Lookahead {
     pub fn setpoint(&self, sequence: u64) -> &Setpoint {
         &self.setpoints[self.nearest(sequence)]
     }
-
-    /// When that setpoint came in.
-    pub fn received(&self, sequence: u64) -> Nanoseconds {
-        self.received[self.nearest(sequence)]
-    }
-
     /// The largest rate at `from` that all setpoints up to `to` allow, up to a block more at either
     /// end. What has not come in yet is taken to allow no more than the planned rate. `before`
     /// gives the rate from which a limit can still be kept, so many setpoints before it.
@@ -244,7 +230,7 @@ mod tests {
     }
 
     fn take(ring: &mut Lookahead, sequence: u64) -> Result<(), StreamBroken> {
-        ring.accept(&setpoint(7, sequence), Nanoseconds(sequence as i64), 2.0)
+        ring.accept(&setpoint(7, sequence), 2.0)
     }
 
     #[test]
@@ -253,11 +239,11 @@ mod tests {
         take(&mut ring, 0).unwrap();
         take(&mut ring, 1).unwrap();
         for (stream, sequence) in [(7, 1), (7, 3), (8, 2), (0, 2)] {
-            let refused = ring.accept(&setpoint(stream, sequence), Nanoseconds(0), 2.0);
+            let refused = ring.accept(&setpoint(stream, sequence), 2.0);
             assert_eq!(refused, Err(StreamBroken { stream, sequence, expected: 2 }));
         }
         let last = Setpoint { flags: flags::LAST, ..setpoint(7, 2) };
-        ring.accept(&last, Nanoseconds(0), 2.0).unwrap();
+        ring.accept(&last, 2.0).unwrap();
         assert!(take(&mut ring, 3).is_err());
     }
 
@@ -272,7 +258,6 @@ mod tests {
             let oldest = ring.played().saturating_sub(HISTORY as u64);
             assert_eq!(ring.setpoint(oldest).sequence, oldest);
             assert_eq!(ring.setpoint(sequence).sequence, sequence);
-            assert_eq!(ring.received(sequence), Nanoseconds(sequence as i64));
             assert_eq!(ring.setpoint(sequence + 9).sequence, sequence);
         }
         ring.pass(StreamTime::of(10));
@@ -292,7 +277,7 @@ mod tests {
             let mut setpoint = setpoint(7, sequence);
             setpoint.laser.gate = u32::from(sequence == 200);
             let rate = if slow { 1.25 } else { 2.0 };
-            ring.accept(&setpoint, Nanoseconds(0), rate).unwrap();
+            ring.accept(&setpoint, rate).unwrap();
             if sequence == 1000 {
                 let around = |from, to| (StreamTime::of(from), StreamTime::of(to));
                 let (from, to) = around(100, 300);

@@ -26,22 +26,22 @@ const MOST_EDGES: u32 = 5;
 /// Newton steps from [`LARGEST_RATE`] down to a root that is at least 1: the error squares with each.
 const NEWTON_STEPS: usize = 7;
 
-/// The limits that a rate must keep, as reciprocals: this is asked once a cycle.
+/// The limits that a rate must keep. It is asked for every setpoint, so they stand as reciprocals.
 #[derive(Debug, Clone)]
 pub struct RateLimit {
-    marking: f64,
-    moving: f64,
-    acceleration: f64,
-    jerk: f64,
+    per_marking_speed: f64,
+    per_moving_speed: f64,
+    per_acceleration: f64,
+    per_jerk: f64,
     axes: Vec<AxisRate>,
 }
 
 /// One axis: reciprocal limits of its joint, and the two lines that bound its motor's torque.
 #[derive(Debug, Clone, Copy)]
 struct AxisRate {
-    velocity: f64,
-    acceleration: f64,
-    jerk: f64,
+    per_velocity: f64,
+    per_acceleration: f64,
+    per_jerk: f64,
     /// Friction per joint speed [N·m·s/m or N·m·s/rad].
     viscous: f64,
     coulomb: f64,
@@ -58,10 +58,10 @@ impl RateLimit {
     pub fn new(machine: &Machine) -> Self {
         let path = &machine.path;
         Self {
-            marking: 1.0 / path.speed,
-            moving: 1.0 / path.speed.max(path.rapid),
-            acceleration: 1.0 / path.acceleration,
-            jerk: 1.0 / path.jerk,
+            per_marking_speed: 1.0 / path.speed,
+            per_moving_speed: 1.0 / path.speed.max(path.rapid),
+            per_acceleration: 1.0 / path.acceleration,
+            per_jerk: 1.0 / path.jerk,
             axes: machine.axes.iter().map(AxisRate::new).collect(),
         }
     }
@@ -70,13 +70,14 @@ impl RateLimit {
     pub fn of(&self, setpoint: &Setpoint) -> f64 {
         let lit = setpoint.laser.is_lit();
         let path_velocity = setpoint.path_velocity;
-        let mut velocity = path_velocity * if lit { self.marking } else { self.moving };
-        let mut acceleration = setpoint.path_acceleration * self.acceleration;
-        let mut jerk = setpoint.path_jerk * self.jerk;
+        let mut velocity =
+            path_velocity * if lit { self.per_marking_speed } else { self.per_moving_speed };
+        let mut acceleration = setpoint.path_acceleration * self.per_acceleration;
+        let mut jerk = setpoint.path_jerk * self.per_jerk;
         // What a change of the rate adds, in shares of the limits, per ṙ and r̈.
-        let mut pull = path_velocity * self.acceleration;
+        let mut pull = path_velocity * self.per_acceleration;
         let (mut twist, mut jolt) =
-            (setpoint.path_acceleration * self.jerk, path_velocity * self.jerk);
+            (setpoint.path_acceleration * self.per_jerk, path_velocity * self.per_jerk);
         let mut rate = LARGEST_RATE;
         let joints = setpoint.velocity.iter().zip(&setpoint.acceleration).zip(&setpoint.jerk);
         let efforts = setpoint.effort.iter().zip(&setpoint.static_effort).zip(&setpoint.momentum);
@@ -84,12 +85,12 @@ impl RateLimit {
             self.axes.iter().zip(joints).zip(efforts)
         {
             let (speed, joint_acceleration) = (speed.abs(), joint_acceleration.abs());
-            velocity = velocity.max(speed * axis.velocity);
-            acceleration = acceleration.max(joint_acceleration * axis.acceleration);
-            jerk = jerk.max(joint_jerk.abs() * axis.jerk);
-            pull = pull.max(speed * axis.acceleration);
-            twist = twist.max(joint_acceleration * axis.jerk);
-            jolt = jolt.max(speed * axis.jerk);
+            velocity = velocity.max(speed * axis.per_velocity);
+            acceleration = acceleration.max(joint_acceleration * axis.per_acceleration);
+            jerk = jerk.max(joint_jerk.abs() * axis.per_jerk);
+            pull = pull.max(speed * axis.per_acceleration);
+            twist = twist.max(joint_acceleration * axis.per_jerk);
+            jolt = jolt.max(speed * axis.per_jerk);
             let constant = standing.abs() + momentum.abs() * OVERRIDE_CHANGE;
             rate = rate.min(axis.motor_rate(speed, (effort - standing).abs(), constant));
         }
@@ -122,9 +123,9 @@ impl AxisRate {
             }
         };
         Self {
-            velocity: 1.0 / velocity,
-            acceleration: 1.0 / limits.acceleration,
-            jerk: 1.0 / limits.jerk,
+            per_velocity: 1.0 / velocity,
+            per_acceleration: 1.0 / limits.acceleration,
+            per_jerk: 1.0 / limits.jerk,
             viscous: axis.friction.viscous / axis.ratio,
             coulomb: axis.friction.coulomb,
             by_current,

@@ -12,8 +12,8 @@ use signals::{
 /// The running report of a stream.
 #[derive(Debug, Clone)]
 pub struct Statistics {
-    path_acceleration: f64,
-    path_jerk: f64,
+    per_path_acceleration: f64,
+    per_path_jerk: f64,
     axes: Vec<Shares>,
     report: ControllerReport,
     digest: Digest,
@@ -22,24 +22,24 @@ pub struct Statistics {
 /// Reciprocal limits of one axis.
 #[derive(Debug, Clone, Copy)]
 struct Shares {
-    velocity: f64,
-    acceleration: f64,
-    jerk: f64,
-    current: f64,
+    per_velocity: f64,
+    per_acceleration: f64,
+    per_jerk: f64,
+    per_current: f64,
 }
 
 impl Statistics {
     /// For this machine, before any stream.
     pub fn new(machine: &Machine) -> Self {
         let shares = |axis: &Axis| Shares {
-            velocity: 1.0 / axis.limits.velocity,
-            acceleration: 1.0 / axis.limits.acceleration,
-            jerk: 1.0 / axis.limits.jerk,
-            current: axis.motor.dc().map_or(0.0, |motor| 1.0 / motor.current),
+            per_velocity: 1.0 / axis.limits.velocity,
+            per_acceleration: 1.0 / axis.limits.acceleration,
+            per_jerk: 1.0 / axis.limits.jerk,
+            per_current: axis.motor.dc().map_or(0.0, |motor| 1.0 / motor.current),
         };
         Self {
-            path_acceleration: 1.0 / machine.path.acceleration,
-            path_jerk: 1.0 / machine.path.jerk,
+            per_path_acceleration: 1.0 / machine.path.acceleration,
+            per_path_jerk: 1.0 / machine.path.jerk,
             axes: machine.axes.iter().map(shares).collect(),
             report: ControllerReport::default(),
             digest: Digest::new(),
@@ -78,7 +78,7 @@ impl Statistics {
         if let (Some(axis), Some(most)) =
             (self.axes.get(index), self.report.effort_use.get_mut(index))
         {
-            *most = most.max(drive.current.abs() * axis.current);
+            *most = most.max(drive.current.abs() * axis.per_current);
         }
     }
 
@@ -93,17 +93,17 @@ impl Statistics {
         let raise = |most: &mut f64, share: f64| *most = most.max(share);
         let (velocity, acceleration) = (setpoint.path_velocity, setpoint.path_acceleration);
         let along = acceleration * square + velocity * change.abs();
-        raise(&mut report.path_acceleration_use, along * self.path_acceleration);
+        raise(&mut report.path_acceleration_use, along * self.per_path_acceleration);
         let along = setpoint.path_jerk * cube.abs() + acceleration * twist.abs();
-        raise(&mut report.path_jerk_use, along * self.path_jerk);
+        raise(&mut report.path_jerk_use, along * self.per_path_jerk);
         for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
             let velocity = setpoint.velocity[index];
             let acceleration = setpoint.acceleration[index];
             let jerk = setpoint.jerk[index] * cube + acceleration * twist;
-            raise(&mut report.velocity_use[index], (velocity * rate).abs() * axis.velocity);
+            raise(&mut report.velocity_use[index], (velocity * rate).abs() * axis.per_velocity);
             let total = acceleration * square + velocity * change;
-            raise(&mut report.acceleration_use[index], total.abs() * axis.acceleration);
-            raise(&mut report.jerk_use[index], jerk.abs() * axis.jerk);
+            raise(&mut report.acceleration_use[index], total.abs() * axis.per_acceleration);
+            raise(&mut report.jerk_use[index], jerk.abs() * axis.per_jerk);
         }
     }
 

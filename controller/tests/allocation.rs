@@ -25,7 +25,7 @@ fn no_step_allocates() {
         feedback.position[index] = support::home(&machine)[index] / axis.ratio;
     }
     let mut sent = 0;
-    let (mut seen, mut steps) = ([0; 7], 0);
+    let mut seen = [0; 7];
     for cycle in 1..2600_u64 {
         let verb = match cycle {
             5 => Some((OperatorVerb::Enable, 0.0)),
@@ -65,9 +65,7 @@ fn no_step_allocates() {
         assert_eq!(asked, Allocations::default(), "in cycle {cycle}");
         sent = end;
         seen[outputs.command.state as usize] += 1;
-        steps += 1;
     }
-    assert_eq!(steps, seen.iter().sum::<u64>());
     for state in [
         ControllerState::Disabled,
         ControllerState::Enabling,

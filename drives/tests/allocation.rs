@@ -1,37 +1,57 @@
-//! A cycle of the bridge and the plant takes nothing from the heap, in any of its states.
+//! A cycle of the bridge and the plant takes nothing from the heap, in any of its states, on any
+//! machine.
 #![allow(clippy::unwrap_used)]
 
+use std::path::{Path, PathBuf};
+
 use drives::{Bridge, BridgeOptions, PlantOptions, SimulatedPlant};
-use machine::Machine;
+use machine::{Machine, Motor};
 use runtime::allocation::{Allocations, CountingAllocator};
 use signals::{Command, CommandMode, LaserCycle, Nanoseconds, RealtimeFacts, axis::axis_array};
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-#[test]
-fn a_cycle_does_not_allocate() {
+fn machine_files() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../machines");
+    let entries = folder.read_dir().unwrap().map(|entry| entry.unwrap().path());
+    entries.filter(|path| path.extension().is_some_and(|kind| kind == "toml")).collect()
+}
+
+/// Runs the bridge of `machine` to and fro about home, with commands missed now and then, and at the
+/// end with a mode that the plant refuses.
+fn assert_allocates_nothing(name: &str, machine: &Machine) {
     let (port, built) =
-        Allocations::during(|| SimulatedPlant::new(&Machine::builtin(), PlantOptions::default()));
+        Allocations::during(|| SimulatedPlant::new(machine, PlantOptions::default()));
     assert!(built.allocations > 0, "the counting allocator does not count");
     let mut bridge = Bridge::new(port.unwrap(), BridgeOptions::default());
+    let stepping = matches!(machine.axes[0].motor, Motor::Stepper(_));
+    let (follows, refused) = if stepping {
+        (CommandMode::Position, CommandMode::Voltage)
+    } else {
+        (CommandMode::Voltage, CommandMode::Position)
+    };
+    let mut home = None;
+    let mut moved = 0.0_f64;
     let ((), cycles) = Allocations::during(|| {
-        for index in 0..2000_i64 {
+        for index in 0..1000_i64 {
             let deadline = Nanoseconds(1_000_000 * (index + 1));
             bridge.begin(deadline, deadline);
             let feedback = *bridge.stamp(deadline + Nanoseconds(3000));
+            let home = *home.get_or_insert(feedback.position);
+            moved = moved.max((feedback.position[0] - home[0]).abs());
             let mode = match index {
                 0..10 => CommandMode::Disabled,
-                10..900 => CommandMode::Voltage,
-                // A mode that the plant refuses, with all that follows.
-                _ => CommandMode::Position,
+                10..900 => follows,
+                _ => refused,
             };
-            let volts = if index % 200 < 100 { 5.0 } else { -5.0 };
+            let side = if index % 20 < 10 { 1.0 } else { -1.0 };
             let command = Command {
                 epoch: feedback.epoch,
                 cycle: feedback.cycle,
                 mode: mode as u32,
-                voltage: axis_array(&[volts, 0.4 * volts]),
+                voltage: axis_array(&[side, 0.4 * side]),
+                position: home.map(|angle| angle + 0.02 * side),
                 laser: LaserCycle { gate: 1, power: 1.0, ..LaserCycle::OFF },
                 ..Command::default()
             };
@@ -44,6 +64,24 @@ fn a_cycle_does_not_allocate() {
             bridge.report(RealtimeFacts::default());
         }
     });
-    assert_eq!(cycles, Allocations::default());
-    assert_eq!(bridge.report(RealtimeFacts::default()).stops, 1);
+    assert_eq!(cycles, Allocations::default(), "{name}");
+    assert!(moved > 0.01, "{name}: moved by {moved} rad");
+    assert_eq!(bridge.report(RealtimeFacts::default()).stops, 1, "{name}");
+}
+
+#[test]
+fn a_cycle_does_not_allocate() {
+    assert_allocates_nothing("built in", &Machine::builtin());
+    for file in machine_files() {
+        let name = file.file_stem().unwrap().to_string_lossy().into_owned();
+        let mut machine = Machine::load(&file, &[]).unwrap();
+        assert_allocates_nothing(&name, &machine);
+        // A gap needs a spring to lie behind.
+        if ["cartesian", "corexy", "mcm"].contains(&name.as_str()) {
+            for axis in &mut machine.axes {
+                axis.backlash = 20e-6;
+            }
+            assert_allocates_nothing(&format!("{name} with backlash"), &machine);
+        }
+    }
 }

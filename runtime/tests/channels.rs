@@ -132,7 +132,7 @@ mod other_build {
 
     signals::sample! {
         /// Has as many bytes as `signals::Progress`.
-        Progress = "graver.Progress.v1" {
+        Progress = "graver.Progress.v2" {
             /// All of them.
             words: [u64; size_of::<signals::Progress>() / 8],
         }
@@ -150,7 +150,7 @@ fn another_layout_under_the_same_name_is_refused() {
     let holder = Domain::create(scratch.instance()).unwrap();
     assert_eq!(size_of::<other_build::Progress>(), size_of::<Progress>());
     let error = holder.subscriber::<other_build::Progress>(Reading::Every).unwrap_err();
-    assert_eq!(error, ChannelError::Layout { channel: "progress", sample: "graver.Progress.v1" });
+    assert_eq!(error, ChannelError::Layout { channel: "progress", sample: "graver.Progress.v2" });
     assert!(holder.subscriber::<Progress>(Reading::Every).is_ok());
 }
 

@@ -41,7 +41,7 @@ impl CommandMode {
 
 sample! {
     /// The answer to one feedback. Drives latches it and applies it at the next deadline, always.
-    Command = "graver.Command.v1" {
+    Command = "graver.Command.v2" {
         /// The `Feedback::epoch` this answers: a command for another run of drives is not fresh.
         epoch: u64,
         /// The feedback this answers; it takes effect at the deadline of `cycle + 1`.
@@ -59,8 +59,6 @@ sample! {
         published: Nanoseconds,
         /// When the planner published the newest setpoint used here; 0 for none.
         setpoint_published: Nanoseconds,
-        /// When the controller took that setpoint into its look-ahead; 0 for none.
-        setpoint_received: Nanoseconds,
         /// A [`CommandMode`].
         mode: u32,
         /// A [`ControllerState`](crate::ControllerState).

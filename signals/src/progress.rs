@@ -4,7 +4,7 @@ use crate::{Fault, Nanoseconds, sample};
 
 sample! {
     /// Published every few cycles; the planner's licence to send more.
-    Progress = "graver.Progress.v1" {
+    Progress = "graver.Progress.v2" {
         /// When it was published.
         published: Nanoseconds,
         /// The stream in the look-ahead, 0 for none.
@@ -17,8 +17,6 @@ sample! {
         room: u64,
         /// Stroke being marked, from 1; 0 for none.
         stroke: u64,
-        /// Control cycles since start.
-        cycles: u64,
         /// The newest stream that was finished or given up, 0 for none.
         finished_stream: u64,
         /// Rate at which the stream is played.

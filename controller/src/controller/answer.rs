@@ -3,12 +3,11 @@
 use super::Controller;
 use crate::cascade::Measurement;
 use crate::exchange::Inputs;
-use crate::gate::TooManyEdges;
 use crate::state::State;
 use crate::supervision::Finding;
 use signals::{
-    Command, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, MAX_AXES, MAX_EDGES,
-    Nanoseconds, Progress,
+    Command, CommandMode, Fault, FaultCode, FaultQuantity, Feedback, LaserCycle, MAX_AXES,
+    MAX_EDGES, Nanoseconds, Progress,
 };
 
 /// Cycles between two progress samples.
@@ -18,31 +17,8 @@ impl Controller {
     /// Writes the command.
     pub(super) fn command(&mut self, now: Nanoseconds, inputs: &Inputs<'_>, command: &mut Command) {
         let feedback = inputs.feedback;
-        let light = match self.playing {
-            0 => Ok(LaserCycle::OFF),
-            _ => self.player.laser(self.intake.lookahead()),
-        };
-        let laser = light.unwrap_or_else(|TooManyEdges| {
-            let limit = MAX_EDGES as f64;
-            let fault = Fault::new(FaultCode::SetpointLimit);
-            let fault = fault.beyond(FaultQuantity::Edges, limit + 1.0, limit);
-            self.fail(Finding::sound(fault), now);
-            LaserCycle::OFF
-        });
-        let lookahead = self.intake.lookahead();
-        let (outputs, newest) = if self.playing == 0 {
-            (0, (Nanoseconds(0), Nanoseconds(0)))
-        } else {
-            let sequence = self.player.after().time.sequence();
-            let newest = (lookahead.setpoint(sequence).published, lookahead.received(sequence));
-            let outputs = lookahead.setpoint(self.player.outputs_at().sequence()).outputs;
-            (outputs, newest)
-        };
-        // The player is dark unless it plays; a fault found after it went on makes it dark too.
-        let laser = match self.state {
-            State::Running | State::Holding(_) => laser,
-            _ => LaserCycle::OFF,
-        };
+        // First: light that cannot be told is a fault, which the rest of the command carries.
+        let laser = self.light(now);
         *command = Command {
             epoch: feedback.epoch,
             cycle: feedback.cycle,
@@ -51,14 +27,11 @@ impl Controller {
             stroke: u64::from(stroke(&laser)),
             received: inputs.received,
             published: now,
-            setpoint_published: newest.0,
-            setpoint_received: newest.1,
             mode: match self.state.mode() {
                 CommandMode::Voltage => self.drive,
                 mode => mode,
             } as u32,
             state: self.state.to_wire() as u32,
-            outputs,
             stream_time: self.player.now().time.seconds(),
             rate: self.player.now().rate,
             tool: self.feedforward.now().tool,
@@ -66,6 +39,36 @@ impl Controller {
             fault: self.fault,
             ..Command::default()
         };
+        if self.playing != 0 {
+            let lookahead = self.intake.lookahead();
+            let sequence = self.player.after().time.sequence();
+            command.setpoint_published = lookahead.setpoint(sequence).published;
+            command.outputs = lookahead.setpoint(self.player.outputs_at().sequence()).outputs;
+        }
+        self.close_loops(feedback, command);
+    }
+
+    /// What the laser shall do in the cycle in which the command acts.
+    fn light(&mut self, now: Nanoseconds) -> LaserCycle {
+        if self.playing == 0 {
+            return LaserCycle::OFF;
+        }
+        let Ok(laser) = self.player.laser(self.intake.lookahead()) else {
+            let limit = MAX_EDGES as f64;
+            let fault = Fault::new(FaultCode::SetpointLimit);
+            let fault = fault.beyond(FaultQuantity::Edges, limit + 1.0, limit);
+            self.fail(Finding::sound(fault), now);
+            return LaserCycle::OFF;
+        };
+        // The player is dark unless it plays; a fault found after it went on makes it dark too.
+        match self.state {
+            State::Running | State::Holding(_) => laser,
+            _ => LaserCycle::OFF,
+        }
+    }
+
+    /// Writes the targets of all axes, and the voltages of those whose loops are closed here.
+    fn close_loops(&mut self, feedback: &Feedback, command: &mut Command) {
         let follows = self.state.follows();
         let axes = self.machine.axes.iter().zip(&mut self.cascades).enumerate();
         for (index, (axis, cascade)) in axes {
@@ -117,7 +120,6 @@ impl Controller {
             played: lookahead.played(),
             room: lookahead.room() as u64,
             stroke: command.stroke,
-            cycles: self.cycles,
             finished_stream: self.intake.finished(),
             rate: command.rate,
             tool: command.tool,
