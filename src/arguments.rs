@@ -24,6 +24,7 @@ const PLAN_EXAMPLES: &str = "\
 Examples:
   graver plan jobs/square_arcs.ngc                  time, length, limits, notes
   graver plan --samples setpoints.csv               every setpoint, one row a millisecond
+  graver plan --machine twin.toml --pulses p.csv    every step pulse with its time and count
   graver plan --ideal --set letters.style=h2        against the limits of the path only";
 
 const CHECK_EXAMPLES: &str = "\
@@ -223,6 +224,9 @@ pub struct PlanArguments {
     /// Write the 1 kHz setpoints to a CSV file.
     #[arg(long, value_name = "FILE")]
     pub samples: Option<PathBuf>,
+    /// Write the step pulses of all steppers, each with its time and count, to a CSV file.
+    #[arg(long, value_name = "FILE")]
+    pub pulses: Option<PathBuf>,
     /// Check the path limits only, as if motors were ideal.
     #[arg(long)]
     pub ideal: bool,

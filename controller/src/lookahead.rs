@@ -3,8 +3,8 @@
 
 use crate::rate_limit::LARGEST_RATE;
 use crate::stream_time::StreamTime;
-use signals::setpoint::flags;
 use signals::Setpoint;
+use signals::setpoint::flags;
 
 /// Setpoints in the ring; a power of two.
 pub const CAPACITY: usize = 2048;

@@ -6,6 +6,7 @@ pub mod kinematics;
 pub mod manual;
 pub mod operator;
 pub mod plan;
+pub mod pulses;
 pub mod run;
 pub mod service;
 pub mod simulate;

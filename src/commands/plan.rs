@@ -1,6 +1,7 @@
 //! `graver plan`: plans a job without running it.
 
 use crate::arguments::PlanArguments;
+use crate::commands::pulses;
 use crate::exit::{Exit, Failure};
 use crate::{inputs, output};
 use machine::Machine;
@@ -48,6 +49,15 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
     let plan_time = started.elapsed().as_secs_f64();
     if let Some(path) = &arguments.samples {
         write_samples(path, &input.machine, &plan)
+            .map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))?;
+    }
+    if let Some(path) = &arguments.pulses {
+        if !pulses::has_steppers(&input.machine) {
+            let name = &input.machine.name;
+            let message = format!("--pulses: {name} has no steppers, and DC motors take no pulses");
+            return Err(Failure::bad_input(message));
+        }
+        pulses::write(path, &input.machine, &plan)
             .map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))?;
     }
     let report = PlanReport {
