@@ -248,7 +248,9 @@ impl<const N: usize> Response<N> {
 ///
 /// Cholesky's factor is inverted in its place, and multiplied with itself: nalgebra solves for one
 /// column of the identity after the other, zeros and all, which takes five times as long.
-fn positive_inverse<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
+pub(super) fn positive_inverse<const N: usize>(
+    matrix: &SMatrix<f64, N, N>,
+) -> Option<SMatrix<f64, N, N>> {
     let mut factor = [[0.0; N]; N];
     let mut scale = [0.0; N];
     for row in 0..N {

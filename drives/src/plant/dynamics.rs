@@ -23,7 +23,7 @@ use machine::{Axis, DcMotor, Mechanism};
 use nalgebra::{SMatrix, SVector};
 
 use super::PlantError;
-use super::coupling::{Coupling, Response, Unsolvable};
+use super::coupling::{Coupling, Response, Unsolvable, positive_inverse};
 use super::friction::Contacts;
 use super::stepping::Field;
 use super::winding::{Weights, Windings};
@@ -498,7 +498,7 @@ fn partly_held<const N: usize>(
         inertia[(row, column)] * free[row] * free[column] + held
     });
     // A principal part of a positive definite matrix is one too.
-    matrix.try_inverse().map_or_else(Joints::zeros, |inverse| inverse * push)
+    positive_inverse(&matrix).map_or_else(Joints::zeros, |inverse| inverse * push)
 }
 
 /// The rotors' inertia in joint coordinates.
