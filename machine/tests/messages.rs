@@ -79,6 +79,17 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
         &["67:12: the current loop (349 rad/s) must be faster than the velocity loop around it \
            (400 rad/s); raise the one or lower the other"],
     );
+    refused(
+        "on_delay = \"0 us\"",
+        "on_delay = \"1e15 s\"",
+        &["101:12: an `on_delay` of 1000000000000000 s is too long; a laser source answers within \
+           1 s"],
+    );
+    refused(
+        "off_delay = \"0 us\"",
+        "off_delay = \"1001 ms\"",
+        &["102:13: an `off_delay` of 1.001 s is too long; a laser source answers within 1 s"],
+    );
 }
 
 #[test]

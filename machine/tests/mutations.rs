@@ -209,6 +209,12 @@ fn a_quantity_that_no_machine_has_is_refused() {
         setting.refuses("nan", &[NotFinite]);
         setting.refuses("-inf", &[NotFinite]);
         setting.refuses(&format!("\"-1 {unit}\""), &[OutOfRange]);
+        if matches!(setting.key, "on_delay" | "off_delay") {
+            for delay in ["1e15 s", "1.01 s"] {
+                setting.refuses(&format!("\"{delay}\""), &[OutOfRange]);
+            }
+            setting.parse(&format!("{} = \"1 s\"", setting.key)).unwrap();
+        }
         let may_be_zero = ["coulomb", "viscous", "inertia", "on_delay", "off_delay"];
         let zero = format!("\"0 {unit}\"");
         if may_be_zero.contains(&setting.key) {

@@ -457,6 +457,25 @@ fn laser_delays_are_compensated() {
     assert!((stroke.start + stroke.duration - off - 50e-6).abs() < 1e-9);
 }
 
+/// The rest before the first motion is as long as the source must be told ahead, in whole cycles.
+#[test]
+fn a_slow_source_is_told_during_the_rest_before_the_first_motion() {
+    let mut machine = Machine::builtin();
+    let from = Vector3::from(machine.home);
+    let curve = Curve::Line { from, to: from + Vector3::x() * 0.01 };
+    let job = job(vec![mark(curve, Some(0.1))], &machine);
+    for (delay, rest) in [(0.0, 0.002), (1e-9, 0.003), (0.0015, 0.004), (1.0, 1.002)] {
+        machine.laser.on_delay = delay;
+        let planned = plan(&machine, &job).unwrap();
+        let found = planned.trajectory.pieces[0].duration;
+        assert!((found - rest).abs() < 1e-12, "{delay} s: {found} s");
+        assert!(planned.trajectory.laser[0].time.0 >= 0, "{delay} s");
+    }
+    // Such a delay cannot be in a machine file; the plan still ends, with an error.
+    machine.laser.on_delay = 1e15;
+    assert!(matches!(plan(&machine, &job), Err(PlanError::TooLong { .. })));
+}
+
 #[test]
 fn dots_are_lit_where_and_as_long_as_asked() {
     let machine = Machine::builtin();

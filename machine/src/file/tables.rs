@@ -344,9 +344,9 @@ table! {
 table! {
     /// The laser source.
     pub struct LaserTable {
-        /// From the gate's opening to light; the planner makes up for it.
+        /// From the gate's opening to light, at most 1 s; the planner makes up for it.
         pub on_delay: AtLeastZero<unit::Duration> = "0 s",
-        /// From the gate's closing to darkness; the planner makes up for it.
+        /// From the gate's closing to darkness, at most 1 s; the planner makes up for it.
         pub off_delay: AtLeastZero<unit::Duration> = "0 s",
     }
 }

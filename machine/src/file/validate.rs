@@ -6,7 +6,7 @@ use super::axes::{Joint, axis};
 use super::doubts;
 use super::mechanism::{self, Built};
 use super::motors;
-use super::tables::{AreaTable, AxisTable, MachineTable, OriginsTable};
+use super::tables::{AreaTable, AxisTable, LaserTable, MachineTable, OriginsTable};
 use crate::document::{
     Document, DocumentError, Findings, Located, Named, Place, Point, ProblemKind, nearest,
 };
@@ -61,6 +61,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
             "remove `z`",
         );
     }
+    let laser = laser(&table.laser, &mut findings);
     let gcode = &table.gcode;
     if gcode.z.value == ZMeaning::Focus && !mechanism.moves_in_z() {
         findings.contradict(
@@ -83,10 +84,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
             jerk: table.path.jerk.value,
             tolerance: table.path.tolerance.value,
         },
-        laser: LaserSource {
-            on_delay: table.laser.on_delay.value,
-            off_delay: table.laser.off_delay.value,
-        },
+        laser,
         gcode: GcodeSettings {
             full_scale: gcode.full_scale.value,
             z: gcode.z.value,
@@ -117,6 +115,21 @@ fn refuse_rigid_backlash(
             );
         }
     }
+}
+
+/// Refuses delays that no source has: the stream would wait for them.
+fn laser(table: &LaserTable, findings: &mut Findings) -> LaserSource {
+    for (key, delay) in [("on_delay", table.on_delay), ("off_delay", table.off_delay)] {
+        if delay.value > LaserSource::LONGEST_DELAY {
+            findings.refuse(
+                ProblemKind::OutOfRange,
+                delay.place,
+                format!("an `{key}` of {} s is too long", delay.value),
+                Some(format!("a laser source answers within {} s", LaserSource::LONGEST_DELAY)),
+            );
+        }
+    }
+    LaserSource { on_delay: table.on_delay.value, off_delay: table.off_delay.value }
 }
 
 /// The area as a box; z is from 0 to 0 where it has no range.
