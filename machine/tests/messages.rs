@@ -82,8 +82,10 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
     refused(
         "on_delay = \"0 us\"",
         "on_delay = \"1e15 s\"",
-        &["101:12: an `on_delay` of 1000000000000000 s is too long; a laser source answers within \
-           1 s"],
+        &[
+            "101:12: an `on_delay` of 1000000000000000 s is too long; a laser source answers within \
+           1 s",
+        ],
     );
     refused(
         "off_delay = \"0 us\"",

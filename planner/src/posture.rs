@@ -21,18 +21,19 @@ const STEPS: usize = 64;
 /// Rounding allowed at a soft limit [m or rad].
 const ROUNDING: f64 = 1e-9;
 
-/// All branches of a mechanism that can be chosen one value at a time, at most [`MOST`]; the first is
-/// its own. Which turn a table is in is no branch here: turns are chosen among the joints.
+/// All branches of a mechanism that can be chosen one value at a time, at most 32; the first is its
+/// own. Which turn a table is in is no branch here: turns are chosen among the joints.
 pub(crate) fn branches<const N: usize, M: Mechanism<N>>(
     mechanism: &M,
     near: &Joints<N>,
 ) -> Vec<M::Branch> {
-    const TURN: &str = "table_turn";
+    /// Six legs with two sides each would be 64; no shipped mechanism comes near.
     const MOST: usize = 32;
-    let own = mechanism.branch();
-    let own = own.choose(TURN, &[]).unwrap_or(own);
+    let own = mechanism.branch().in_any_turn();
     // What the mechanism itself leaves open is named by the branch that a posture is in.
-    let named = mechanism.assemble(near, own, None).map(|assembly| mechanism.branch_of(&assembly));
+    let named = mechanism
+        .assemble(near, own, None)
+        .map(|assembly| mechanism.branch_of(&assembly).in_any_turn());
     let names = |branch: M::Branch| {
         let mut choices = branch.choices();
         if let Ok(named) = named {
@@ -48,7 +49,7 @@ pub(crate) fn branches<const N: usize, M: Mechanism<N>>(
     let mut next = 0;
     while let Some(&branch) = found.get(next) {
         next += 1;
-        for (name, values) in names(branch).into_iter().filter(|(name, _)| *name != TURN) {
+        for (name, values) in names(branch) {
             for index in 0..values.len() {
                 for sign in [1, -1] {
                     let mut other = values.clone();

@@ -7,6 +7,7 @@
 use machine::kinematics::ToolMotion;
 use machine::{Machine, Override};
 use nalgebra::Vector3;
+use planner::check::Quantity;
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
 use planner::trajectory::{Course, Trajectory};
 use planner::{Job, MarkingSpeed, Plan, PlanError, plan};
@@ -390,23 +391,23 @@ fn broken_limits_are_named() {
         };
     let machine = Machine::builtin();
     let found = breach(&machine, 0.12);
-    assert_eq!((found.quantity, found.limit), ("x of the tool", 0.2));
+    assert_eq!((found.quantity, found.limit), (Quantity::ToolPosition(0), 0.2));
     assert!(found.value > 0.2 && found.value < 0.2003, "{}", found.value);
 
     let mut weak = machine.clone();
     weak.axes[1].motor.dc_mut().unwrap().voltage = 3.0;
     let found = breach(&weak, 0.05);
-    assert_eq!((found.axis.as_deref(), found.quantity), (Some("b"), "motor voltage"));
+    assert_eq!((found.axis.as_deref(), found.quantity), (Some("b"), Quantity::MotorVoltage));
 
     let mut weak = machine.clone();
     weak.axes[0].motor.dc_mut().unwrap().current = 0.5;
     let found = breach(&weak, 0.05);
-    assert_eq!((found.axis.as_deref(), found.quantity), (Some("a"), "motor current"));
+    assert_eq!((found.axis.as_deref(), found.quantity), (Some("a"), Quantity::MotorCurrent));
 
     let mut slow = machine.clone();
     slow.axes[0].limits.velocity = 0.1;
     let found = breach(&slow, 0.05);
-    assert_eq!((found.quantity, found.limit), ("joint velocity", 0.1));
+    assert_eq!((found.quantity, found.limit), (Quantity::JointVelocity, 0.1));
     assert!(found.value > 0.1 && found.value < 0.11, "{}", found.value);
 
     let message = plan(&slow, &line(0.05, &slow)).unwrap_err().to_string();

@@ -83,6 +83,10 @@ impl Branch for PolarBranch {
             _ => None,
         }
     }
+
+    fn in_any_turn(self) -> Self {
+        Self { table_turn: None, ..self }
+    }
 }
 
 impl Polar {
