@@ -1,6 +1,6 @@
 //! Every sample of a plan against every limit of path, area and axes, before the first one is sent.
 
-use machine::{Axis, DcMotor, Machine, Motor, PathLimits};
+use machine::{Axis, DcMotor, Friction, Machine, Motor, PathLimits};
 use signals::Setpoint;
 use signals::time::CYCLE_TIME;
 
@@ -221,10 +221,7 @@ impl<'a> Checker<'a> {
             let angle = (setpoint.position[index] + setpoint.lead[index]) / axis.ratio;
             let before = self.before.as_ref().map(|motors| motors[index]);
             let speed = before.map_or(0.0, |(earlier, _)| (angle - earlier) / CYCLE_TIME);
-            // Below the speed at which no setpoint moves, friction takes no side.
-            let side = if speed.abs() > 1e-9 { speed.signum() } else { 0.0 };
-            let friction = axis.friction.coulomb * side + axis.friction.viscous * speed;
-            let torque = setpoint.effort[index] + friction;
+            let torque = setpoint.effort[index] + axis.friction.torque(speed);
             let size = sizing(axis, setpoint.effort[index], setpoint.acceleration[index], speed);
             self.uses.sizing[index] = self.uses.sizing[index].max(size);
             let name = Some(axis.name.as_str());
@@ -272,7 +269,7 @@ impl<'a> Checker<'a> {
 /// taken from the joint's acceleration, reaches no gear. Whatever stands is taken to be starting.
 fn sizing(axis: &Axis, effort: f64, acceleration: f64, speed: f64) -> f64 {
     let rotor = axis.motor.rotor_inertia() * acceleration / axis.ratio;
-    let speed = if speed.abs() > 1e-9 { speed } else { 0.0 };
+    let speed = if Friction::is_standing(speed) { 0.0 } else { speed };
     let torque = rotor + axis.efficiency.torque(effort - rotor, speed);
     let most = match &axis.motor {
         Motor::Dc(motor) => motor.current * motor.torque_constant,

@@ -27,9 +27,6 @@ const STEP: f64 = CYCLE_TIME / STEPS as f64;
 /// A stream ends once no motor is farther than this from where it will stay [joint units].
 const SETTLED: f64 = 1e-9;
 
-/// Motor speed below which friction takes no side, as in the controller [rad/s].
-const STANDING: f64 = 0.01;
-
 /// Nanoseconds in a cycle.
 const CYCLE: i64 = signals::time::CYCLE_PERIOD.0;
 
@@ -91,9 +88,7 @@ impl Drive {
     fn lead_rotor(&self, axis: usize, velocity: f64, setpoint: &mut Setpoint) {
         let Some(stepper) = &self.stepper else { return };
         let speed = velocity / self.ratio;
-        let side = if speed.abs() < STANDING { 0.0 } else { speed.signum() };
-        let friction = self.friction.coulomb * side + self.friction.viscous * speed;
-        let torque = setpoint.effort[axis] + friction;
+        let torque = setpoint.effort[axis] + self.friction.torque(speed);
         // Beyond its torque there is no load angle: the checker refuses the sample for that torque.
         let angle = stepper
             .load_angle(torque, speed)
