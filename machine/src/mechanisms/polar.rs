@@ -21,7 +21,7 @@ use crate::kinematics::{
     Pose, ToolMotion, finite,
 };
 use crate::taylor::Scalar;
-use crate::transmission::Elasticity;
+use crate::transmission::{self, Elasticity};
 
 pub use dynamics::{PolarLoad, feed_scale};
 
@@ -353,14 +353,10 @@ impl Mechanism<3> for Polar {
     }
 
     fn stiffness(&self) -> Option<Matrix3<f64>> {
-        self.elasticity.map(|springs| {
-            Matrix3::from_diagonal(&Vector3::from(springs.map(|spring| spring.stiffness)))
-        })
+        transmission::stiffness(self.elasticity)
     }
 
     fn damping(&self) -> Matrix3<f64> {
-        self.elasticity.map_or_else(Matrix3::zeros, |springs| {
-            Matrix3::from_diagonal(&Vector3::from(springs.map(|spring| spring.damping)))
-        })
+        transmission::damping(self.elasticity)
     }
 }

@@ -21,7 +21,7 @@ use crate::kinematics::{
     Pose, ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
-use crate::transmission::Elasticity;
+use crate::transmission::{self, Elasticity};
 use signals::math;
 
 /// The dimensions and masses.
@@ -359,11 +359,11 @@ impl Mechanism<2> for TwinActuator {
     }
 
     fn stiffness(&self) -> Option<Matrix2<f64>> {
-        plane::stiffness(self.elasticity)
+        transmission::stiffness(self.elasticity)
     }
 
     fn damping(&self) -> Matrix2<f64> {
-        plane::damping(self.elasticity)
+        transmission::damping(self.elasticity)
     }
 }
 
