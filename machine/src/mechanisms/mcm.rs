@@ -81,7 +81,8 @@ impl Branch for McmBranch {
             .collect()
     }
 
-    /// No values leave the choice to the previous joints.
+    /// No values leave the choice to the previous joints. `sign` is another name for `side`, the one
+    /// that the golden vectors of source 002 have.
     fn choose(self, name: &str, values: &[i32]) -> Option<Self> {
         match (name, values) {
             ("side" | "sign", []) => Some(Self { side: None, ..self }),

@@ -23,7 +23,7 @@ use crate::kinematics::{
 use crate::taylor::Scalar;
 use crate::transmission::{self, Elasticity};
 
-pub use dynamics::{PolarLoad, feed_scale};
+pub use dynamics::PolarLoad;
 
 /// How far from the centre a path may pass and still be taken as passing through it [m]: rounding
 /// of a planned line, far below any encoder's count.
@@ -71,13 +71,12 @@ impl Branch for PolarBranch {
         [of("side", self.side), of("table_turn", self.table_turn)].into_iter().flatten().collect()
     }
 
-    /// No values leave the choice to the previous joints.
+    /// No values leave the choice to the previous joints. `branch` is another name for `side`, the
+    /// one that the golden vectors of source 000 have.
     fn choose(self, name: &str, values: &[i32]) -> Option<Self> {
         match (name, values) {
-            ("side" | "elbow" | "branch", []) => Some(Self { side: None, ..self }),
-            ("side" | "elbow" | "branch", &[side @ (1 | -1)]) => {
-                Some(Self { side: Some(side), ..self })
-            }
+            ("side" | "branch", []) => Some(Self { side: None, ..self }),
+            ("side" | "branch", &[side @ (1 | -1)]) => Some(Self { side: Some(side), ..self }),
             ("table_turn", []) => Some(Self { table_turn: None, ..self }),
             ("table_turn", &[turn]) => Some(Self { table_turn: Some(turn), ..self }),
             _ => None,
