@@ -156,6 +156,7 @@ fn refusal(machine: &Machine, found: NoWay) -> PlanError {
     let place = Place { stroke, time };
     match cause {
         Refused::Kinematics(cause) => PlanError::Unreachable { line, place, cause },
+        Refused::NoPosture { tried } => PlanError::NoPosture { line, place, tried },
         Refused::Position { axis, value, limit } => {
             let axis = machine.axes.get(axis);
             let unit = axis.map_or("", |axis| axis.unit.name());

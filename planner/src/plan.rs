@@ -140,6 +140,19 @@ pub enum PlanError {
         /// Why.
         cause: KinematicsError,
     },
+    /// The joints would have to stand otherwise than they can.
+    #[error(
+        "{place}: of {tried} postures tried, none in which the axes can follow this stroke can be \
+         reached from the one before; move the stroke, or mark it in parts"
+    )]
+    NoPosture {
+        /// Line of the job file, 0 for none.
+        line: u64,
+        /// Where in the job.
+        place: Place,
+        /// How many were tried.
+        tried: usize,
+    },
     /// A limit of path, area, axis or motor.
     #[error(
         "{place}{}: {} of {:.6} {unit} is beyond the limit of {:.6} {unit}",
@@ -186,6 +199,7 @@ impl PlanError {
             | Self::TooShort { line, .. }
             | Self::TooManyEdges { line, .. }
             | Self::Unreachable { line, .. }
+            | Self::NoPosture { line, .. }
             | Self::Limit { line, .. } => *line,
         }
     }

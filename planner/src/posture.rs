@@ -11,11 +11,11 @@ use crate::demand::Demands;
 /// A larger step of a joint between two looks makes the other branches compete [m or rad].
 const JUMP: f64 = 0.3;
 
-/// The shortest step along a sortie, as a share of one of its parts: below, a change of the joints
-/// is a jump.
+/// The shortest step of a walk, as a share of the part that it goes along: below, a change of the
+/// joints is a jump.
 const SHORTEST: f64 = 1e-7;
 
-/// Steps of a walk along one part of a sortie, before they are refined.
+/// Steps of a walk along one part, before they are refined.
 const STEPS: usize = 64;
 
 /// Rounding allowed at a soft limit [m or rad].
@@ -146,6 +146,8 @@ pub(crate) enum Refused {
     Kinematics(KinematicsError),
     /// A joint would leave its soft limits.
     Position { axis: usize, value: f64, limit: f64 },
+    /// So many were tried, and none that the axes can follow can be reached.
+    NoPosture { tried: usize },
 }
 
 impl From<KinematicsError> for Refused {
@@ -154,7 +156,7 @@ impl From<KinematicsError> for Refused {
     }
 }
 
-/// Where the joints go along a sortie.
+/// Where the joints go on a walk along parts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Walked<const N: usize> {
     pub(crate) end: Posture<N>,
