@@ -104,6 +104,15 @@ pub struct Breach {
     pub unit: &'static str,
 }
 
+/// What a plan is held to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scope {
+    /// Everything that a machine cannot exceed: path, area, axes and motors.
+    Machine,
+    /// The limits of the path alone, as if the axes could follow anywhere.
+    PathAlone,
+}
+
 /// Holds samples to limits, one after the other.
 pub(crate) struct Checker<'a> {
     path: PathLimits,
@@ -118,14 +127,17 @@ pub(crate) struct Checker<'a> {
 }
 
 impl<'a> Checker<'a> {
-    /// Against all of a machine's limits, or the path's alone.
-    pub(crate) fn new(machine: &'a Machine, path: PathLimits, ideal: bool) -> Self {
-        let axes: &[Axis] = if ideal { &[] } else { &machine.axes };
+    /// Against those limits of `machine` that are in `scope`, and against `path`.
+    pub(crate) fn new(machine: &'a Machine, path: PathLimits, scope: Scope) -> Self {
+        let (axes, area): (&[Axis], _) = match scope {
+            Scope::Machine => (&machine.axes, Some(&machine.area)),
+            Scope::PathAlone => (&[], None),
+        };
         let none = || vec![0.0; axes.len()];
         Self {
             path,
             dark: path.rapid.max(path.speed),
-            area: (!ideal).then_some(&machine.area),
+            area,
             axes,
             before: None,
             heating: none(),

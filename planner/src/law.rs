@@ -98,11 +98,12 @@ impl SpeedLaw {
         self.duration
     }
 
-    /// The motion along the path at `time` since the start [s].
+    /// The motion along the path at `time` since the start [s]; at rest at the start where the stroke
+    /// has no length.
     pub fn at(&self, time: f64) -> Motion {
         let after = self.phases.partition_point(|phase| phase.start <= time);
-        let phase = &self.phases[after.max(1) - 1];
-        phase.at(time - phase.start)
+        let phase = self.phases.get(after.max(1) - 1);
+        phase.map_or_else(Motion::default, |phase| phase.at(time - phase.start))
     }
 
     /// The speed at the start [m/s].

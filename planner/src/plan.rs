@@ -4,16 +4,18 @@ use std::sync::Arc;
 
 use machine::kinematics::KinematicsError;
 use machine::{Axis, Machine, Mechanism, MechanismKind, MechanismVisitor, PathLimits};
+use nalgebra::Vector3;
 use signals::artwork::Artwork;
 use signals::time::CYCLE_PERIOD;
 use signals::{MAX_EDGES, Setpoint};
 
 use crate::artwork::artwork;
-use crate::check::{Breach, Checker};
+use crate::check::{Breach, Checker, Scope};
 use crate::drawing::Note;
 use crate::itinerary::itinerary;
 use crate::job::Job;
-use crate::joint_plan::{IsLinear, PlanJoints, Task};
+use crate::joint_plan::{IsLinear, PlanJoints, Routed, Task};
+use crate::outline::Outline;
 use crate::sampler::{Sampler, Unreachable};
 use crate::speed;
 use crate::trajectory::Trajectory;
@@ -221,7 +223,7 @@ pub(crate) fn plan_unless(
 ) -> Result<Plan, PlanError> {
     match job.ideal_only {
         Some(reason) => Err(PlanError::IdealOnly(reason)),
-        None => plan_within(machine, job, false, abandoned),
+        None => plan_within(machine, job, Scope::Machine, abandoned),
     }
 }
 
@@ -231,13 +233,13 @@ pub(crate) fn plan_unless(
 /// # Errors
 /// As [`plan`], without axes and area.
 pub fn plan_ideal(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
-    plan_within(machine, job, true, &|| false)
+    plan_within(machine, job, Scope::PathAlone, &|| false)
 }
 
 fn plan_within(
     machine: &Machine,
     job: &Job,
-    ideal: bool,
+    scope: Scope,
     abandoned: &dyn Fn() -> bool,
 ) -> Result<Plan, PlanError> {
     let drawing = &job.drawing;
@@ -251,67 +253,77 @@ fn plan_within(
     })?;
     let chosen = speed::choose(drawing.start, &stops, &limits, &job.marking)
         .map_err(|sharp| PlanError::TooSharp { line: sharp.line, speed: sharp.speed })?;
-    let mut plan = Plan {
-        artwork: Artwork::default(),
-        facts: PlanFacts {
-            name: drawing.name.clone(),
-            strokes: 0,
-            // From 0, since the sum of nothing is -0.
-            length: speed::outlines(&stops)
-                .map(crate::outline::Outline::length)
-                .fold(0.0, |a, b| a + b),
-            duration: 0.0,
-            samples: 0,
-            speed: chosen.speeds.iter().copied().fold(0.0, f64::max),
-            notes: drawing.notes.iter().cloned().chain(chosen.notes).collect(),
-            uses: Uses::default(),
-        },
-        trajectory: Arc::default(),
+    let task = Task {
+        machine,
+        limits,
+        stops: &stops,
+        speeds: &chosen.speeds,
+        standing: job.standing,
+        attitude: job.attitude,
+    };
+    let check =
+        |trajectory: &Arc<Trajectory>| checked(machine, limits, trajectory, scope, abandoned);
+    let (routed, (samples, uses)) =
+        if scope == Scope::PathAlone || machine.mechanism.visit(IsLinear) {
+            by_tool(drawing.start, &task, check)?
+        } else {
+            machine.mechanism.visit(PlanJoints { task, check })?
+        };
+    // Last, so that a drawing far beyond the area is refused before it is drawn point by point.
+    let artwork = artwork(routed.stops.as_deref().unwrap_or(&stops));
+    let notes = [drawing.notes.as_slice(), &chosen.notes, &routed.notes].concat();
+    let facts = PlanFacts {
+        name: drawing.name.clone(),
+        strokes: artwork.strokes.len(),
+        // From 0, since the sum of nothing is -0.
+        length: speed::outlines(&stops).map(Outline::length).fold(0.0, |a, b| a + b),
+        duration: routed.trajectory.duration(),
+        samples,
+        speed: routed.speed,
+        notes,
+        uses,
+    };
+    Ok(Plan {
+        artwork,
+        facts,
+        trajectory: routed.trajectory,
         mechanism: machine.mechanism.clone(),
         axes: machine.axes.clone(),
-    };
-    let check = |trajectory: &Arc<Trajectory>| {
-        if trajectory.end().is_nan() || trajectory.end() > LONGEST {
-            return Err(PlanError::TooLong { duration: trajectory.duration() });
-        }
-        check_edges(trajectory)?;
-        let checker = Checker::new(machine, limits, ideal);
-        machine.mechanism.visit(CheckAll { trajectory, axes: &machine.axes, checker, abandoned })
-    };
-    let mut gone = None;
-    let (samples, uses) = if ideal || machine.mechanism.visit(IsLinear) {
-        let mut trajectory =
-            Trajectory::new(drawing.start, &stops, &limits, &machine.laser, &chosen.speeds)
-                .map_err(|short| PlanError::TooShort {
-                    line: short.line,
-                    duration: short.duration,
-                })?;
-        trajectory.attitude = job.attitude;
-        plan.trajectory = Arc::new(trajectory);
-        check(&plan.trajectory)?
-    } else {
-        let task = Task {
-            machine,
-            limits,
-            stops: &stops,
-            speeds: &chosen.speeds,
-            standing: job.standing,
-            attitude: job.attitude,
-        };
-        let (routed, checked) = machine.mechanism.visit(PlanJoints { task, check })?;
-        plan.trajectory = routed.trajectory;
-        plan.facts.notes.extend(routed.notes);
-        plan.facts.speed = routed.speed;
-        gone = routed.stops;
-        checked
-    };
-    plan.facts.duration = plan.trajectory.duration();
-    plan.facts.samples = samples;
-    plan.facts.uses = uses;
-    // Last, so that a drawing far beyond the area is refused before it is drawn point by point.
-    plan.artwork = artwork(gone.as_deref().unwrap_or(&stops));
-    plan.facts.strokes = plan.artwork.strokes.len();
-    Ok(plan)
+    })
+}
+
+/// Plans a task by the tool alone, from `start` on, and checks it with `check`: for mechanisms whose
+/// joints go straight with the tool, and for what is held to the path alone.
+fn by_tool<T>(
+    start: Vector3<f64>,
+    task: &Task<'_>,
+    check: impl FnOnce(&Arc<Trajectory>) -> Result<T, PlanError>,
+) -> Result<(Routed, T), PlanError> {
+    let Task { machine, limits, stops, speeds, standing: _, attitude } = *task;
+    let mut trajectory = Trajectory::new(start, stops, &limits, &machine.laser, speeds)
+        .map_err(|short| PlanError::TooShort { line: short.line, duration: short.duration })?;
+    trajectory.attitude = attitude;
+    let trajectory = Arc::new(trajectory);
+    let found = check(&trajectory)?;
+    let speed = speeds.iter().copied().fold(0.0, f64::max);
+    Ok((Routed { trajectory, notes: Vec::new(), stops: None, speed }, found))
+}
+
+/// Samples a trajectory and holds it to the limits in `scope`: how many samples there are, and what
+/// of the limits they use.
+fn checked(
+    machine: &Machine,
+    limits: PathLimits,
+    trajectory: &Arc<Trajectory>,
+    scope: Scope,
+    abandoned: &dyn Fn() -> bool,
+) -> Result<(u64, Uses), PlanError> {
+    if trajectory.end().is_nan() || trajectory.end() > LONGEST {
+        return Err(PlanError::TooLong { duration: trajectory.duration() });
+    }
+    check_edges(trajectory)?;
+    let checker = Checker::new(machine, limits, scope);
+    machine.mechanism.visit(CheckAll { trajectory, axes: &machine.axes, checker, abandoned })
 }
 
 /// That no cycle needs more changes of the laser than a sample can hold.

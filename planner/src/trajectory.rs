@@ -88,7 +88,7 @@ pub struct LaserChange {
 }
 
 /// A job as functions of stream time.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     /// The pieces, each starting where the one before ends; never empty.
     pub pieces: Vec<Piece>,
@@ -133,8 +133,15 @@ impl Trajectory {
         // Whole cycles, so that a source that is told ahead of the first light is told at rest.
         let cycles = (laser.on_delay / CYCLE_TIME).ceil();
         let before = BEFORE + cycles * CYCLE_TIME;
+        let rest = Piece { start: 0.0, duration: before, course: first, line: 0, stroke: 0 };
         let mut builder = Builder {
-            trajectory: Self::default(),
+            trajectory: Self {
+                pieces: vec![rest],
+                laser: Vec::new(),
+                outputs: Vec::new(),
+                pauses: Vec::new(),
+                attitude: AttitudeLaw::default(),
+            },
             time: before,
             stroke: 0,
             outputs: 0,
@@ -142,13 +149,6 @@ impl Trajectory {
             laser: *laser,
             refused: None,
         };
-        builder.trajectory.pieces.push(Piece {
-            start: 0.0,
-            duration: before,
-            course: first,
-            line: 0,
-            stroke: 0,
-        });
         legs(&mut |leg| builder.add(leg));
         match builder.refused {
             Some(refused) => Err(refused),
