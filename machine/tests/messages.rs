@@ -74,6 +74,14 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
            leave it out to use 90 % of what the motor can do"],
     );
     refused(
+        "following_error = \"1 mm\"",
+        "velocity = \"400 rad/s\"",
+        &[
+            "62:12: axis `a` moves along a line: this unit does not fit; write it with a length, such \
+           as \"1 mm\"",
+        ],
+    );
+    refused(
         "velocity = \"160 rad/s\"",
         "velocity = \"400 rad/s\"",
         &["67:12: the current loop (349 rad/s) must be faster than the velocity loop around it \

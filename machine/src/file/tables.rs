@@ -1,4 +1,7 @@
-//! The tables of a machine file, with every default: the only place where defaults stand.
+//! The tables of a machine file, with every default that is a value; those of most mechanisms are in
+//! [`super::mechanism`]. A default that follows from other values is said here in words, and stands
+//! where these meet: the following error, largest speed and range of an axis in `axes`, home and the
+//! origins of programs in `validate`.
 //!
 //! Their documentation becomes the schema's, so it speaks to whoever writes a machine file.
 
