@@ -262,6 +262,21 @@ fn a_ringing_belt_is_a_warning() {
     );
 }
 
+/// A spring that follows from its shaft rings as one that is given does.
+#[test]
+fn a_ringing_screw_is_a_warning_however_its_stiffness_is_said() {
+    let cartesian = include_str!("../../machines/cartesian.toml");
+    let ringing = |text: &str| {
+        let settings = set(&["mechanism.cartesian.x.damping_ratio=0.05"]);
+        let machine = Machine::parse("cartesian.toml", text, &settings).unwrap();
+        machine.warnings.iter().filter(|warning| warning.text.contains("ring")).count()
+    };
+    assert_eq!(ringing(cartesian), 1);
+    let given = cartesian.lines().find(|line| line.starts_with("stiffness")).unwrap();
+    let shaft = "shaft = { core_diameter = \"10 mm\", length = \"300 mm\" }";
+    assert_eq!(ringing(&cartesian.replace(given, shaft)), 1);
+}
+
 #[test]
 fn the_built_in_machine_is_the_shipped_corexy() {
     let machine = Machine::builtin();

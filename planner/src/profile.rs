@@ -3,7 +3,7 @@
 //! Every profile is made of one [`Ramp`], from rest to a speed in three phases (jerk, constant
 //! acceleration, jerk back), and its mirror image in time. Seven phases in all; source 003 text of
 //! fig. 2-1 counts six, and its eq. 2.2 to 2.5 hold only with absolute instants, so the forms here
-//! are derived again. [`check`] integrates the phases once more and compares.
+//! are derived again, and the tests integrate the phases once more ([`integrate`]) and compare.
 
 use signals::math;
 

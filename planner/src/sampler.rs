@@ -302,8 +302,8 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         Ok(setpoint)
     }
 
-    /// The laser in the cycle that starts with sample `sequence`, and the stroke it lights; `None`
-    /// when the cycle cannot hold its changes, which the checker has refused.
+    /// The laser in the cycle that starts with sample `sequence`, and the stroke it lights. A change
+    /// that the cycle cannot hold is left to the next one; the checker refuses such a stream.
     fn laser(&mut self) -> (LaserCycle, u64) {
         let start = self.sequence as i64 * CYCLE;
         let mut cycle = LaserCycle {
