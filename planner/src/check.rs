@@ -28,6 +28,8 @@ pub enum Quantity {
     ToolAcceleration,
     /// Jerk of the tool [m/s³].
     ToolJerk,
+    /// How far the tool strays from the drawn path between two setpoints [m].
+    PathDeviation,
     /// Position of a joint [m or rad].
     JointPosition,
     /// Speed of a joint [m/s or rad/s].
@@ -58,6 +60,7 @@ impl Quantity {
             Self::ToolSpeed => "speed of the tool",
             Self::ToolAcceleration => "acceleration of the tool",
             Self::ToolJerk => "jerk of the tool",
+            Self::PathDeviation => "deviation from the drawn path",
             Self::JointPosition => "joint position",
             Self::JointVelocity => "joint velocity",
             Self::JointAcceleration => "joint acceleration",

@@ -6,10 +6,11 @@ use machine::kinematics::KinematicsError;
 use machine::{Axis, Machine, Mechanism, MechanismKind, MechanismVisitor, PathLimits};
 use nalgebra::Vector3;
 use signals::artwork::Artwork;
-use signals::time::CYCLE_PERIOD;
+use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
 use signals::{MAX_EDGES, Setpoint};
 
 use crate::artwork::artwork;
+use crate::between::Between;
 use crate::check::{Breach, Checker, Scope};
 use crate::drawing::Note;
 use crate::itinerary::itinerary;
@@ -323,7 +324,12 @@ fn checked(
     }
     check_edges(trajectory)?;
     let checker = Checker::new(machine, limits, scope);
-    machine.mechanism.visit(CheckAll { trajectory, axes: &machine.axes, checker, abandoned })
+    let between = match scope {
+        Scope::Machine => Some(Between::new(limits.tolerance)),
+        Scope::PathAlone => None,
+    };
+    let axes = &machine.axes;
+    machine.mechanism.visit(CheckAll { trajectory, axes, checker, between, abandoned })
 }
 
 /// That no cycle needs more changes of the laser than a sample can hold.
@@ -344,6 +350,8 @@ struct CheckAll<'a> {
     trajectory: &'a Arc<Trajectory>,
     axes: &'a [Axis],
     checker: Checker<'a>,
+    /// Where the axes have to follow, so that what lies between two setpoints depends on them.
+    between: Option<Between>,
     abandoned: &'a dyn Fn() -> bool,
 }
 
@@ -351,20 +359,33 @@ impl MechanismVisitor for CheckAll<'_> {
     type Output = Result<(u64, Uses), PlanError>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let Self { trajectory, axes, mut checker, abandoned } = self;
+        let Self { trajectory, axes, mut checker, between, abandoned } = self;
         let refuse = |found| unreachable(trajectory, found);
+        // On straight joints the cubic is the tool's own.
+        let is_linear = mechanism.is_linear();
         let mut sampler =
             Sampler::new(mechanism, axes, Arc::clone(trajectory), 1).map_err(refuse)?;
+        let mut between = between.filter(|_| !is_linear);
+        let refuse_breach = |breach: Breach| {
+            let (line, place) = place(trajectory, breach.time);
+            PlanError::Limit { line, place, breach }
+        };
         let mut samples: u64 = 0;
-        for setpoint in sampler.by_ref() {
+        while let Some(setpoint) = sampler.next() {
             samples += 1;
             if samples.is_multiple_of(LOOK) && abandoned() {
                 return Err(PlanError::Abandoned);
             }
-            checker.look(&setpoint).map_err(|breach| {
-                let (line, place) = place(trajectory, breach.time);
-                PlanError::Limit { line, place, breach }
-            })?;
+            checker.look(&setpoint).map_err(refuse_breach)?;
+            if let Some(between) = &mut between {
+                let time = setpoint.sequence as f64 * CYCLE_TIME;
+                let breach = between
+                    .look(&setpoint, &sampler, trajectory)
+                    .map_err(|cause| refuse(Unreachable { time, cause }))?;
+                if let Some(breach) = breach {
+                    return Err(refuse_breach(breach));
+                }
+            }
         }
         match sampler.broken() {
             Some(found) => Err(refuse(found)),

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use machine::kinematics::{JointMotion, Joints, KinematicsError, ToolMotion};
 use machine::{Axis, Friction, Mechanism, StepperMotor};
+use nalgebra::Vector3;
 use signals::time::CYCLE_TIME;
 use signals::{GateEdge, LaserCycle, Setpoint, axis::axis_array, setpoint::flags};
 
@@ -193,6 +194,13 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             }
             Stream::Running | Stream::Ended => None,
         }
+    }
+
+    /// Where the tool is with the joints at `joints` [m or rad], near the last sample and on its
+    /// branch [m].
+    pub(crate) fn locate(&self, joints: &Joints<N>) -> Result<Vector3<f64>, KinematicsError> {
+        let branch = self.branches[self.branch];
+        Ok(self.mechanism.locate(joints, branch, Some(&self.assembly))?.position)
     }
 
     /// The mechanism with the joints at `joints` [m or rad], near the last sample and on its branch.

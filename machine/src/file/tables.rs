@@ -78,7 +78,8 @@ table! {
         pub acceleration: Above<unit::Acceleration> = "10 m/s^2",
         /// Largest jerk.
         pub jerk: Above<unit::Jerk> = "500 m/s^3",
-        /// How far a smoothed join may lie from the drawn line.
+        /// How far a smoothed join may lie from the drawn line, and the tool from its path between two
+        /// setpoints.
         pub tolerance: Above<unit::Length> = "5 um",
     }
 }
