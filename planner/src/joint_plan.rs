@@ -296,4 +296,18 @@ mod tests {
         }
         assert_eq!(refused, 3);
     }
+
+    /// The words of a refusal say what was tried, and what would help.
+    #[test]
+    fn the_lack_of_a_posture_is_told_by_what_was_tried() {
+        let machine = Machine::parse("polar.toml", POLAR, &[]).unwrap();
+        let cause = Refused::NoPosture { tried: 7 };
+        let error = refusal(&machine, NoWay { line: 3, stop: 1, stroke: 2, time: 0.5, cause });
+        assert_eq!(error.line(), 3);
+        assert_eq!(
+            error.to_string(),
+            "stroke 2, at 0.500 s: of 7 postures tried, none in which the axes can follow this stroke \
+             can be reached from the one before; move the stroke, or mark it in parts"
+        );
+    }
 }
