@@ -88,7 +88,7 @@ fn replaced(text: &str, index: usize, line: &str) -> String {
 }
 
 /// Values that are wrong nearly everywhere.
-const VALUES: [&str; 18] = [
+const VALUES: [&str; 19] = [
     "\"banana\"",
     "\"1 furlong\"",
     "\"\"",
@@ -96,6 +96,7 @@ const VALUES: [&str; 18] = [
     "\"-1 mm\"",
     "\"1e308 m/s\"",
     "\"1e999 mm\"",
+    "\"1e15 s\"",
     "\"1 mm 2\"",
     "\"ü µ\"",
     "0",

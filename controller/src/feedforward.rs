@@ -20,7 +20,7 @@ use signals::{AxisArray, MAX_AXES};
 
 /// Planned speed below which a motor counts as standing [rad/s]: less than a count of any usual
 /// encoder in a minute. However slowly it creeps above that, friction is against it.
-const STANDING: f64 = 1e-6;
+const STANDING: f64 = machine::Friction::STANDING;
 
 /// What the plan asks of the motors at one instant.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

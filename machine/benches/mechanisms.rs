@@ -155,7 +155,7 @@ fn planar(criterion: &mut Criterion) {
         housing_inertia: 0.004,
         rod_mass: 0.4,
         rod_inertia: 0.002,
-        rod_centre: 0.15,
+        rod_center: 0.15,
     };
     let twin = TwinActuator {
         bases: [Vector2::new(0.0, 0.0), Vector2::new(0.6, 0.0)],

@@ -13,6 +13,24 @@ pub struct Friction {
     pub viscous: f64,
 }
 
+impl Friction {
+    /// Speed below which a motor counts as standing [rad/s]: less than a count of any usual encoder
+    /// in a minute. However slowly it creeps above that, friction is against it.
+    pub const STANDING: f64 = 1e-6;
+
+    /// What a motor that turns at `speed` [rad/s] must give to overcome it [N·m], with the sign of
+    /// the speed; 0 of one that stands, whose Coulomb friction takes no side.
+    pub fn torque(&self, speed: f64) -> f64 {
+        let side = if Self::is_standing(speed) { 0.0 } else { speed.signum() };
+        self.coulomb * side + self.viscous * speed
+    }
+
+    /// Whether a motor at `speed` [rad/s] counts as standing.
+    pub fn is_standing(speed: f64) -> bool {
+        speed.abs() < Self::STANDING
+    }
+}
+
 /// What a motor's position is counted in: the counts of an incremental encoder on its shaft, or the
 /// pulses sent to a stepper.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,5 +114,22 @@ impl Encoder {
     /// Angle of one count [rad].
     pub fn resolution(&self) -> f64 {
         core::f64::consts::TAU / self.counts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Friction;
+
+    #[test]
+    fn friction_is_with_the_speed_and_takes_no_side_at_rest() {
+        let friction = Friction { coulomb: 0.01, viscous: 2e-5 };
+        assert_eq!(friction.torque(0.0), 0.0);
+        assert!((friction.torque(100.0) - 0.012).abs() < 1e-15);
+        assert_eq!(friction.torque(-100.0), -friction.torque(100.0));
+        // A creeping motor has all of the Coulomb friction against it.
+        let creep = 2.0 * Friction::STANDING;
+        assert!((friction.torque(creep) - 0.01).abs() < 1e-9);
+        assert!(friction.torque(Friction::STANDING / 2.0).abs() < 1e-9);
     }
 }

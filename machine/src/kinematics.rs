@@ -195,6 +195,13 @@ pub trait Branch: Copy + core::fmt::Debug + PartialEq + Send + Sync + 'static {
 
     /// The same with `name` set to `values`; `None` where there is no such name or value.
     fn choose(self, name: &str, values: &[i32]) -> Option<Self>;
+
+    /// The same with the turn of a joint that turns without end left to the previous joints; itself
+    /// where it names no turn.
+    #[must_use]
+    fn in_any_turn(self) -> Self {
+        self
+    }
 }
 
 impl Branch for () {
@@ -433,13 +440,13 @@ pub(crate) fn in_plane(position: &Vector3<f64>) -> Result<(), KinematicsError> {
 
 /// Refuses a position or direction that is nowhere, which equations would hand on as joints that are
 /// nowhere.
-pub(crate) fn finite(target: &Vector3<f64>) -> Result<(), KinematicsError> {
+pub(crate) fn finite<const N: usize>(target: &SVector<f64, N>) -> Result<(), KinematicsError> {
     let Some(number) = target.iter().find(|number| !number.is_finite()) else { return Ok(()) };
     Err(KinematicsError {
         code: "not_a_number",
         axis: None,
         value: *number,
         limit: f64::MAX,
-        detail: "a coordinate of the target is not a finite number",
+        detail: "a coordinate of the target, or of the joints before it, is not a finite number",
     })
 }

@@ -11,7 +11,8 @@ pub struct PathLimits {
     pub acceleration: f64,
     /// Largest jerk along and across the path together [m/s³].
     pub jerk: f64,
-    /// How far a smoothed join may lie from the drawn line [m].
+    /// How far a smoothed join may lie from the drawn line, and the tool from its path between two
+    /// setpoints [m].
     pub tolerance: f64,
 }
 

@@ -4,10 +4,18 @@
 /// The laser source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaserSource {
-    /// From the gate's opening to light [s], compensated by the planner.
+    /// From the gate's opening to light [s], compensated by the planner; 0 to
+    /// [`Self::LONGEST_DELAY`].
     pub on_delay: f64,
-    /// From the gate's closing to darkness [s], compensated by the planner.
+    /// From the gate's closing to darkness [s], compensated by the planner; 0 to
+    /// [`Self::LONGEST_DELAY`].
     pub off_delay: f64,
+}
+
+impl LaserSource {
+    /// The longest delay that a machine file may give a source [s]. Real ones switch within
+    /// milliseconds; what is longer is a slip of the unit.
+    pub const LONGEST_DELAY: f64 = 1.0;
 }
 
 /// What Z means in a G-code program.

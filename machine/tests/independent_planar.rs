@@ -120,7 +120,7 @@ fn the_twin_actuator_moves_as_its_free_bodies_do() {
                 housing_inertia: value("housing_inertia"),
                 rod_mass: value("rod_mass"),
                 rod_inertia: value("rod_inertia"),
-                rod_centre: value("rod_centre"),
+                rod_center: value("rod_centre"),
             }
         });
         let mechanism = TwinActuator {

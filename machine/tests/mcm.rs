@@ -212,7 +212,7 @@ fn the_sources_secant_stops_at_once_where_y_is_0_and_the_closed_form_does_not() 
 #[test]
 fn the_closed_form_finds_what_the_secant_misses() {
     let machine = reference();
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let (mut secant, mut printed, cases) = (0, 0, 1000);
     for _ in 0..cases {
         let (x, d) = (0.3 + 0.2 * random.next(), 3.0 * random.next());

@@ -74,10 +74,31 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
            leave it out to use 90 % of what the motor can do"],
     );
     refused(
+        "following_error = \"1 mm\"",
+        "velocity = \"400 rad/s\"",
+        &[
+            "62:12: axis `a` moves along a line: this unit does not fit; write it with a length, such \
+           as \"1 mm\"",
+        ],
+    );
+    refused(
         "velocity = \"160 rad/s\"",
         "velocity = \"400 rad/s\"",
         &["67:12: the current loop (349 rad/s) must be faster than the velocity loop around it \
            (400 rad/s); raise the one or lower the other"],
+    );
+    refused(
+        "on_delay = \"0 us\"",
+        "on_delay = \"1e15 s\"",
+        &[
+            "101:12: an `on_delay` of 1000000000000000 s is too long; a laser source answers within \
+           1 s",
+        ],
+    );
+    refused(
+        "off_delay = \"0 us\"",
+        "off_delay = \"1001 ms\"",
+        &["102:13: an `off_delay` of 1.001 s is too long; a laser source answers within 1 s"],
     );
 }
 
@@ -241,13 +262,27 @@ fn a_ringing_belt_is_a_warning() {
     );
 }
 
+/// A spring that follows from its shaft rings as one that is given does.
+#[test]
+fn a_ringing_screw_is_a_warning_however_its_stiffness_is_said() {
+    let cartesian = include_str!("../../machines/cartesian.toml");
+    let ringing = |text: &str| {
+        let settings = set(&["mechanism.cartesian.x.damping_ratio=0.05"]);
+        let machine = Machine::parse("cartesian.toml", text, &settings).unwrap();
+        machine.warnings.iter().filter(|warning| warning.text.contains("ring")).count()
+    };
+    assert_eq!(ringing(cartesian), 1);
+    let given = cartesian.lines().find(|line| line.starts_with("stiffness")).unwrap();
+    let shaft = "shaft = { core_diameter = \"10 mm\", length = \"300 mm\" }";
+    assert_eq!(ringing(&cartesian.replace(given, shaft)), 1);
+}
+
 #[test]
 fn the_built_in_machine_is_the_shipped_corexy() {
     let machine = Machine::builtin();
     let parsed = Machine::parse("corexy.toml", COREXY, &[]).unwrap();
     assert_eq!(machine, parsed);
     assert_eq!(machine.mechanism.name(), "corexy");
-    assert_eq!(machine.mechanism.axes(), machine.axes.len());
     assert_eq!(machine.home, [0.1, 0.1, 0.0]);
     assert_eq!(machine.area.upper, [0.2, 0.2, 0.0]);
     let path = &machine.path;

@@ -5,6 +5,7 @@
 
 use machine::Machine;
 use machine::document::{DocumentError, Place, ProblemKind};
+use signals::random::SplitMix64;
 
 const FILES: [(&str, &str); 2] = [
     ("cartesian.toml", include_str!("../../machines/cartesian.toml")),
@@ -209,6 +210,12 @@ fn a_quantity_that_no_machine_has_is_refused() {
         setting.refuses("nan", &[NotFinite]);
         setting.refuses("-inf", &[NotFinite]);
         setting.refuses(&format!("\"-1 {unit}\""), &[OutOfRange]);
+        if matches!(setting.key, "on_delay" | "off_delay") {
+            for delay in ["1e15 s", "1.01 s"] {
+                setting.refuses(&format!("\"{delay}\""), &[OutOfRange]);
+            }
+            setting.parse(&format!("{} = \"1 s\"", setting.key)).unwrap();
+        }
         let may_be_zero = ["coulomb", "viscous", "inertia", "on_delay", "off_delay"];
         let zero = format!("\"0 {unit}\"");
         if may_be_zero.contains(&setting.key) {
@@ -319,13 +326,8 @@ fn a_broken_header_is_refused_near_its_line() {
 /// Bytes deleted, doubled, exchanged and replaced at random: an error with a line, or a machine.
 #[test]
 fn random_damage_never_panics() {
-    let mut state = 0x2545_f491_4f6c_dd1d_u64;
-    let mut random = |below: usize| {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state % below as u64) as usize
-    };
+    let mut sequence = SplitMix64::new(1);
+    let mut random = |below: usize| (sequence.bits() % below as u64) as usize;
     let alphabet: Vec<char> = "0129.-+eE[]{}=\"'#\n\r\t ,ambµ²^/%\u{0}\u{feff}".chars().collect();
     for case in 0..4000 {
         let (file, text) = FILES[case % 2];

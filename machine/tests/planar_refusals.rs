@@ -39,7 +39,7 @@ const PRRRP: Prrrp = Prrrp {
 };
 
 const BODIES: ActuatorBodies =
-    ActuatorBodies { housing_inertia: 0.01, rod_mass: 0.4, rod_inertia: 0.002, rod_centre: 0.15 };
+    ActuatorBodies { housing_inertia: 0.01, rod_mass: 0.4, rod_inertia: 0.002, rod_center: 0.15 };
 
 const TWIN: TwinActuator = TwinActuator {
     bases: [Vector2::new(0.0, 0.0), Vector2::new(0.8, 0.0)],

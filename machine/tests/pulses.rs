@@ -38,7 +38,7 @@ fn mechanism(params: &Value) -> TwinActuator {
         housing_inertia: 0.01,
         rod_mass: 0.4,
         rod_inertia: 0.002,
-        rod_centre: 0.15,
+        rod_center: 0.15,
     };
     TwinActuator {
         bases: [pair(&params["A"]), pair(&params["B"])],

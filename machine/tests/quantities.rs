@@ -5,6 +5,7 @@
 use core::f64::consts::TAU;
 
 use machine::quantity::*;
+use signals::random::SplitMix64;
 
 #[track_caller]
 fn reads<K: Kind>(text: &str, expected: f64) {
@@ -159,7 +160,7 @@ fn what_is_no_quantity_is_refused_with_advice() {
 /// Any text at all: a value or an error whose span lies in the text.
 #[test]
 fn no_text_panics() {
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut random = SplitMix64::new(1);
     let parts = [
         "1", "9", ".", "e", "E", "-", "+", "m", "mm", "s", "N", "µ", "Ω", "²", "⁻", "^", "/", "*",
         "·", " ", "\t", "\u{a0}", "nan", "inf", "kg", "(", "%", "°", "😀", "\u{0}",
@@ -167,10 +168,7 @@ fn no_text_panics() {
     for case in 0..200_000 {
         let mut text = String::new();
         for _ in 0..case % 9 {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            text.push_str(parts[(state % parts.len() as u64) as usize]);
+            text.push_str(parts[(random.bits() % parts.len() as u64) as usize]);
         }
         match read::<Length>(&text) {
             Ok(value) => assert!(value.is_finite(), "`{text}`"),

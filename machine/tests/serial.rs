@@ -181,6 +181,14 @@ fn limits_singularities_and_far_targets_are_told_apart() {
     let error = arm.inverse(&high, (), &Joints::from([0.1, 0.5])).unwrap_err();
     assert_eq!((error.code, error.value), ("out_of_plane", 0.02));
 
+    for wrong in [f64::NAN, f64::INFINITY] {
+        let nowhere = Pose::at(Vector3::new(0.4, wrong, 0.0));
+        let error = arm.inverse(&nowhere, (), &Joints::from([0.1, 0.5])).unwrap_err();
+        assert_eq!(error.code, "not_a_number");
+        let error = arm.inverse(&up, (), &Joints::from([0.1, wrong])).unwrap_err();
+        assert_eq!(error.code, "not_a_number");
+    }
+
     // Stretched out it may stand, but not move.
     let stretched = Joints::from([0.2, 0.0]);
     let mut tool = ToolMotion::rest(&arm.forward(&stretched, ()).unwrap());

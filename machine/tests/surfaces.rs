@@ -88,7 +88,7 @@ fn tangent(part: [Taylor; 3]) -> Vector3<f64> {
 
 #[test]
 fn spots_lie_on_their_surface_with_the_normal_across_it() {
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     for shape in all_shapes() {
         let surface = Surface { shape, placement: aslant() };
         for _ in 0..50 {
@@ -213,7 +213,7 @@ fn surface_of(input: &Value) -> Surface {
 
 #[test]
 fn a_tool_faces_every_normal() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let fixed = [Vector3::x(), -Vector3::x(), Vector3::y(), Vector3::z(), -Vector3::z()];
     for normal in fixed.into_iter().chain((0..50).map(|_| random.vector(1.0).normalize())) {
         let rotation = facing(&normal);
@@ -363,7 +363,7 @@ fn segments_are_halved_until_the_path_is_within_tolerance() {
 
 #[test]
 fn natural_cubics_are_smooth_and_straight_at_their_ends() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut parameter = 0.0;
     let knots: Vec<(f64, Joints<2>)> = (0..7)
         .map(|_| {

@@ -11,7 +11,7 @@ use machine::kinematics::{
 use machine::mechanisms::tri_planar::{Fold, Legs, TriPlanar};
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 use serde_json::Value;
-use support::{golden, number};
+use support::{Random, golden, number};
 
 fn list<const N: usize>(value: &Value) -> [f64; N] {
     core::array::from_fn(|index| number(&value[index]))
@@ -265,45 +265,27 @@ fn it_says_which_limit_and_by_how_much() {
     assert_eq!(outward.choose("elbow", &[1, 1, 1]), None);
 }
 
-/// Repeatable numbers from -1 to 1 (xorshift64*).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        let bits = self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11;
-        bits as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    fn vector(&mut self, scale: f64) -> Vector3<f64> {
-        Vector3::new(self.next(), self.next(), self.next()) * scale
-    }
-
-    /// Anywhere over the stator, at any yaw, tilted by up to `tilt` [rad].
-    fn pose(&mut self, height: f64, tilt: f64) -> Pose {
-        let position = Vector3::new(
-            self.next() * 0.25,
-            self.next() * 0.15,
-            (0.6 + 0.35 * self.next()) * height,
-        );
-        let yaw =
-            Rotation3::from_axis_angle(&Vector3::z_axis(), self.next() * core::f64::consts::PI);
-        let lean = Rotation3::new(Vector3::new(self.next() * tilt, self.next() * tilt, 0.0));
-        Pose { position, rotation: (yaw * lean).into_inner() }
-    }
+/// Anywhere over the stator, at any yaw, tilted by up to `tilt` [rad].
+fn any_pose(random: &mut Random, height: f64, tilt: f64) -> Pose {
+    let position = Vector3::new(
+        random.next() * 0.25,
+        random.next() * 0.15,
+        (0.6 + 0.35 * random.next()) * height,
+    );
+    let yaw = Rotation3::from_axis_angle(&Vector3::z_axis(), random.next() * core::f64::consts::PI);
+    let lean = Rotation3::new(Vector3::new(random.next() * tilt, random.next() * tilt, 0.0));
+    Pose { position, rotation: (yaw * lean).into_inner() }
 }
 
 #[test]
 fn feet_and_pose_lead_to_each_other_over_the_working_range() {
     let mechanism = mechanism(&golden("tri_planar")["params"]);
     let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
-    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut random = Random::new(0x9e37_79b9_7f4a_7c15);
     let mut counts = [0; 2];
     let mut last: [Option<_>; 2] = [None; 2];
     for case in 0..4000 {
-        let pose = random.pose(height, 0.6);
+        let pose = any_pose(&mut random, height, 0.6);
         let mixed = Legs([Fold::Inward, Fold::Outward, Fold::Outward]);
         for (which, branch) in [Legs::default(), mixed].into_iter().enumerate() {
             let Ok(q) = mechanism.inverse(&pose, branch, &at_rest()) else { continue };
@@ -336,7 +318,7 @@ struct Course {
 
 impl Course {
     fn random(random: &mut Random, height: f64) -> Self {
-        let pose = random.pose(height, 0.3);
+        let pose = any_pose(random, height, 0.3);
         Self {
             tool: ToolMotion {
                 velocity: random.vector(0.5),
@@ -382,7 +364,7 @@ impl Course {
 /// Courses over the stator that every limit allows.
 fn courses(mechanism: &TriPlanar, branch: Legs, count: usize) -> Vec<Course> {
     let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
-    let mut random = Random(0x5851_f42d_4c95_7f2d);
+    let mut random = Random::new(0x5851_f42d_4c95_7f2d);
     let mut courses = Vec::new();
     while courses.len() < count {
         let course = Course::random(&mut random, height);
@@ -431,7 +413,7 @@ fn every_derivative_of_the_joints_is_that_of_the_one_below() {
 /// their places. A thin uniform triangle has the inertia of a third of its mass in the middle of
 /// each side.
 fn energy(mechanism: &TriPlanar, branch: Legs, course: &Course, time: f64) -> (f64, f64) {
-    let h = 1e-5;
+    let h = 3e-6;
     let points = |time: f64| {
         let tool = course.later(time);
         let q = unlimited(mechanism).inverse(&tool.pose(), branch, &at_rest()).unwrap();
@@ -481,7 +463,7 @@ fn power_into_the_feet_is_the_change_of_energy() {
             let (expected, _) = energy(&mechanism, branch, &course, 0.0);
             near(kinetic / expected, 1.0, 1e-6, context);
 
-            let h = 1e-4;
+            let h = 2e-5;
             let total = |time: f64| {
                 let (kinetic, potential) = energy(&mechanism, branch, &course, time);
                 kinetic + potential

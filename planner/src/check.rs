@@ -1,6 +1,6 @@
 //! Every sample of a plan against every limit of path, area and axes, before the first one is sent.
 
-use machine::{Axis, DcMotor, Machine, Motor, PathLimits};
+use machine::{Axis, DcMotor, Friction, Machine, Motor, PathLimits};
 use signals::Setpoint;
 use signals::time::CYCLE_TIME;
 
@@ -17,6 +17,79 @@ const DARK_ALLOWANCE: f64 = 1.005;
 /// Rounding allowed at the edge of an area or a soft limit [m or rad].
 const ROUNDING: f64 = 1e-9;
 
+/// What a plan holds to a limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// A coordinate of the tool, 0 to 2 for x to z [m].
+    ToolPosition(usize),
+    /// Speed of the tool [m/s].
+    ToolSpeed,
+    /// Acceleration of the tool [m/s²].
+    ToolAcceleration,
+    /// Jerk of the tool [m/s³].
+    ToolJerk,
+    /// How far the tool strays from the drawn path between two setpoints [m].
+    PathDeviation,
+    /// Position of a joint [m or rad].
+    JointPosition,
+    /// Speed of a joint [m/s or rad/s].
+    JointVelocity,
+    /// Acceleration of a joint [m/s² or rad/s²].
+    JointAcceleration,
+    /// Jerk of a joint [m/s³ or rad/s³].
+    JointJerk,
+    /// Current of a DC motor [A].
+    MotorCurrent,
+    /// Voltage of a DC motor [V].
+    MotorVoltage,
+    /// Root mean square of a DC motor's current, which heats its winding [A].
+    HeatingCurrent,
+    /// Torque of a stepper [N·m].
+    MotorTorque,
+    /// Rate of a stepper's pulses [1/s].
+    PulseRate,
+}
+
+impl Quantity {
+    /// What a person reads.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ToolPosition(0) => "x of the tool",
+            Self::ToolPosition(1) => "y of the tool",
+            Self::ToolPosition(_) => "z of the tool",
+            Self::ToolSpeed => "speed of the tool",
+            Self::ToolAcceleration => "acceleration of the tool",
+            Self::ToolJerk => "jerk of the tool",
+            Self::PathDeviation => "deviation from the drawn path",
+            Self::JointPosition => "joint position",
+            Self::JointVelocity => "joint velocity",
+            Self::JointAcceleration => "joint acceleration",
+            Self::JointJerk => "joint jerk",
+            Self::MotorCurrent => "motor current",
+            Self::MotorVoltage => "motor voltage",
+            Self::HeatingCurrent => "root mean square of current",
+            Self::MotorTorque => "motor torque",
+            Self::PulseRate => "pulse rate",
+        }
+    }
+
+    /// Whether it says where something is, so that no other speed along the same way changes it.
+    pub fn is_place(self) -> bool {
+        matches!(self, Self::ToolPosition(_) | Self::JointPosition)
+    }
+
+    /// Whether it comes of all the motion before, and not of that at one instant.
+    pub fn sums_up(self) -> bool {
+        self == Self::HeatingCurrent
+    }
+}
+
+impl core::fmt::Display for Quantity {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter.write_str(self.name())
+    }
+}
+
 /// Which limit was broken, by how much.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Breach {
@@ -25,13 +98,22 @@ pub struct Breach {
     /// The axis, if it is one's limit.
     pub axis: Option<String>,
     /// What exceeds its limit.
-    pub quantity: &'static str,
+    pub quantity: Quantity,
     /// Its value.
     pub value: f64,
     /// The limit that it breaks.
     pub limit: f64,
     /// The unit of both.
     pub unit: &'static str,
+}
+
+/// What a plan is held to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scope {
+    /// Everything that a machine cannot exceed: path, area, axes and motors.
+    Machine,
+    /// The limits of the path alone, as if the axes could follow anywhere.
+    PathAlone,
 }
 
 /// Holds samples to limits, one after the other.
@@ -48,14 +130,17 @@ pub(crate) struct Checker<'a> {
 }
 
 impl<'a> Checker<'a> {
-    /// Against all of a machine's limits, or the path's alone.
-    pub(crate) fn new(machine: &'a Machine, path: PathLimits, ideal: bool) -> Self {
-        let axes: &[Axis] = if ideal { &[] } else { &machine.axes };
+    /// Against those limits of `machine` that are in `scope`, and against `path`.
+    pub(crate) fn new(machine: &'a Machine, path: PathLimits, scope: Scope) -> Self {
+        let (axes, area): (&[Axis], _) = match scope {
+            Scope::Machine => (&machine.axes, Some(&machine.area)),
+            Scope::PathAlone => (&[], None),
+        };
         let none = || vec![0.0; axes.len()];
         Self {
             path,
             dark: path.rapid.max(path.speed),
-            area: (!ideal).then_some(&machine.area),
+            area,
             axes,
             before: None,
             heating: none(),
@@ -82,10 +167,10 @@ impl<'a> Checker<'a> {
         let time = setpoint.sequence as f64 * CYCLE_TIME;
         self.path(setpoint, time)?;
         if let Some(area) = self.area {
-            for (index, name) in ["x", "y", "z"].into_iter().enumerate() {
+            for index in 0..3 {
                 let value = setpoint.tool[index];
                 let limit = value.clamp(area.lower[index], area.upper[index]);
-                within(value, limit, time, None, position_of(name), "m")?;
+                within(value, limit, time, None, Quantity::ToolPosition(index), "m")?;
             }
         }
         self.joints(setpoint, time)?;
@@ -100,14 +185,14 @@ impl<'a> Checker<'a> {
             (self.dark, DARK_ALLOWANCE)
         };
         let value = setpoint.path_velocity;
-        let share = below(value, speed, allowance, time, None, "speed of the tool", "m/s")?;
+        let share = below(value, speed, allowance, time, None, Quantity::ToolSpeed, "m/s")?;
         uses.path_speed = uses.path_speed.max(share);
         let (value, limit) = (setpoint.path_acceleration, path.acceleration);
-        let quantity = "acceleration of the tool";
+        let quantity = Quantity::ToolAcceleration;
         let share = below(value, limit, ALLOWANCE, time, None, quantity, "m/s²")?;
         uses.path_acceleration = uses.path_acceleration.max(share);
         let (value, limit) = (setpoint.path_jerk, path.jerk);
-        let share = below(value, limit, ALLOWANCE, time, None, "jerk of the tool", "m/s³")?;
+        let share = below(value, limit, ALLOWANCE, time, None, Quantity::ToolJerk, "m/s³")?;
         uses.path_jerk = uses.path_jerk.max(share);
         Ok(())
     }
@@ -120,16 +205,16 @@ impl<'a> Checker<'a> {
             let position = setpoint.position[index];
             let nearest = position.clamp(limits.position[0], limits.position[1]);
             let [place, speed, acceleration, jerk] = axis.unit.names();
-            within(position, nearest, time, name, "joint position", place)?;
+            within(position, nearest, time, name, Quantity::JointPosition, place)?;
             let demands = [
-                (setpoint.velocity[index], limits.velocity, "joint velocity", speed),
+                (setpoint.velocity[index], limits.velocity, Quantity::JointVelocity, speed),
                 (
                     setpoint.acceleration[index],
                     limits.acceleration,
-                    "joint acceleration",
+                    Quantity::JointAcceleration,
                     acceleration,
                 ),
-                (setpoint.jerk[index], limits.jerk, "joint jerk", jerk),
+                (setpoint.jerk[index], limits.jerk, Quantity::JointJerk, jerk),
             ];
             let most =
                 [&mut uses.velocity[index], &mut uses.acceleration[index], &mut uses.jerk[index]];
@@ -151,10 +236,7 @@ impl<'a> Checker<'a> {
             let angle = (setpoint.position[index] + setpoint.lead[index]) / axis.ratio;
             let before = self.before.as_ref().map(|motors| motors[index]);
             let speed = before.map_or(0.0, |(earlier, _)| (angle - earlier) / CYCLE_TIME);
-            // Below the speed at which no setpoint moves, friction takes no side.
-            let side = if speed.abs() > 1e-9 { speed.signum() } else { 0.0 };
-            let friction = axis.friction.coulomb * side + axis.friction.viscous * speed;
-            let torque = setpoint.effort[index] + friction;
+            let torque = setpoint.effort[index] + axis.friction.torque(speed);
             let size = sizing(axis, setpoint.effort[index], setpoint.acceleration[index], speed);
             self.uses.sizing[index] = self.uses.sizing[index].max(size);
             let name = Some(axis.name.as_str());
@@ -162,10 +244,10 @@ impl<'a> Checker<'a> {
                 Motor::Dc(motor) => motor,
                 Motor::Stepper(motor) => {
                     let (torque, most) = (torque.abs(), motor.pull_out_torque(speed));
-                    let share = below(torque, most, 1.0, time, name, "motor torque", "N·m")?;
+                    let share = below(torque, most, 1.0, time, name, Quantity::MotorTorque, "N·m")?;
                     self.uses.current[index] = self.uses.current[index].max(share);
                     let (rate, most) = (speed.abs() * motor.pulses_per_radian(), motor.pulse_rate);
-                    let share = below(rate, most, 1.0, time, name, "pulse rate", "1/s")?;
+                    let share = below(rate, most, 1.0, time, name, Quantity::PulseRate, "1/s")?;
                     self.uses.voltage[index] = self.uses.voltage[index].max(share);
                     now.push((angle, 0.0));
                     continue;
@@ -176,16 +258,18 @@ impl<'a> Checker<'a> {
             let voltage = motor.resistance * (current + earlier) / 2.0
                 + motor.inductance * (current - earlier) / CYCLE_TIME
                 + motor.torque_constant * speed;
-            let share = below(current.abs(), motor.current, 1.0, time, name, "motor current", "A")?;
+            let share =
+                below(current.abs(), motor.current, 1.0, time, name, Quantity::MotorCurrent, "A")?;
             self.uses.current[index] = self.uses.current[index].max(share);
-            let share = below(voltage.abs(), motor.voltage, 1.0, time, name, "motor voltage", "V")?;
+            let share =
+                below(voltage.abs(), motor.voltage, 1.0, time, name, Quantity::MotorVoltage, "V")?;
             self.uses.voltage[index] = self.uses.voltage[index].max(share);
             if let Some(continuous) = motor.continuous_current {
                 let heating = &mut self.heating[index];
                 *heating = DcMotor::heated(*heating, current, CYCLE_TIME, DcMotor::HEATING_TIME);
                 let value = heating.sqrt();
                 let share =
-                    below(value, continuous, 1.0, time, name, "root mean square of current", "A")?;
+                    below(value, continuous, 1.0, time, name, Quantity::HeatingCurrent, "A")?;
                 self.uses.heat[index] = self.uses.heat[index].max(share);
             }
             now.push((angle, current));
@@ -200,7 +284,7 @@ impl<'a> Checker<'a> {
 /// taken from the joint's acceleration, reaches no gear. Whatever stands is taken to be starting.
 fn sizing(axis: &Axis, effort: f64, acceleration: f64, speed: f64) -> f64 {
     let rotor = axis.motor.rotor_inertia() * acceleration / axis.ratio;
-    let speed = if speed.abs() > 1e-9 { speed } else { 0.0 };
+    let speed = if Friction::is_standing(speed) { 0.0 } else { speed };
     let torque = rotor + axis.efficiency.torque(effort - rotor, speed);
     let most = match &axis.motor {
         Motor::Dc(motor) => motor.current * motor.torque_constant,
@@ -209,20 +293,12 @@ fn sizing(axis: &Axis, effort: f64, acceleration: f64, speed: f64) -> f64 {
     torque.abs() / most
 }
 
-fn position_of(name: &str) -> &'static str {
-    match name {
-        "x" => "x of the tool",
-        "y" => "y of the tool",
-        _ => "z of the tool",
-    }
-}
-
 fn within(
     value: f64,
     limit: f64,
     time: f64,
     axis: Option<&str>,
-    quantity: &'static str,
+    quantity: Quantity,
     unit: &'static str,
 ) -> Result<(), Breach> {
     if (value - limit).abs() <= ROUNDING {
@@ -238,7 +314,7 @@ fn below(
     allowance: f64,
     time: f64,
     axis: Option<&str>,
-    quantity: &'static str,
+    quantity: Quantity,
     unit: &'static str,
 ) -> Result<f64, Breach> {
     let share = value / limit;

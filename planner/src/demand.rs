@@ -158,9 +158,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Demands<'a, N, M> {
                 let torque = ratio * gravity[index]
                     + (rotor * motion.acceleration[index] + ratio * moving[index]) * square;
                 let slew = (rotor * motion.jerk[index] + ratio * slew[index]) * square * rate;
-                let side = if speed.abs() > 1e-9 { speed.signum() } else { 0.0 };
-                let friction = axis.friction.coulomb * side + axis.friction.viscous * speed;
-                let torque = torque + friction;
+                let torque = torque + axis.friction.torque(speed);
                 worst = worst.max(match motor {
                     Motor::Dc(motor) => {
                         let current = torque / motor.torque_constant;

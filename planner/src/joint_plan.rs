@@ -8,7 +8,7 @@ use machine::{Machine, Mechanism, MechanismVisitor, PathLimits};
 use signals::AxisArray;
 
 use crate::attitude::AttitudeLaw;
-use crate::check::Breach;
+use crate::check::{Breach, Quantity};
 use crate::demand::Demands;
 use crate::drawing::Note;
 use crate::itinerary::Stop;
@@ -156,11 +156,12 @@ fn refusal(machine: &Machine, found: NoWay) -> PlanError {
     let place = Place { stroke, time };
     match cause {
         Refused::Kinematics(cause) => PlanError::Unreachable { line, place, cause },
+        Refused::NoPosture { tried } => PlanError::NoPosture { line, place, tried },
         Refused::Position { axis, value, limit } => {
             let axis = machine.axes.get(axis);
             let unit = axis.map_or("", |axis| axis.unit.name());
             let axis = axis.map(|axis| axis.name.clone());
-            let quantity = "joint position";
+            let quantity = Quantity::JointPosition;
             let breach = Breach { time, axis, quantity, value, limit, unit };
             PlanError::Limit { line, place, breach }
         }
@@ -215,7 +216,7 @@ mod tests {
     /// Plans moves by the joints, along a curve and straight, with a check that finds `quantity` in
     /// excess in the middle of piece `bad` the first `times` times. The pieces at the last check.
     fn pieces_with(
-        quantity: &'static str,
+        quantity: Quantity,
         bad: usize,
         times: usize,
     ) -> Result<Vec<(String, f64)>, PlanError> {
@@ -266,11 +267,11 @@ mod tests {
 
     #[test]
     fn what_breaks_a_limit_in_the_dark_is_slowed_and_nothing_else() {
-        let before = pieces_with("motor current", 0, 0).unwrap();
+        let before = pieces_with(Quantity::MotorCurrent, 0, 0).unwrap();
         let kinds: Vec<&str> = before.iter().map(|(kind, _)| kind.as_str()).collect();
         assert_eq!(kinds, ["Joint", "Joint", "Feed(", "Strai"]);
         for bad in 1..=3 {
-            let after = pieces_with("motor current", bad, 2).unwrap();
+            let after = pieces_with(Quantity::MotorCurrent, bad, 2).unwrap();
             for (index, ((_, was), (kind, is))) in before.iter().zip(&after).enumerate() {
                 let slower = if index == bad { 1.0 / (0.85 * 0.85) } else { 1.0 };
                 assert!((is / was - slower).abs() < 1e-6, "{kind}: {was} s, then {is} s");
@@ -280,8 +281,8 @@ mod tests {
 
     #[test]
     fn a_breach_that_adds_up_slows_everything() {
-        let before = pieces_with("root mean square of current", 0, 0).unwrap();
-        let after = pieces_with("root mean square of current", 2, 1).unwrap();
+        let before = pieces_with(Quantity::HeatingCurrent, 0, 0).unwrap();
+        let after = pieces_with(Quantity::HeatingCurrent, 2, 1).unwrap();
         for ((kind, was), (_, is)) in before.iter().zip(&after).skip(1) {
             assert!((is / was - 1.0 / 0.85).abs() < 1e-6, "{kind}: {was} s, then {is} s");
         }
@@ -291,8 +292,22 @@ mod tests {
     fn a_place_out_of_limits_is_refused_at_once() {
         let mut refused = 0;
         for bad in 1..=3 {
-            refused += usize::from(pieces_with("joint position", bad, 1).is_err());
+            refused += usize::from(pieces_with(Quantity::JointPosition, bad, 1).is_err());
         }
         assert_eq!(refused, 3);
+    }
+
+    /// The words of a refusal say what was tried, and what would help.
+    #[test]
+    fn the_lack_of_a_posture_is_told_by_what_was_tried() {
+        let machine = Machine::parse("polar.toml", POLAR, &[]).unwrap();
+        let cause = Refused::NoPosture { tried: 7 };
+        let error = refusal(&machine, NoWay { line: 3, stop: 1, stroke: 2, time: 0.5, cause });
+        assert_eq!(error.line(), 3);
+        assert_eq!(
+            error.to_string(),
+            "stroke 2, at 0.500 s: of 7 postures tried, none in which the axes can follow this stroke \
+             can be reached from the one before; move the stroke, or mark it in parts"
+        );
     }
 }

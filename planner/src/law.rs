@@ -98,11 +98,12 @@ impl SpeedLaw {
         self.duration
     }
 
-    /// The motion along the path at `time` since the start [s].
+    /// The motion along the path at `time` since the start [s]; at rest at the start where the stroke
+    /// has no length.
     pub fn at(&self, time: f64) -> Motion {
         let after = self.phases.partition_point(|phase| phase.start <= time);
-        let phase = &self.phases[after.max(1) - 1];
-        phase.at(time - phase.start)
+        let phase = self.phases.get(after.max(1) - 1);
+        phase.map_or_else(Motion::default, |phase| phase.at(time - phase.start))
     }
 
     /// The speed at the start [m/s].
@@ -297,7 +298,8 @@ fn lacks_room(plateaus: &[Plateau], index: usize) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use crate::random::logarithmic;
+    use signals::random::SplitMix64;
 
     const RAMP: [f64; 2] = [2.0, 100.0];
 
@@ -406,17 +408,17 @@ mod tests {
 
     #[test]
     fn random_laws_stay_below_their_cells_and_times_turn_back_into_places() {
-        let mut random = Random::new(5);
+        let mut random = SplitMix64::new(5);
         for trial in 0..200 {
             let mut end = 0.0;
             let cells: Vec<Cell> = (0..40)
                 .map(|_| {
-                    end += random.logarithmic(1e-5, 5e-3);
-                    let speed = random.logarithmic(2e-3, 0.3);
-                    Cell { steady: speed * random.logarithmic(1.0, 2.0), ..cell(end, speed) }
+                    end += logarithmic(&mut random, 1e-5, 5e-3);
+                    let speed = logarithmic(&mut random, 2e-3, 0.3);
+                    Cell { steady: speed * logarithmic(&mut random, 1.0, 2.0), ..cell(end, speed) }
                 })
                 .collect();
-            let ends = [random.logarithmic(5e-3, 0.2), random.logarithmic(5e-3, 0.2)];
+            let ends = [logarithmic(&mut random, 5e-3, 0.2), logarithmic(&mut random, 5e-3, 0.2)];
             let top = 0.15;
             let law = SpeedLaw::below(&cells, top, ends);
             check(&law, &cells, top, ends, &format!("trial {trial}"));

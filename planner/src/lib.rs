@@ -6,6 +6,7 @@
 mod arc_length;
 mod artwork;
 pub mod attitude;
+mod between;
 mod blend;
 pub mod check;
 mod demand;

@@ -4,16 +4,19 @@ use std::sync::Arc;
 
 use machine::kinematics::KinematicsError;
 use machine::{Axis, Machine, Mechanism, MechanismKind, MechanismVisitor, PathLimits};
+use nalgebra::Vector3;
 use signals::artwork::Artwork;
-use signals::time::CYCLE_PERIOD;
+use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
 use signals::{MAX_EDGES, Setpoint};
 
 use crate::artwork::artwork;
-use crate::check::{Breach, Checker};
+use crate::between::Between;
+use crate::check::{Breach, Checker, Scope};
 use crate::drawing::Note;
 use crate::itinerary::itinerary;
 use crate::job::Job;
-use crate::joint_plan::{IsLinear, PlanJoints, Task};
+use crate::joint_plan::{IsLinear, PlanJoints, Routed, Task};
+use crate::outline::Outline;
 use crate::sampler::{Sampler, Unreachable};
 use crate::speed;
 use crate::trajectory::Trajectory;
@@ -140,6 +143,19 @@ pub enum PlanError {
         /// Why.
         cause: KinematicsError,
     },
+    /// The joints would have to stand otherwise than they can.
+    #[error(
+        "{place}: of {tried} postures tried, none in which the axes can follow this stroke can be \
+         reached from the one before; move the stroke, or mark it in parts"
+    )]
+    NoPosture {
+        /// Line of the job file, 0 for none.
+        line: u64,
+        /// Where in the job.
+        place: Place,
+        /// How many were tried.
+        tried: usize,
+    },
     /// A limit of path, area, axis or motor.
     #[error(
         "{place}{}: {} of {:.6} {unit} is beyond the limit of {:.6} {unit}",
@@ -186,6 +202,7 @@ impl PlanError {
             | Self::TooShort { line, .. }
             | Self::TooManyEdges { line, .. }
             | Self::Unreachable { line, .. }
+            | Self::NoPosture { line, .. }
             | Self::Limit { line, .. } => *line,
         }
     }
@@ -207,7 +224,7 @@ pub(crate) fn plan_unless(
 ) -> Result<Plan, PlanError> {
     match job.ideal_only {
         Some(reason) => Err(PlanError::IdealOnly(reason)),
-        None => plan_within(machine, job, false, abandoned),
+        None => plan_within(machine, job, Scope::Machine, abandoned),
     }
 }
 
@@ -217,13 +234,13 @@ pub(crate) fn plan_unless(
 /// # Errors
 /// As [`plan`], without axes and area.
 pub fn plan_ideal(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
-    plan_within(machine, job, true, &|| false)
+    plan_within(machine, job, Scope::PathAlone, &|| false)
 }
 
 fn plan_within(
     machine: &Machine,
     job: &Job,
-    ideal: bool,
+    scope: Scope,
     abandoned: &dyn Fn() -> bool,
 ) -> Result<Plan, PlanError> {
     let drawing = &job.drawing;
@@ -237,67 +254,82 @@ fn plan_within(
     })?;
     let chosen = speed::choose(drawing.start, &stops, &limits, &job.marking)
         .map_err(|sharp| PlanError::TooSharp { line: sharp.line, speed: sharp.speed })?;
-    let mut plan = Plan {
-        artwork: Artwork::default(),
-        facts: PlanFacts {
-            name: drawing.name.clone(),
-            strokes: 0,
-            // From 0, since the sum of nothing is -0.
-            length: speed::outlines(&stops)
-                .map(crate::outline::Outline::length)
-                .fold(0.0, |a, b| a + b),
-            duration: 0.0,
-            samples: 0,
-            speed: chosen.speeds.iter().copied().fold(0.0, f64::max),
-            notes: drawing.notes.iter().cloned().chain(chosen.notes).collect(),
-            uses: Uses::default(),
-        },
-        trajectory: Arc::default(),
+    let task = Task {
+        machine,
+        limits,
+        stops: &stops,
+        speeds: &chosen.speeds,
+        standing: job.standing,
+        attitude: job.attitude,
+    };
+    let check =
+        |trajectory: &Arc<Trajectory>| checked(machine, limits, trajectory, scope, abandoned);
+    let (routed, (samples, uses)) =
+        if scope == Scope::PathAlone || machine.mechanism.visit(IsLinear) {
+            by_tool(drawing.start, &task, check)?
+        } else {
+            machine.mechanism.visit(PlanJoints { task, check })?
+        };
+    // Last, so that a drawing far beyond the area is refused before it is drawn point by point.
+    let artwork = artwork(routed.stops.as_deref().unwrap_or(&stops));
+    let notes = [drawing.notes.as_slice(), &chosen.notes, &routed.notes].concat();
+    let facts = PlanFacts {
+        name: drawing.name.clone(),
+        strokes: artwork.strokes.len(),
+        // From 0, since the sum of nothing is -0.
+        length: speed::outlines(&stops).map(Outline::length).fold(0.0, |a, b| a + b),
+        duration: routed.trajectory.duration(),
+        samples,
+        speed: routed.speed,
+        notes,
+        uses,
+    };
+    Ok(Plan {
+        artwork,
+        facts,
+        trajectory: routed.trajectory,
         mechanism: machine.mechanism.clone(),
         axes: machine.axes.clone(),
+    })
+}
+
+/// Plans a task by the tool alone, from `start` on, and checks it with `check`: for mechanisms whose
+/// joints go straight with the tool, and for what is held to the path alone.
+fn by_tool<T>(
+    start: Vector3<f64>,
+    task: &Task<'_>,
+    check: impl FnOnce(&Arc<Trajectory>) -> Result<T, PlanError>,
+) -> Result<(Routed, T), PlanError> {
+    let Task { machine, limits, stops, speeds, standing: _, attitude } = *task;
+    let mut trajectory = Trajectory::new(start, stops, &limits, &machine.laser, speeds)
+        .map_err(|short| PlanError::TooShort { line: short.line, duration: short.duration })?;
+    trajectory.attitude = attitude;
+    let trajectory = Arc::new(trajectory);
+    let found = check(&trajectory)?;
+    let speed = speeds.iter().copied().fold(0.0, f64::max);
+    Ok((Routed { trajectory, notes: Vec::new(), stops: None, speed }, found))
+}
+
+/// Samples a trajectory and holds it to the limits in `scope`: how many samples there are, and what
+/// of the limits they use.
+fn checked(
+    machine: &Machine,
+    limits: PathLimits,
+    trajectory: &Arc<Trajectory>,
+    scope: Scope,
+    abandoned: &dyn Fn() -> bool,
+) -> Result<(u64, Uses), PlanError> {
+    if trajectory.end().is_nan() || trajectory.end() > LONGEST {
+        return Err(PlanError::TooLong { duration: trajectory.duration() });
+    }
+    check_edges(trajectory)?;
+    let checker = Checker::new(machine, limits, scope);
+    let between = match scope {
+        Scope::Machine => Some(Between::new(limits.tolerance)),
+        Scope::PathAlone => None,
     };
-    let check = |trajectory: &Arc<Trajectory>| {
-        if trajectory.end().is_nan() || trajectory.end() > LONGEST {
-            return Err(PlanError::TooLong { duration: trajectory.duration() });
-        }
-        check_edges(trajectory)?;
-        let checker = Checker::new(machine, limits, ideal);
-        machine.mechanism.visit(CheckAll { trajectory, axes: &machine.axes, checker, abandoned })
-    };
-    let mut gone = None;
-    let (samples, uses) = if ideal || machine.mechanism.visit(IsLinear) {
-        let mut trajectory =
-            Trajectory::new(drawing.start, &stops, &limits, &machine.laser, &chosen.speeds)
-                .map_err(|short| PlanError::TooShort {
-                    line: short.line,
-                    duration: short.duration,
-                })?;
-        trajectory.attitude = job.attitude;
-        plan.trajectory = Arc::new(trajectory);
-        check(&plan.trajectory)?
-    } else {
-        let task = Task {
-            machine,
-            limits,
-            stops: &stops,
-            speeds: &chosen.speeds,
-            standing: job.standing,
-            attitude: job.attitude,
-        };
-        let (routed, checked) = machine.mechanism.visit(PlanJoints { task, check })?;
-        plan.trajectory = routed.trajectory;
-        plan.facts.notes.extend(routed.notes);
-        plan.facts.speed = routed.speed;
-        gone = routed.stops;
-        checked
-    };
-    plan.facts.duration = plan.trajectory.duration();
-    plan.facts.samples = samples;
-    plan.facts.uses = uses;
-    // Last, so that a drawing far beyond the area is refused before it is drawn point by point.
-    plan.artwork = artwork(gone.as_deref().unwrap_or(&stops));
-    plan.facts.strokes = plan.artwork.strokes.len();
-    Ok(plan)
+    let axes = &machine.axes;
+    machine.mechanism.visit(CheckAll { trajectory, axes, checker, between, abandoned })
 }
 
 /// That no cycle needs more changes of the laser than a sample can hold.
@@ -318,6 +350,8 @@ struct CheckAll<'a> {
     trajectory: &'a Arc<Trajectory>,
     axes: &'a [Axis],
     checker: Checker<'a>,
+    /// Where the axes have to follow, so that what lies between two setpoints depends on them.
+    between: Option<Between>,
     abandoned: &'a dyn Fn() -> bool,
 }
 
@@ -325,20 +359,33 @@ impl MechanismVisitor for CheckAll<'_> {
     type Output = Result<(u64, Uses), PlanError>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let Self { trajectory, axes, mut checker, abandoned } = self;
+        let Self { trajectory, axes, mut checker, between, abandoned } = self;
         let refuse = |found| unreachable(trajectory, found);
+        // On straight joints the cubic is the tool's own.
+        let is_linear = mechanism.is_linear();
         let mut sampler =
             Sampler::new(mechanism, axes, Arc::clone(trajectory), 1).map_err(refuse)?;
+        let mut between = between.filter(|_| !is_linear);
+        let refuse_breach = |breach: Breach| {
+            let (line, place) = place(trajectory, breach.time);
+            PlanError::Limit { line, place, breach }
+        };
         let mut samples: u64 = 0;
-        for setpoint in sampler.by_ref() {
+        while let Some(setpoint) = sampler.next() {
             samples += 1;
             if samples.is_multiple_of(LOOK) && abandoned() {
                 return Err(PlanError::Abandoned);
             }
-            checker.look(&setpoint).map_err(|breach| {
-                let (line, place) = place(trajectory, breach.time);
-                PlanError::Limit { line, place, breach }
-            })?;
+            checker.look(&setpoint).map_err(refuse_breach)?;
+            if let Some(between) = &mut between {
+                let time = setpoint.sequence as f64 * CYCLE_TIME;
+                let breach = between
+                    .look(&setpoint, &sampler, trajectory)
+                    .map_err(|cause| refuse(Unreachable { time, cause }))?;
+                if let Some(breach) = breach {
+                    return Err(refuse_breach(breach));
+                }
+            }
         }
         match sampler.broken() {
             Some(found) => Err(refuse(found)),

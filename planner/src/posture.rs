@@ -11,28 +11,29 @@ use crate::demand::Demands;
 /// A larger step of a joint between two looks makes the other branches compete [m or rad].
 const JUMP: f64 = 0.3;
 
-/// The shortest step along a sortie, as a share of one of its parts: below, a change of the joints
-/// is a jump.
+/// The shortest step of a walk, as a share of the part that it goes along: below, a change of the
+/// joints is a jump.
 const SHORTEST: f64 = 1e-7;
 
-/// Steps of a walk along one part of a sortie, before they are refined.
+/// Steps of a walk along one part, before they are refined.
 const STEPS: usize = 64;
 
 /// Rounding allowed at a soft limit [m or rad].
 const ROUNDING: f64 = 1e-9;
 
-/// All branches of a mechanism that can be chosen one value at a time, at most [`MOST`]; the first is
-/// its own. Which turn a table is in is no branch here: turns are chosen among the joints.
+/// All branches of a mechanism that can be chosen one value at a time, at most 32; the first is its
+/// own. Which turn a table is in is no branch here: turns are chosen among the joints.
 pub(crate) fn branches<const N: usize, M: Mechanism<N>>(
     mechanism: &M,
     near: &Joints<N>,
 ) -> Vec<M::Branch> {
-    const TURN: &str = "table_turn";
+    /// Six legs with two sides each would be 64; no shipped mechanism comes near.
     const MOST: usize = 32;
-    let own = mechanism.branch();
-    let own = own.choose(TURN, &[]).unwrap_or(own);
+    let own = mechanism.branch().in_any_turn();
     // What the mechanism itself leaves open is named by the branch that a posture is in.
-    let named = mechanism.assemble(near, own, None).map(|assembly| mechanism.branch_of(&assembly));
+    let named = mechanism
+        .assemble(near, own, None)
+        .map(|assembly| mechanism.branch_of(&assembly).in_any_turn());
     let names = |branch: M::Branch| {
         let mut choices = branch.choices();
         if let Ok(named) = named {
@@ -48,7 +49,7 @@ pub(crate) fn branches<const N: usize, M: Mechanism<N>>(
     let mut next = 0;
     while let Some(&branch) = found.get(next) {
         next += 1;
-        for (name, values) in names(branch).into_iter().filter(|(name, _)| *name != TURN) {
+        for (name, values) in names(branch) {
             for index in 0..values.len() {
                 for sign in [1, -1] {
                     let mut other = values.clone();
@@ -145,6 +146,8 @@ pub(crate) enum Refused {
     Kinematics(KinematicsError),
     /// A joint would leave its soft limits.
     Position { axis: usize, value: f64, limit: f64 },
+    /// So many were tried, and none that the axes can follow can be reached.
+    NoPosture { tried: usize },
 }
 
 impl From<KinematicsError> for Refused {
@@ -153,7 +156,7 @@ impl From<KinematicsError> for Refused {
     }
 }
 
-/// Where the joints go along a sortie.
+/// Where the joints go on a walk along parts.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Walked<const N: usize> {
     pub(crate) end: Posture<N>,

@@ -3,7 +3,7 @@
 //! Every profile is made of one [`Ramp`], from rest to a speed in three phases (jerk, constant
 //! acceleration, jerk back), and its mirror image in time. Seven phases in all; source 003 text of
 //! fig. 2-1 counts six, and its eq. 2.2 to 2.5 hold only with absolute instants, so the forms here
-//! are derived again. [`check`] integrates the phases once more and compares.
+//! are derived again, and the tests integrate the phases once more ([`integrate`]) and compare.
 
 use signals::math;
 
@@ -206,7 +206,9 @@ pub fn integrate(phases: &[(f64, f64)]) -> Vec<Motion> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::random::logarithmic;
     use serde_json::Value;
+    use signals::random::SplitMix64;
 
     fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
         assert!(
@@ -287,12 +289,12 @@ mod tests {
 
     #[test]
     fn random_moves_integrate_back_and_keep_their_limits() {
-        let mut random = crate::random::Random::new(1);
+        let mut random = SplitMix64::new(1);
         for _ in 0..20_000 {
-            let length = random.logarithmic(1e-9, 10.0);
-            let speed = random.logarithmic(1e-4, 10.0);
-            let acceleration = random.logarithmic(1e-2, 1e3);
-            let jerk = random.logarithmic(1.0, 1e6);
+            let length = logarithmic(&mut random, 1e-9, 10.0);
+            let speed = logarithmic(&mut random, 1e-4, 10.0);
+            let acceleration = logarithmic(&mut random, 1e-2, 1e3);
+            let jerk = logarithmic(&mut random, 1.0, 1e6);
             let case = format!("L {length:e} V {speed:e} A {acceleration:e} J {jerk:e}");
             let planned = Move::new(length, speed, acceleration, jerk);
             check(&planned, speed, acceleration, jerk, &case);

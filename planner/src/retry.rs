@@ -34,10 +34,10 @@ impl Retry {
         (place, breach): (&Place, &Breach),
     ) -> bool {
         self.trials += 1;
-        if self.trials > TRIALS[0] + TRIALS[1] || !may_be_slower(breach) {
+        if self.trials > TRIALS[0] + TRIALS[1] || breach.quantity.is_place() {
             return false;
         }
-        let all = self.trials > TRIALS[0] || sums_up(breach);
+        let all = self.trials > TRIALS[0] || breach.quantity.sums_up();
         if all {
             speeds.strokes.iter_mut().for_each(|(_, share)| *share *= SLOWER);
             speeds.moves.iter_mut().for_each(|share| *share *= SLOWER);
@@ -64,17 +64,6 @@ impl Retry {
         }
         slowed
     }
-}
-
-/// Whether less speed mends a breach.
-fn may_be_slower(breach: &Breach) -> bool {
-    const PLACES: [&str; 4] = ["joint position", "x of the tool", "y of the tool", "z of the tool"];
-    !PLACES.contains(&breach.quantity)
-}
-
-/// Whether a breach comes of all that went before.
-fn sums_up(breach: &Breach) -> bool {
-    breach.quantity == "root mean square of current"
 }
 
 /// The number of the piece that moves at `time` [s], or of the last one that did before.

@@ -28,8 +28,44 @@ use crate::timing::{Leg, OUTPUT_REST, PAUSE_REST, Straight, Way};
 /// Postures tried for one stroke, the nearest first.
 const TRIED: usize = 6;
 
+/// Postures that one stroke is timed for, each where the one before cannot be reached.
+const TIMED: usize = 7;
+
 /// Rounding allowed at the edge of the area [m].
 const ROUNDING: f64 = 1e-9;
+
+/// How much slower a move along a curve is made than the looks at it ask: between two looks it may
+/// ask for a little more.
+const BETWEEN_LOOKS: f64 = 1.01;
+
+/// Rounds in which run-in, run-out and the law of speed between them are fitted to each other. Each
+/// makes the runs slower by what the axes lack.
+const ROUNDS: usize = 12;
+
+/// How much slower than it seems to need a run is made in each of these rounds, so that a last
+/// thousandth takes no round of its own.
+const RUN_MARGIN: f64 = 1.02;
+
+/// Share of the path's acceleration that the stroke's bend at its end may take of a run that is made
+/// slower; the rest is for its ramp.
+const BEND: f64 = 0.7;
+
+/// How often the runs are made shorter, by half their speed, where they leave the reach: at last their
+/// speed is below a hundredth of what was asked, and what is out of reach is the stroke itself.
+const SHORTENINGS: usize = 8;
+
+/// How much slower a straight move of the tool that the axes cannot follow is tried again, and how
+/// often: at last a hundred and fifty times slower.
+const STRAIGHT_SLOWER: f64 = 1.3;
+const STRAIGHT_TRIALS: u32 = 20;
+
+/// Places at which the way of a joint move is held to the area and to the margins. It is an arc or a
+/// screw line of at most a few turns.
+const LOOKS: u32 = 32;
+
+/// Time between two looks at a motion of the tool [s], and the bounds of their number.
+const LOOK: f64 = 1e-3;
+const LOOK_COUNT: [f64; 2] = [32.0, 4000.0];
 
 /// A way that cannot be gone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -147,10 +183,12 @@ struct Timed {
     law: Option<SpeedLaw>,
 }
 
-/// The way into a stroke or out of it, within shares of the path's limits that the axes can follow.
+/// How fast the run-in or the run-out of a stroke is made.
 #[derive(Clone, Copy)]
-struct Lead {
+struct RunPace {
+    /// The speed at the stroke's end of it [m/s].
     speed: f64,
+    /// How many times slower it is than the path's limits let it be, so that the axes can follow.
     slower: f64,
 }
 
@@ -221,7 +259,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         };
         let duration = feed.duration();
         let pace = self.pace(start, duration, &|time| feed.at(time))?;
-        feed.pace *= if pace > 1.0 { pace * 1.01 } else { 1.0 } / self.share();
+        feed.pace *= if pace > 1.0 { pace * BETWEEN_LOOKS } else { 1.0 } / self.share();
         self.push(feed.duration(), Way::Feed(Cow::Owned(feed)));
         Ok(())
     }
@@ -296,7 +334,6 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
 
     /// That the tool stays inside the area during `step`, and the mechanism away from collisions.
     fn check(&self, step: &JointMove) -> Result<(), KinematicsError> {
-        const LOOKS: u32 = 32;
         let way = step.way::<N>();
         let mut near = None;
         for index in 0..=LOOKS {
@@ -327,8 +364,6 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         first: &ToolMotion,
         parts: &[&Part<'_>],
     ) -> Result<Approach<'a, N>, Refused> {
-        const SLOWER: f64 = 1.3;
-        const TRIALS: u32 = 20;
         let from = self.tool()?.position;
         let to = first.position;
         let line =
@@ -340,20 +375,24 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         let mut trials = 0;
         let mut way = None;
         while let Some(straight) = Straight::new(from, to, &limits) {
-            trials += 1;
-            if trials > TRIALS {
-                let detail = "the axes cannot follow a straight move to here, however slow";
-                let code = "overload";
-                return Err(
-                    KinematicsError { code, axis: None, value: 1.0, limit: 0.0, detail }.into()
-                );
-            }
             let duration = straight.profile.duration();
-            if self.pace(self.now, duration, &|time| straight.at(time))? <= 1.0 {
+            let pace = self.pace(self.now, duration, &|time| straight.at(time))?;
+            if pace <= 1.0 {
                 way = Some((duration, Way::Straight(straight)));
                 break;
             }
-            limits = slower(&limits, SLOWER);
+            trials += 1;
+            if trials >= STRAIGHT_TRIALS {
+                return Err(Refused::Kinematics(KinematicsError {
+                    code: "overload",
+                    axis: None,
+                    value: pace,
+                    limit: 1.0,
+                    detail: "a straight move to here would have to be so many times slower still for \
+                             the axes to follow",
+                }));
+            }
+            limits = slower(&limits, STRAIGHT_SLOWER);
         }
         Ok(Approach { way, start, end: whole.end })
     }
@@ -365,9 +404,8 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         duration: f64,
         tool: &dyn Fn(f64) -> ToolMotion,
     ) -> Result<f64, KinematicsError> {
-        /// Time between two looks [s], and their bounds.
-        const LOOK: f64 = 1e-3;
-        let count = (duration / LOOK).ceil().clamp(32.0, 4000.0) as usize;
+        let [least, most] = LOOK_COUNT;
+        let count = (duration / LOOK).ceil().clamp(least, most) as usize;
         let Posture { mut joints, mut branch } = start;
         let mut pace: f64 = 0.0;
         for index in 0..=count {
@@ -391,10 +429,10 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         let middle = |share: f64| path.at(length * share).motion(1.0, 0.0, 0.0);
 
         // A posture for the whole; with shorter ways in and out where long ones leave the reach.
-        let mut leads = [top, top].map(|speed| Lead { speed, slower: 1.0 });
-        let mut wanted = self.posture_for(&ends, &middle, &mut leads)?;
-        for _ in 0..=TRIED {
-            let timed = self.time(&ends, (&path, &middle), &wanted, leads, [top, share])?;
+        let mut runs = [top, top].map(|speed| RunPace { speed, slower: 1.0 });
+        let mut wanted = self.posture_for(&ends, &middle, &mut runs)?;
+        for _ in 0..TIMED {
+            let timed = self.time(&ends, (&path, &middle), &wanted, runs, [top, share])?;
             let Timed { run_in, run_out, .. } = &timed;
             let into = |share: f64| run_in.at(run_in.duration() * share);
             let out = |share: f64| run_out.at(run_out.duration() * share);
@@ -407,14 +445,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
             // What was timed cannot be reached: what can be has times of its own.
             wanted = approach.start;
         }
-        Err(Refused::Kinematics(KinematicsError {
-            code: "posture",
-            axis: None,
-            value: TRIED as f64,
-            limit: TRIED as f64,
-            detail: "no posture in which the axes can follow this stroke can be reached from the one \
-                     before; move the stroke, or mark it in parts",
-        }))
+        Err(Refused::NoPosture { tried: TIMED })
     }
 
     /// Times a stroke of at most `top` [m/s], at a share of what the axes seem to allow, that is
@@ -424,16 +455,16 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         ends: &[Jet; 2],
         (path, middle): (&StrokePath, &Part<'_>),
         wanted: &Posture<N>,
-        mut leads: [Lead; 2],
+        mut runs: [RunPace; 2],
         [top, share]: [f64; 2],
     ) -> Result<Timed, Refused> {
         let limits = self.demands.path;
-        for _ in 0..12 {
-            let (run_in, run_out) = ways(ends, &leads, &limits);
+        for _ in 0..ROUNDS {
+            let (run_in, run_out) = ways(ends, &runs, &limits);
             let into = |share: f64| run_in.at(run_in.duration() * share);
             let entered = walk(self.demands, wanted_start(self, &run_in, wanted)?, &[&into])?.end;
             let reach = reach(self.demands, path, &entered, top)?;
-            let law = if share >= 1.0 && reach.steady >= top && leads.iter().all(|l| l.speed >= top)
+            let law = if share >= 1.0 && reach.steady >= top && runs.iter().all(|l| l.speed >= top)
             {
                 None
             } else {
@@ -444,13 +475,13 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
                     cell.ramp = cell.ramp.map(|limit| limit * share);
                 }
                 let most = cells.iter().map(|cell| cell.speed).fold(0.0, f64::max).min(top);
-                Some(SpeedLaw::below(&cells, most, [leads[0].speed, leads[1].speed]))
+                Some(SpeedLaw::below(&cells, most, [runs[0].speed, runs[1].speed]))
             };
             let (first, last) = law.as_ref().map_or((top, top), |law| (law.first(), law.last()));
-            leads[0].speed = first;
-            leads[1].speed = last;
+            runs[0].speed = first;
+            runs[1].speed = last;
             let (run_in, run_out) =
-                if law.is_some() { ways(ends, &leads, &limits) } else { (run_in, run_out) };
+                if law.is_some() { ways(ends, &runs, &limits) } else { (run_in, run_out) };
             let start = wanted_start(self, &run_in, wanted)?;
             let left = walk(self.demands, entered, &[middle])?.end;
             let paces = [
@@ -463,11 +494,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
                 let pace = pace / share.min(1.0);
                 if pace > 1.0 {
                     fits = false;
-                    let lead = &mut leads[index];
-                    lead.slower *= pace * 1.02;
+                    let run = &mut runs[index];
+                    run.slower *= pace * RUN_MARGIN;
                     let bend = ends[index].second.norm();
-                    let most = 0.7 * limits.acceleration / (lead.slower * lead.slower * bend);
-                    lead.speed = lead.speed.min(most.sqrt());
+                    let most = BEND * limits.acceleration / (run.slower * run.slower * bend);
+                    run.speed = run.speed.min(most.sqrt());
                 }
             }
             if fits {
@@ -477,7 +508,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         Err(Refused::Kinematics(KinematicsError {
             code: "singular",
             axis: None,
-            value: leads[0].slower.max(leads[1].slower),
+            value: runs[0].slower.max(runs[1].slower),
             limit: 1.0,
             detail: "the axes cannot follow the way into the stroke or out of it",
         }))
@@ -488,11 +519,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
         &self,
         ends: &[Jet; 2],
         middle: &Part<'_>,
-        leads: &mut [Lead; 2],
+        runs: &mut [RunPace; 2],
     ) -> Result<Posture<N>, Refused> {
         let mut refused = None;
-        for _ in 0..8 {
-            let (run_in, run_out) = ways(ends, leads, &self.demands.path);
+        for _ in 0..SHORTENINGS {
+            let (run_in, run_out) = ways(ends, runs, &self.demands.path);
             let into = |share: f64| run_in.at(run_in.duration() * share);
             let out = |share: f64| run_out.at(run_out.duration() * share);
             let found =
@@ -507,11 +538,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Router<'a, '_, N, M> {
                     refused.get_or_insert(cause);
                 }
             }
-            for lead in leads.iter_mut() {
-                lead.speed /= 2.0;
+            for run in runs.iter_mut() {
+                run.speed /= 2.0;
             }
         }
-        Err(refused.unwrap_or(Refused::Position { axis: 0, value: f64::NAN, limit: 0.0 }))
+        Err(refused.unwrap_or(Refused::NoPosture { tried: SHORTENINGS }))
     }
 
     fn add_stroke(&mut self, outline: &'a Outline, path: &StrokePath, timed: Timed, top: f64) {
@@ -547,8 +578,8 @@ fn wanted_start<const N: usize, M: Mechanism<N>>(
 }
 
 /// The ways into a stroke and out of it.
-fn ways(ends: &[Jet; 2], leads: &[Lead; 2], limits: &machine::PathLimits) -> (RunIn, RunOut) {
-    let [into, out] = leads;
+fn ways(ends: &[Jet; 2], runs: &[RunPace; 2], limits: &machine::PathLimits) -> (RunIn, RunOut) {
+    let [into, out] = runs;
     (
         RunIn::new(&ends[0], into.speed, &slower(limits, into.slower)),
         RunOut::new(&ends[1], out.speed, &slower(limits, out.slower)),

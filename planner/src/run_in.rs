@@ -239,6 +239,8 @@ impl RunOut {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::logarithmic;
+    use signals::random::SplitMix64;
 
     const LIMITS: PathLimits =
         PathLimits { speed: 0.25, rapid: 0.25, acceleration: 10.0, jerk: 500.0, tolerance: 5e-6 };
@@ -263,11 +265,11 @@ mod tests {
 
     #[test]
     fn random_curved_run_ins_arrive_and_keep_their_limits() {
-        let mut random = crate::random::Random::new(2);
+        let mut random = SplitMix64::new(2);
         for _ in 0..400 {
-            let speed = random.logarithmic(1e-3, 0.25);
+            let speed = logarithmic(&mut random, 1e-3, 0.25);
             let top = (10.0 / (speed * speed)).min((500.0 / (speed * speed * speed)).sqrt());
-            let jet = start(top * random.logarithmic(1e-4, 1.0));
+            let jet = start(top * logarithmic(&mut random, 1e-4, 1.0));
             let case = format!("speed {speed:e} curvature {:e}", jet.second.norm());
             let run_in = RunIn::new(&jet, speed, &LIMITS);
             let end = run_in.at(run_in.duration());

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use machine::kinematics::{JointMotion, Joints, KinematicsError, ToolMotion};
 use machine::{Axis, Friction, Mechanism, StepperMotor};
+use nalgebra::Vector3;
 use signals::time::CYCLE_TIME;
 use signals::{GateEdge, LaserCycle, Setpoint, axis::axis_array, setpoint::flags};
 
@@ -26,9 +27,6 @@ const STEP: f64 = CYCLE_TIME / STEPS as f64;
 
 /// A stream ends once no motor is farther than this from where it will stay [joint units].
 const SETTLED: f64 = 1e-9;
-
-/// Motor speed below which friction takes no side, as in the controller [rad/s].
-const STANDING: f64 = 0.01;
 
 /// Nanoseconds in a cycle.
 const CYCLE: i64 = signals::time::CYCLE_PERIOD.0;
@@ -91,9 +89,7 @@ impl Drive {
     fn lead_rotor(&self, axis: usize, velocity: f64, setpoint: &mut Setpoint) {
         let Some(stepper) = &self.stepper else { return };
         let speed = velocity / self.ratio;
-        let side = if speed.abs() < STANDING { 0.0 } else { speed.signum() };
-        let friction = self.friction.coulomb * side + self.friction.viscous * speed;
-        let torque = setpoint.effort[axis] + friction;
+        let torque = setpoint.effort[axis] + self.friction.torque(speed);
         // Beyond its torque there is no load angle: the checker refuses the sample for that torque.
         let angle = stepper
             .load_angle(torque, speed)
@@ -198,6 +194,13 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             }
             Stream::Running | Stream::Ended => None,
         }
+    }
+
+    /// Where the tool is with the joints at `joints` [m or rad], near the last sample and on its
+    /// branch [m].
+    pub(crate) fn locate(&self, joints: &Joints<N>) -> Result<Vector3<f64>, KinematicsError> {
+        let branch = self.branches[self.branch];
+        Ok(self.mechanism.locate(joints, branch, Some(&self.assembly))?.position)
     }
 
     /// The mechanism with the joints at `joints` [m or rad], near the last sample and on its branch.
@@ -307,8 +310,8 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         Ok(setpoint)
     }
 
-    /// The laser in the cycle that starts with sample `sequence`, and the stroke it lights; `None`
-    /// when the cycle cannot hold its changes, which the checker has refused.
+    /// The laser in the cycle that starts with sample `sequence`, and the stroke it lights. A change
+    /// that the cycle cannot hold is left to the next one; the checker refuses such a stream.
     fn laser(&mut self) -> (LaserCycle, u64) {
         let start = self.sequence as i64 * CYCLE;
         let mut cycle = LaserCycle {

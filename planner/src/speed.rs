@@ -10,7 +10,7 @@ use crate::job::{Marking, MarkingSpeed};
 use crate::outline::Outline;
 use crate::timing::travel;
 
-/// Speeds tried between nothing and the largest before the best is refined.
+/// ChosenSpeeds tried between nothing and the largest before the best is refined.
 const TRIALS: usize = 50;
 
 /// Steps of golden section: the speed to a part in 10⁷ of a trial's width.
@@ -24,7 +24,7 @@ pub(crate) const CRAWL: f64 = 1e-5;
 
 /// The speed of each stroke, in order [m/s], and what a person should know about it.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Speeds {
+pub(crate) struct ChosenSpeeds {
     pub(crate) speeds: Vec<f64>,
     pub(crate) notes: Vec<Note>,
 }
@@ -51,8 +51,8 @@ pub(crate) fn choose(
     stops: &[Stop],
     limits: &PathLimits,
     marking: &Marking,
-) -> Result<Speeds, TooSharp> {
-    let mut chosen = Speeds::default();
+) -> Result<ChosenSpeeds, TooSharp> {
+    let mut chosen = ChosenSpeeds::default();
     let cap = match marking.max_speed {
         Some(most) if most > limits.speed => {
             chosen.note(
@@ -136,7 +136,7 @@ fn fastest(time: impl Fn(f64) -> f64, most: f64) -> f64 {
     if time(refined) < least { refined } else { trial(best) }
 }
 
-impl Speeds {
+impl ChosenSpeeds {
     fn note(&mut self, line: u64, text: String) {
         self.notes.push(Note { line, text });
     }

@@ -10,6 +10,7 @@ use machine::kinematics::ToolMotion;
 use machine::{LaserSource, PathLimits, Pose};
 use nalgebra::Vector3;
 use signals::Nanoseconds;
+use signals::time::CYCLE_TIME;
 
 use crate::attitude::AttitudeLaw;
 use crate::itinerary::{Feed, Stop};
@@ -21,7 +22,7 @@ use crate::stroke::StrokePath;
 use crate::timing::{Leg, OUTPUT_REST, Straight, Way, travel};
 
 /// Rest at the start of a stream [s], so that its first samples are at rest.
-pub const BEFORE: f64 = 2.0 * signals::time::CYCLE_TIME;
+pub const BEFORE: f64 = 2.0 * CYCLE_TIME;
 
 /// A stretch of motion of one kind.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,7 +88,7 @@ pub struct LaserChange {
 }
 
 /// A job as functions of stream time.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     /// The pieces, each starting where the one before ends; never empty.
     pub pieces: Vec<Piece>,
@@ -129,12 +130,18 @@ impl Trajectory {
         laser: &LaserSource,
         legs: impl FnOnce(&mut dyn FnMut(Leg<'a>)),
     ) -> Result<Self, TooShort> {
-        let mut before = BEFORE;
-        while before < laser.on_delay + BEFORE {
-            before += signals::time::CYCLE_TIME;
-        }
+        // Whole cycles, so that a source that is told ahead of the first light is told at rest.
+        let cycles = (laser.on_delay / CYCLE_TIME).ceil();
+        let before = BEFORE + cycles * CYCLE_TIME;
+        let rest = Piece { start: 0.0, duration: before, course: first, line: 0, stroke: 0 };
         let mut builder = Builder {
-            trajectory: Self::default(),
+            trajectory: Self {
+                pieces: vec![rest],
+                laser: Vec::new(),
+                outputs: Vec::new(),
+                pauses: Vec::new(),
+                attitude: AttitudeLaw::default(),
+            },
             time: before,
             stroke: 0,
             outputs: 0,
@@ -142,13 +149,6 @@ impl Trajectory {
             laser: *laser,
             refused: None,
         };
-        builder.trajectory.pieces.push(Piece {
-            start: 0.0,
-            duration: before,
-            course: first,
-            line: 0,
-            stroke: 0,
-        });
         legs(&mut |leg| builder.add(leg));
         match builder.refused {
             Some(refused) => Err(refused),
@@ -288,7 +288,7 @@ impl Builder {
             }
             Way::Pause(place) => {
                 // One cycle before the end, so that the sample that pauses is at rest.
-                self.trajectory.pauses.push(start + duration - signals::time::CYCLE_TIME);
+                self.trajectory.pauses.push(start + duration - CYCLE_TIME);
                 resting(place)
             }
         };

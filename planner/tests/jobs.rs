@@ -270,3 +270,26 @@ fn long_curves_in_the_dark_keep_the_limits_at_every_instant() {
         assert!((0.7..=1.0 + 1e-9).contains(&used), "{program}: {used}");
     }
 }
+
+/// Of a cloud's numbers that count something no part is cut off: a seed of 1.5 is not the seed 1.
+#[test]
+fn a_count_that_is_not_whole_is_refused() {
+    let machine = Machine::builtin();
+    let folder = Folder::new("whole");
+    let text = "[cloud]\ndwell = \"2 ms\"\n[cloud.sphere]\n\
+                center = [\"100 mm\", \"100 mm\", \"0 mm\"]\nradius = \"5 mm\"\n";
+    let path = folder.write("cloud.toml", text);
+    let read = |key: &str, value: &str| Job::read(&path, &[set(key, value)], &machine);
+    for (key, name) in
+        [("cloud.sphere.seed", "seed"), ("cloud.sphere.count", "count"), ("cloud.from", "from")]
+    {
+        for wrong in ["1.5", "-1", "-0.5"] {
+            let error = read(key, wrong).unwrap_err().to_string();
+            assert!(error.contains(key), "{error}");
+            if !wrong.starts_with('-') {
+                assert!(error.contains(&format!("`{name}` cannot be {wrong}")), "{error}");
+            }
+        }
+        read(key, "7").unwrap();
+    }
+}

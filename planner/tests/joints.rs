@@ -8,6 +8,7 @@ use core::f64::consts::TAU;
 use machine::mechanisms::polar::{Polar, PolarBranch, PolarLoad};
 use machine::{Axis, Machine, MechanismKind};
 use nalgebra::Vector3;
+use planner::check::Quantity;
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
 use planner::trajectory::Course;
 use planner::{Job, Plan, PlanError, plan};
@@ -227,7 +228,7 @@ fn a_table_at_the_end_of_its_travel_is_unwound_in_the_dark() {
         panic!("the arm does not turn so far")
     };
     assert_eq!((line, breach.axis.as_deref()), (3, Some("arm")));
-    assert_eq!(breach.quantity, "joint position");
+    assert_eq!(breach.quantity, Quantity::JointPosition);
 }
 
 fn plan_of(machine: &Machine, steps: Vec<Step>) -> Result<Plan, PlanError> {

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use machine::{Machine, Motor, StepperMotor};
+use planner::check::Quantity;
 use planner::{Job, PlanError, plan};
 
 fn machine() -> Machine {
@@ -18,7 +19,7 @@ fn stepper(machine: &mut Machine, axis: usize) -> &mut StepperMotor {
 }
 
 /// What is refused of the built-in job on `machine`, with axis, limit and unit.
-fn refused(machine: &Machine) -> (String, &'static str, f64, &'static str) {
+fn refused(machine: &Machine) -> (String, Quantity, f64, &'static str) {
     let job = Job::builtin(&[], machine).unwrap();
     match plan(machine, &job).unwrap_err() {
         PlanError::Limit { breach, .. } => {
@@ -48,10 +49,10 @@ fn a_motor_beyond_its_torque_or_its_driver_is_refused() {
     let mut weak = machine();
     stepper(&mut weak, 1).holding_torque = 0.01;
     let (axis, quantity, limit, unit) = refused(&weak);
-    assert_eq!((axis.as_str(), quantity, unit), ("y", "motor torque", "N·m"));
+    assert_eq!((axis.as_str(), quantity, unit), ("y", Quantity::MotorTorque, "N·m"));
     assert!(limit <= 0.01, "{limit}");
     let mut slow = machine();
     stepper(&mut slow, 0).pulse_rate = 40e3;
     let (axis, quantity, limit, unit) = refused(&slow);
-    assert_eq!((axis.as_str(), quantity, limit, unit), ("x", "pulse rate", 40e3, "1/s"));
+    assert_eq!((axis.as_str(), quantity, limit, unit), ("x", Quantity::PulseRate, 40e3, "1/s"));
 }

@@ -10,6 +10,7 @@ use machine::surface::{Cone, Placement, Projection, Shape, Surface};
 use machine::{Axis, Machine, Mechanism, MechanismKind};
 use nalgebra::{Matrix3, SVector, Vector3};
 use planner::attitude::{AttitudeLaw, turned};
+use planner::check::Quantity;
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
 use planner::{Job, PlanError, plan};
 
@@ -173,6 +174,6 @@ fn a_path_through_the_upright_tool_is_refused_where_the_tilt_goes_one_way_only()
     else {
         panic!("the tilt has no other side")
     };
-    assert_eq!((line, breach.quantity, breach.limit), (4, "joint position", 0.0));
+    assert_eq!((line, breach.quantity, breach.limit), (4, Quantity::JointPosition, 0.0));
     assert_eq!(breach.axis, Some(machine.axes[3].name.clone()));
 }

@@ -7,27 +7,12 @@
 use machine::kinematics::ToolMotion;
 use machine::{Machine, Override};
 use nalgebra::Vector3;
+use planner::check::Quantity;
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
 use planner::trajectory::{Course, Trajectory};
 use planner::{Job, MarkingSpeed, Plan, PlanError, plan};
+use signals::random::SplitMix64;
 use signals::setpoint::flags;
-
-/// splitmix64, so that a failing seed can be run again.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut value = self.0;
-        value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        value ^ (value >> 31)
-    }
-
-    fn between(&mut self, lower: f64, upper: f64) -> f64 {
-        lower + (upper - lower) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 fn step(action: Action) -> Step {
     Step { action, line: 7 }
@@ -67,14 +52,14 @@ fn arc(from: Vector3<f64>, heading: f64, radius: f64, sweep: f64) -> (Curve, Vec
 
 /// Strokes of lines, arcs and ellipses, some going on into each other with or without a small kink,
 /// with rapids, feeds in the dark, dwells and dots between them.
-fn random_drawing(random: &mut Random, machine: &Machine) -> Job {
+fn random_drawing(random: &mut SplitMix64, machine: &Machine) -> Job {
     let mut steps = Vec::new();
     let home = Vector3::from(machine.home);
     let mut place = home;
     let mut heading = 0.0;
     for _ in 0..8 {
         let to = home + Vector3::new(random.between(-0.03, 0.03), random.between(-0.03, 0.03), 0.0);
-        match random.next() % 8 {
+        match random.bits() % 8 {
             0 => {
                 steps.push(step(Action::Rapid { to }));
                 place = to;
@@ -92,7 +77,7 @@ fn random_drawing(random: &mut Random, machine: &Machine) -> Job {
                 place = to;
             }
             3 => {
-                let lit = random.next().is_multiple_of(2).then_some(0.3);
+                let lit = random.bits().is_multiple_of(2).then_some(0.3);
                 steps.push(step(Action::Dwell { time: random.between(0.001, 0.02), lit }));
             }
             4 => {
@@ -108,11 +93,11 @@ fn random_drawing(random: &mut Random, machine: &Machine) -> Job {
                 place = curve.to();
             }
             _ => {
-                let speed = random.next().is_multiple_of(2).then(|| random.between(0.02, 0.25));
-                for _ in 0..1 + random.next() % 4 {
+                let speed = random.bits().is_multiple_of(2).then(|| random.between(0.02, 0.25));
+                for _ in 0..1 + random.bits() % 4 {
                     // A kink below the corner of 1°.
                     heading += random.between(-0.017, 0.017);
-                    let (curve, to, turned) = match random.next() % 2 {
+                    let (curve, to, turned) = match random.bits() % 2 {
                         0 => {
                             let along = Vector3::new(
                                 signals::math::cos(heading),
@@ -280,7 +265,7 @@ fn check_stream(plan: &Plan, case: &str) {
 fn random_drawings_are_smooth_and_keep_their_limits() {
     let machine = machine_of_any_size();
     for seed in 0..120 {
-        let mut random = Random(seed);
+        let mut random = SplitMix64::new(seed);
         let job = random_drawing(&mut random, &machine);
         let case = format!("seed {seed}");
         let planned = match plan(&machine, &job) {
@@ -390,23 +375,23 @@ fn broken_limits_are_named() {
         };
     let machine = Machine::builtin();
     let found = breach(&machine, 0.12);
-    assert_eq!((found.quantity, found.limit), ("x of the tool", 0.2));
+    assert_eq!((found.quantity, found.limit), (Quantity::ToolPosition(0), 0.2));
     assert!(found.value > 0.2 && found.value < 0.2003, "{}", found.value);
 
     let mut weak = machine.clone();
     weak.axes[1].motor.dc_mut().unwrap().voltage = 3.0;
     let found = breach(&weak, 0.05);
-    assert_eq!((found.axis.as_deref(), found.quantity), (Some("b"), "motor voltage"));
+    assert_eq!((found.axis.as_deref(), found.quantity), (Some("b"), Quantity::MotorVoltage));
 
     let mut weak = machine.clone();
     weak.axes[0].motor.dc_mut().unwrap().current = 0.5;
     let found = breach(&weak, 0.05);
-    assert_eq!((found.axis.as_deref(), found.quantity), (Some("a"), "motor current"));
+    assert_eq!((found.axis.as_deref(), found.quantity), (Some("a"), Quantity::MotorCurrent));
 
     let mut slow = machine.clone();
     slow.axes[0].limits.velocity = 0.1;
     let found = breach(&slow, 0.05);
-    assert_eq!((found.quantity, found.limit), ("joint velocity", 0.1));
+    assert_eq!((found.quantity, found.limit), (Quantity::JointVelocity, 0.1));
     assert!(found.value > 0.1 && found.value < 0.11, "{}", found.value);
 
     let message = plan(&slow, &line(0.05, &slow)).unwrap_err().to_string();
@@ -455,6 +440,25 @@ fn laser_delays_are_compensated() {
     let off = planned.trajectory.laser[1].time.seconds();
     assert!((stroke.start - on - 150e-6).abs() < 1e-9);
     assert!((stroke.start + stroke.duration - off - 50e-6).abs() < 1e-9);
+}
+
+/// The rest before the first motion is as long as the source must be told ahead, in whole cycles.
+#[test]
+fn a_slow_source_is_told_during_the_rest_before_the_first_motion() {
+    let mut machine = Machine::builtin();
+    let from = Vector3::from(machine.home);
+    let curve = Curve::Line { from, to: from + Vector3::x() * 0.01 };
+    let job = job(vec![mark(curve, Some(0.1))], &machine);
+    for (delay, rest) in [(0.0, 0.002), (1e-9, 0.003), (0.0015, 0.004), (1.0, 1.002)] {
+        machine.laser.on_delay = delay;
+        let planned = plan(&machine, &job).unwrap();
+        let found = planned.trajectory.pieces[0].duration;
+        assert!((found - rest).abs() < 1e-12, "{delay} s: {found} s");
+        assert!(planned.trajectory.laser[0].time.0 >= 0, "{delay} s");
+    }
+    // Such a delay cannot be in a machine file; the plan still ends, with an error.
+    machine.laser.on_delay = 1e15;
+    assert!(matches!(plan(&machine, &job), Err(PlanError::TooLong { .. })));
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! What the stages of Graver say to each other: fixed-size samples, time, fault codes, and the
-//! one source of transcendental functions.
+//! one source of transcendental functions and of random numbers.
 //!
 //! Nothing here does input or output, allocates in a cycle, or knows how a sample travels.
 //! A sample is plain bytes: `#[repr(C)]`, no padding, no `bool`, no `enum`, no `Option`, arrays of
@@ -19,6 +19,7 @@ pub mod laser;
 pub mod math;
 pub mod operator;
 pub mod progress;
+pub mod random;
 pub mod report;
 pub mod sample;
 pub mod setpoint;

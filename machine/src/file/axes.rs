@@ -51,15 +51,15 @@ impl JointUnit {
         }
     }
 
-    /// Refuses a `quantity` of `axis` that is of the other kind.
+    /// Refuses a `quantity` of `axis` that is of the other kind; whether it is of this one.
     pub(super) fn expect<K: Kind, R: Range>(
         self,
         quantity: &Quantity<K, R>,
         axis: &str,
         findings: &mut Findings,
-    ) {
+    ) -> bool {
         if quantity.form == self as usize {
-            return;
+            return true;
         }
         let (moves, due) = match self {
             Self::Length => ("moves along a line", "a length, such as \"1 mm\""),
@@ -71,6 +71,7 @@ impl JointUnit {
             format!("axis `{axis}` {moves}: this unit does not fit"),
             Some(format!("write it with {due}")),
         );
+        false
     }
 }
 
@@ -163,28 +164,42 @@ fn limits(
     ratio: f64,
     findings: &mut Findings,
 ) -> AxisLimits {
-    let unit = joint.unit;
-    let margin = table.following_error.map_or(unit.following_error(), |given| {
-        unit.expect(&given, joint.name, findings);
+    let (unit, name) = (joint.unit, joint.name);
+    let following_error = table.following_error.map_or(unit.following_error(), |given| {
+        unit.expect(&given, name, findings);
         given.value
     });
-    let position = match &table.position {
-        None => match joint.range {
-            Some([lower, upper]) => [lower - margin, upper + margin],
-            None => {
-                findings.refuse(
-                    ProblemKind::MissingKey,
-                    table.place,
-                    format!("the range of axis `{}` does not follow from the area", joint.name),
-                    Some(format!(
-                        "add `position = {}` to the axis's `limits`",
-                        unit.example_range()
-                    )),
-                );
-                [f64::NEG_INFINITY, f64::INFINITY]
-            }
-        },
-        Some(Either::Word(word)) => {
+    if let Some(limit) = &table.acceleration {
+        unit.expect(limit, name, findings);
+    }
+    if let Some(limit) = &table.jerk {
+        unit.expect(limit, name, findings);
+    }
+    AxisLimits {
+        position: position(table, joint, following_error, findings),
+        velocity: velocity(table, joint, motor.largest_speed() * ratio, findings),
+        acceleration: table.acceleration.map_or(f64::INFINITY, |limit| limit.value),
+        jerk: table.jerk.map_or(f64::INFINITY, |limit| limit.value),
+        following_error,
+    }
+}
+
+/// The soft limits of `joint` [m or rad]: as given, or the range that the area needs with `margin`
+/// beyond it.
+fn position(table: &LimitsTable, joint: &Joint, margin: f64, findings: &mut Findings) -> [f64; 2] {
+    let unit = joint.unit;
+    match (&table.position, joint.range) {
+        (None, Some([lower, upper])) => [lower - margin, upper + margin],
+        (None, None) => {
+            findings.refuse(
+                ProblemKind::MissingKey,
+                table.place,
+                format!("the range of axis `{}` does not follow from the area", joint.name),
+                Some(format!("add `position = {}` to the axis's `limits`", unit.example_range())),
+            );
+            [f64::NEG_INFINITY, f64::INFINITY]
+        }
+        (Some(Either::Word(word)), _) => {
             if unit == JointUnit::Length {
                 findings.contradict(
                     word.place,
@@ -194,61 +209,51 @@ fn limits(
             }
             [f64::NEG_INFINITY, f64::INFINITY]
         }
-        Some(Either::Value([lower, upper])) => {
-            unit.expect(lower, joint.name, findings);
-            unit.expect(upper, joint.name, findings);
-            let name = unit.name();
-            if lower.value >= upper.value {
-                findings.contradict(
-                    lower.place,
-                    format!(
-                        "the range from {} {name} to {} {name} is empty",
-                        lower.value, upper.value
-                    ),
-                    "write [from, to], the smaller first",
-                );
-            } else if joint.home < lower.value || joint.home > upper.value {
-                let place = if joint.home < lower.value { lower.place } else { upper.place };
-                findings.contradict(
-                    place,
-                    format!(
-                        "axis `{}` is at {} {name} at home, outside its limits {} {name} to {} {name}",
-                        joint.name, joint.home, lower.value, upper.value
-                    ),
-                    "widen the limits, or change `home` or `home_axes`",
-                );
+        (Some(Either::Value([lower, upper])), _) => {
+            let fits = [lower, upper].map(|end| unit.expect(end, joint.name, findings));
+            if fits == [true, true] {
+                range([lower, upper], joint, findings);
             }
             [lower.value, upper.value]
         }
-    };
-    let no_load = motor.largest_speed() * ratio;
-    if let Some(velocity) = table.velocity
-        && velocity.value > no_load
-    {
+    }
+}
+
+/// Refuses a range of soft limits that is empty or has `joint` at home outside of it.
+fn range<K: Kind>([lower, upper]: [&Quantity<K>; 2], joint: &Joint, findings: &mut Findings) {
+    let name = joint.unit.name();
+    if lower.value >= upper.value {
+        findings.contradict(
+            lower.place,
+            format!("the range from {} {name} to {} {name} is empty", lower.value, upper.value),
+            "write [from, to], the smaller first",
+        );
+    } else if joint.home < lower.value || joint.home > upper.value {
+        let place = if joint.home < lower.value { lower.place } else { upper.place };
+        findings.contradict(
+            place,
+            format!(
+                "axis `{}` is at {} {name} at home, outside its limits {} {name} to {} {name}",
+                joint.name, joint.home, lower.value, upper.value
+            ),
+            "widen the limits, or change `home` or `home_axes`",
+        );
+    }
+}
+
+/// The largest speed of `joint` [m/s or rad/s], whose motor reaches `no_load` without load.
+fn velocity(table: &LimitsTable, joint: &Joint, no_load: f64, findings: &mut Findings) -> f64 {
+    let Some(velocity) = table.velocity else { return SPEED_SHARE * no_load };
+    if joint.unit.expect(&velocity, joint.name, findings) && velocity.value > no_load {
         findings.contradict(
             velocity.place,
             format!(
                 "the motor reaches {no_load:.4} {name}/s without load, not {} {name}/s",
                 velocity.value,
-                name = unit.name()
+                name = joint.unit.name()
             ),
             "lower the limit, or leave it out to use 90 % of what the motor can do",
         );
     }
-    if let Some(limit) = &table.velocity {
-        unit.expect(limit, joint.name, findings);
-    }
-    if let Some(limit) = &table.acceleration {
-        unit.expect(limit, joint.name, findings);
-    }
-    if let Some(limit) = &table.jerk {
-        unit.expect(limit, joint.name, findings);
-    }
-    AxisLimits {
-        position,
-        velocity: table.velocity.map_or(SPEED_SHARE * no_load, |velocity| velocity.value),
-        acceleration: table.acceleration.map_or(f64::INFINITY, |limit| limit.value),
-        jerk: table.jerk.map_or(f64::INFINITY, |limit| limit.value),
-        following_error: margin,
-    }
+    velocity.value
 }

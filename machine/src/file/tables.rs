@@ -1,4 +1,7 @@
-//! The tables of a machine file, with every default: the only place where defaults stand.
+//! The tables of a machine file, with every default that is a value; those of most mechanisms are in
+//! [`super::mechanism`]. A default that follows from other values is said here in words, and stands
+//! where these meet: the following error, largest speed and range of an axis in `axes`, home and the
+//! origins of programs in `validate`.
 //!
 //! Their documentation becomes the schema's, so it speaks to whoever writes a machine file.
 
@@ -75,7 +78,8 @@ table! {
         pub acceleration: Above<unit::Acceleration> = "10 m/s^2",
         /// Largest jerk.
         pub jerk: Above<unit::Jerk> = "500 m/s^3",
-        /// How far a smoothed join may lie from the drawn line.
+        /// How far a smoothed join may lie from the drawn line, and the tool from its path between two
+        /// setpoints.
         pub tolerance: Above<unit::Length> = "5 um",
     }
 }
@@ -344,9 +348,9 @@ table! {
 table! {
     /// The laser source.
     pub struct LaserTable {
-        /// From the gate's opening to light; the planner makes up for it.
+        /// From the gate's opening to light, at most 1 s; the planner makes up for it.
         pub on_delay: AtLeastZero<unit::Duration> = "0 s",
-        /// From the gate's closing to darkness; the planner makes up for it.
+        /// From the gate's closing to darkness, at most 1 s; the planner makes up for it.
         pub off_delay: AtLeastZero<unit::Duration> = "0 s",
     }
 }

@@ -6,12 +6,13 @@ use super::axes::{Joint, axis};
 use super::doubts;
 use super::mechanism::{self, Built};
 use super::motors;
-use super::tables::{AreaTable, AxisTable, MachineTable, OriginsTable};
+use super::tables::{AreaTable, AxisTable, LaserTable, MachineTable, OriginsTable, PathTable};
+use crate::actuator::Axis;
 use crate::document::{
     Document, DocumentError, Findings, Located, Named, Place, Point, ProblemKind, nearest,
 };
 use crate::limits::{PathLimits, WorkArea};
-use crate::machine::Machine;
+use crate::machine::{Machine, Warning};
 use crate::mechanisms::MechanismKind;
 use crate::process::{GcodeSettings, LaserSource, ZMeaning};
 
@@ -27,48 +28,12 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let Some(tables) = axes_in_order(&table.axis, &joints, &mut findings) else {
         return findings.fail();
     };
-    let mut axes = Vec::with_capacity(joints.len());
-    let mut warnings = Vec::new();
-    for (axis_table, joint) in tables.iter().copied().zip(&joints) {
-        let Some(axis) = axis(axis_table, joint, &mut findings) else { continue };
-        if let Some(dc) = &axis_table.motor.dc {
-            warnings.extend(doubts::of_motor(joint.name, dc, &findings));
-        }
-        let speeds = [&table.path.speed, &table.path.rapid];
-        warnings.extend(doubts::of_speeds(speeds, joint, &axis, &findings));
-        axes.push(axis);
-    }
-    if axes.len() == tables.len() {
-        motors::of_one_kind(tables.into_iter().zip(&axes), &mut findings);
-    }
-    warnings.extend(
-        mechanism::damping_ratios(&table).filter_map(|ratio| doubts::of_damping(ratio, &findings)),
-    );
+    let (axes, warnings) = axes(&table, &tables, &joints, &mut findings);
     refuse_rigid_backlash(&mechanism, &table.axis, &mut findings);
-    if table.area.z.is_none() && mechanism.moves_in_z() {
-        findings.contradict(
-            table.area.place,
-            "the machine has a z axis, but its area has no range of z".to_owned(),
-            "add `z = [from, to]`",
-        );
-    }
-    if let Some([lower, _]) = table.area.z
-        && !mechanism.moves_in_z()
-    {
-        findings.contradict(
-            lower.place,
-            "the area has a range of z, but the mechanism has no z axis".to_owned(),
-            "remove `z`",
-        );
-    }
+    check_z(&table, &mechanism, &mut findings);
+    let laser = laser(&table.laser, &mut findings);
+    let PathTable { speed, rapid, acceleration, jerk, tolerance, place: _ } = &table.path;
     let gcode = &table.gcode;
-    if gcode.z.value == ZMeaning::Focus && !mechanism.moves_in_z() {
-        findings.contradict(
-            gcode.z.place,
-            "Z cannot move the focus: the mechanism has no z axis".to_owned(),
-            "write \"ignored\", or add the z axis",
-        );
-    }
     let machine = Machine {
         name: table.name.value.clone(),
         mechanism,
@@ -77,16 +42,13 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         home,
         home_joints: joints.iter().map(|joint| joint.home).collect(),
         path: PathLimits {
-            speed: table.path.speed.value,
-            rapid: table.path.rapid.value,
-            acceleration: table.path.acceleration.value,
-            jerk: table.path.jerk.value,
-            tolerance: table.path.tolerance.value,
+            speed: speed.value,
+            rapid: rapid.value,
+            acceleration: acceleration.value,
+            jerk: jerk.value,
+            tolerance: tolerance.value,
         },
-        laser: LaserSource {
-            on_delay: table.laser.on_delay.value,
-            off_delay: table.laser.off_delay.value,
-        },
+        laser,
         gcode: GcodeSettings {
             full_scale: gcode.full_scale.value,
             z: gcode.z.value,
@@ -97,6 +59,61 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         warnings,
     };
     findings.finish(machine)
+}
+
+/// The axes that `tables` describe, in the order of `joints`, and what is doubtful about them and
+/// their transmissions. Those without a sound motor are left out, and noted.
+fn axes(
+    table: &MachineTable,
+    tables: &[&AxisTable],
+    joints: &[Joint],
+    findings: &mut Findings,
+) -> (Vec<Axis>, Vec<Warning>) {
+    let mut axes = Vec::with_capacity(joints.len());
+    let mut warnings = Vec::new();
+    for (axis_table, joint) in tables.iter().copied().zip(joints) {
+        let Some(axis) = axis(axis_table, joint, findings) else { continue };
+        if let Some(dc) = &axis_table.motor.dc {
+            warnings.extend(doubts::of_motor(joint.name, dc, findings));
+        }
+        let speeds = [&table.path.speed, &table.path.rapid];
+        warnings.extend(doubts::of_speeds(speeds, joint, &axis, findings));
+        axes.push(axis);
+    }
+    if axes.len() == tables.len() {
+        motors::of_one_kind(tables.iter().copied().zip(&axes), findings);
+    }
+    let ratios = mechanism::damping_ratios(table);
+    warnings.extend(ratios.filter_map(|ratio| doubts::of_damping(ratio, findings)));
+    (axes, warnings)
+}
+
+/// That the area has a range of z, and Z moves the focus, only where the mechanism moves in z.
+fn check_z(table: &MachineTable, mechanism: &MechanismKind, findings: &mut Findings) {
+    if mechanism.moves_in_z() {
+        if table.area.z.is_none() {
+            findings.contradict(
+                table.area.place,
+                "the machine has a z axis, but its area has no range of z".to_owned(),
+                "add `z = [from, to]`",
+            );
+        }
+        return;
+    }
+    if let Some([lower, _]) = table.area.z {
+        findings.contradict(
+            lower.place,
+            "the area has a range of z, but the mechanism has no z axis".to_owned(),
+            "remove `z`",
+        );
+    }
+    if table.gcode.z.value == ZMeaning::Focus {
+        findings.contradict(
+            table.gcode.z.place,
+            "Z cannot move the focus: the mechanism has no z axis".to_owned(),
+            "write \"ignored\", or add the z axis",
+        );
+    }
 }
 
 /// Refuses a gap with nothing elastic behind it: what meets at its end would meet in no time.
@@ -117,6 +134,21 @@ fn refuse_rigid_backlash(
             );
         }
     }
+}
+
+/// Refuses delays that no source has: the stream would wait for them.
+fn laser(table: &LaserTable, findings: &mut Findings) -> LaserSource {
+    for (key, delay) in [("on_delay", table.on_delay), ("off_delay", table.off_delay)] {
+        if delay.value > LaserSource::LONGEST_DELAY {
+            findings.refuse(
+                ProblemKind::OutOfRange,
+                delay.place,
+                format!("an `{key}` of {} s is too long", delay.value),
+                Some(format!("a laser source answers within {} s", LaserSource::LONGEST_DELAY)),
+            );
+        }
+    }
+    LaserSource { on_delay: table.on_delay.value, off_delay: table.off_delay.value }
 }
 
 /// The area as a box; z is from 0 to 0 where it has no range.

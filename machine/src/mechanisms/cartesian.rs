@@ -9,7 +9,7 @@ use crate::kinematics::{
     Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
     STANDARD_GRAVITY, ToolMotion, finite, in_plane,
 };
-use crate::transmission::Elasticity;
+use crate::transmission::{self, Elasticity};
 
 /// Carriages in x, y and, with `N` = 3, z.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,14 +113,10 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
     }
 
     fn stiffness(&self) -> Option<SMatrix<f64, N, N>> {
-        self.elasticity.map(|springs| {
-            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.stiffness)))
-        })
+        transmission::stiffness(self.elasticity)
     }
 
     fn damping(&self) -> SMatrix<f64, N, N> {
-        self.elasticity.map_or_else(SMatrix::zeros, |springs| {
-            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.damping)))
-        })
+        transmission::damping(self.elasticity)
     }
 }

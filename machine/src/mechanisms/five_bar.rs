@@ -19,7 +19,7 @@ use crate::kinematics::{
     Pose, ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
-use crate::transmission::Elasticity;
+use crate::transmission::{self, Elasticity};
 use signals::math;
 
 /// How far an angle may be from the previous one before a turn is counted [rad]. Anything from
@@ -478,10 +478,10 @@ impl Mechanism<2> for FiveBar {
     }
 
     fn stiffness(&self) -> Option<Matrix2<f64>> {
-        plane::stiffness(self.elasticity)
+        transmission::stiffness(self.elasticity)
     }
 
     fn damping(&self) -> Matrix2<f64> {
-        plane::damping(self.elasticity)
+        transmission::damping(self.elasticity)
     }
 }

@@ -14,7 +14,7 @@ mod dynamics;
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 use signals::math;
 
 use super::polar::center;
@@ -23,7 +23,7 @@ use crate::kinematics::{
     Mechanism, Pose, ToolMotion, finite,
 };
 use crate::taylor::{Scalar, Taylor};
-use crate::transmission::Elasticity;
+use crate::transmission::{self, Elasticity};
 
 pub use dynamics::McmLoad;
 
@@ -81,7 +81,8 @@ impl Branch for McmBranch {
             .collect()
     }
 
-    /// No values leave the choice to the previous joints.
+    /// No values leave the choice to the previous joints. `sign` is another name for `side`, the one
+    /// that the golden vectors of source 002 have.
     fn choose(self, name: &str, values: &[i32]) -> Option<Self> {
         match (name, values) {
             ("side" | "sign", []) => Some(Self { side: None, ..self }),
@@ -414,14 +415,10 @@ impl Mechanism<5> for Mcm {
     }
 
     fn stiffness(&self) -> Option<SMatrix<f64, 5, 5>> {
-        self.elasticity.map(|springs| {
-            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.stiffness)))
-        })
+        transmission::stiffness(self.elasticity)
     }
 
     fn damping(&self) -> SMatrix<f64, 5, 5> {
-        self.elasticity.map_or_else(SMatrix::zeros, |springs| {
-            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.damping)))
-        })
+        transmission::damping(self.elasticity)
     }
 }

@@ -143,20 +143,4 @@ impl MechanismKind {
         }
         self.visit(IsElastic)
     }
-
-    /// The number of actuated axes.
-    pub fn axes(&self) -> usize {
-        match self {
-            Self::Cartesian(_)
-            | Self::CoreXy(_)
-            | Self::FiveBar(_)
-            | Self::Prrrp(_)
-            | Self::TwinActuator(_)
-            | Self::Serial2(_) => 2,
-            Self::CartesianLift(_) | Self::Polar(_) | Self::Serial3(_) => 3,
-            Self::Serial4(_) => 4,
-            Self::Mcm(_) | Self::Serial5(_) => 5,
-            Self::TriPlanar(_) | Self::Serial6(_) => 6,
-        }
-    }
 }

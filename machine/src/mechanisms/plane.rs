@@ -3,7 +3,6 @@
 use nalgebra::{Matrix2, Vector2};
 
 use crate::kinematics::Jacobian;
-use crate::transmission::Elasticity;
 
 /// `vector` turned by a right angle, counter-clockwise.
 pub(super) fn turned(vector: Vector2<f64>) -> Vector2<f64> {
@@ -20,18 +19,6 @@ pub(super) fn jacobian(plane: &Matrix2<f64>) -> Jacobian<2> {
     let mut jacobian = Jacobian::<2>::zeros();
     jacobian.fixed_view_mut::<2, 2>(0, 0).copy_from(plane);
     jacobian
-}
-
-/// One spring to each joint.
-pub(super) fn stiffness(elasticity: Option<[Elasticity; 2]>) -> Option<Matrix2<f64>> {
-    elasticity.map(|[first, second]| Matrix2::new(first.stiffness, 0.0, 0.0, second.stiffness))
-}
-
-/// One damper to each joint; none where the joints are rigid.
-pub(super) fn damping(elasticity: Option<[Elasticity; 2]>) -> Matrix2<f64> {
-    elasticity.map_or_else(Matrix2::zeros, |[first, second]| {
-        Matrix2::new(first.damping, 0.0, 0.0, second.damping)
-    })
 }
 
 /// A rigid link: what resists its centre's motion and its turning.

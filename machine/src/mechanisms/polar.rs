@@ -21,9 +21,9 @@ use crate::kinematics::{
     Pose, ToolMotion, finite,
 };
 use crate::taylor::Scalar;
-use crate::transmission::Elasticity;
+use crate::transmission::{self, Elasticity};
 
-pub use dynamics::{PolarLoad, feed_scale};
+pub use dynamics::PolarLoad;
 
 /// How far from the centre a path may pass and still be taken as passing through it [m]: rounding
 /// of a planned line, far below any encoder's count.
@@ -71,17 +71,20 @@ impl Branch for PolarBranch {
         [of("side", self.side), of("table_turn", self.table_turn)].into_iter().flatten().collect()
     }
 
-    /// No values leave the choice to the previous joints.
+    /// No values leave the choice to the previous joints. `branch` is another name for `side`, the
+    /// one that the golden vectors of source 000 have.
     fn choose(self, name: &str, values: &[i32]) -> Option<Self> {
         match (name, values) {
-            ("side" | "elbow" | "branch", []) => Some(Self { side: None, ..self }),
-            ("side" | "elbow" | "branch", &[side @ (1 | -1)]) => {
-                Some(Self { side: Some(side), ..self })
-            }
+            ("side" | "branch", []) => Some(Self { side: None, ..self }),
+            ("side" | "branch", &[side @ (1 | -1)]) => Some(Self { side: Some(side), ..self }),
             ("table_turn", []) => Some(Self { table_turn: None, ..self }),
             ("table_turn", &[turn]) => Some(Self { table_turn: Some(turn), ..self }),
             _ => None,
         }
+    }
+
+    fn in_any_turn(self) -> Self {
+        Self { table_turn: None, ..self }
     }
 }
 
@@ -349,14 +352,10 @@ impl Mechanism<3> for Polar {
     }
 
     fn stiffness(&self) -> Option<Matrix3<f64>> {
-        self.elasticity.map(|springs| {
-            Matrix3::from_diagonal(&Vector3::from(springs.map(|spring| spring.stiffness)))
-        })
+        transmission::stiffness(self.elasticity)
     }
 
     fn damping(&self) -> Matrix3<f64> {
-        self.elasticity.map_or_else(Matrix3::zeros, |springs| {
-            Matrix3::from_diagonal(&Vector3::from(springs.map(|spring| spring.damping)))
-        })
+        transmission::damping(self.elasticity)
     }
 }

@@ -19,7 +19,7 @@ use crate::kinematics::{
     Pose, ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
-use crate::transmission::Elasticity;
+use crate::transmission::{self, Elasticity};
 
 /// The dimensions and masses. Centres of mass are at mid-link.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -300,10 +300,10 @@ impl Mechanism<2> for Prrrp {
     }
 
     fn stiffness(&self) -> Option<Matrix2<f64>> {
-        plane::stiffness(self.elasticity)
+        transmission::stiffness(self.elasticity)
     }
 
     fn damping(&self) -> Matrix2<f64> {
-        plane::damping(self.elasticity)
+        transmission::damping(self.elasticity)
     }
 }

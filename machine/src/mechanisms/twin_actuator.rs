@@ -21,7 +21,7 @@ use crate::kinematics::{
     Pose, ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
-use crate::transmission::Elasticity;
+use crate::transmission::{self, Elasticity};
 use signals::math;
 
 /// The dimensions and masses.
@@ -59,7 +59,7 @@ pub struct ActuatorBodies {
     /// Inertia of the rod about its centre of mass [kg·m²].
     pub rod_inertia: f64,
     /// Distance of the rod's centre of mass from J, towards the base [m].
-    pub rod_centre: f64,
+    pub rod_center: f64,
 }
 
 /// On which side of the base line the actuators meet.
@@ -344,7 +344,7 @@ impl Mechanism<2> for TwinActuator {
         for (actuator, bodies) in self.bodies.iter().enumerate() {
             let rate = assembly.turning[actuator].dot(velocity);
             let length = assembly.lengths[actuator];
-            let moment = bodies.rod_mass * (length - bodies.rod_centre);
+            let moment = bodies.rod_mass * (length - bodies.rod_center);
             // Centrifugal along the rod; Coriolis and the actuator's own turning about the pivot.
             effort[actuator] -= moment * rate * rate;
             let torque = bodies.inertia(length) * turning[actuator]
@@ -359,18 +359,18 @@ impl Mechanism<2> for TwinActuator {
     }
 
     fn stiffness(&self) -> Option<Matrix2<f64>> {
-        plane::stiffness(self.elasticity)
+        transmission::stiffness(self.elasticity)
     }
 
     fn damping(&self) -> Matrix2<f64> {
-        plane::damping(self.elasticity)
+        transmission::damping(self.elasticity)
     }
 }
 
 impl ActuatorBodies {
     /// Inertia about the pivot with the actuator `length` long [kg·m²].
     fn inertia(&self, length: f64) -> f64 {
-        let centre = length - self.rod_centre;
+        let centre = length - self.rod_center;
         self.housing_inertia + self.rod_inertia + self.rod_mass * centre * centre
     }
 }

@@ -21,16 +21,6 @@ pub struct DcMotor {
 }
 
 impl DcMotor {
-    /// Current for a steady `torque` [N·m], in A.
-    pub fn current_for(&self, torque: f64) -> f64 {
-        torque / self.torque_constant
-    }
-
-    /// Voltage for a steady `torque` [N·m] at `speed` [rad/s], in V.
-    pub fn voltage_for(&self, torque: f64, speed: f64) -> f64 {
-        self.resistance * self.current_for(torque) + self.torque_constant * speed
-    }
-
     /// Speed at which the back-EMF takes the whole supply [rad/s].
     pub fn no_load_speed(&self) -> f64 {
         self.voltage / self.torque_constant
@@ -40,13 +30,6 @@ impl DcMotor {
     /// through the winding, whichever is less [N·m].
     pub fn stall_torque(&self) -> f64 {
         self.torque_constant * self.current.min(self.voltage / self.resistance)
-    }
-
-    /// Largest steady torque in the direction of motion at `speed` [rad/s], in N·m; below 0 where
-    /// the back-EMF exceeds the supply.
-    pub fn torque_at(&self, speed: f64) -> f64 {
-        let left = self.voltage - self.torque_constant * speed.abs();
-        self.torque_constant * self.current.min(left / self.resistance)
     }
 
     /// Time over which the heating of a winding is averaged [s]; short against a real winding's.
@@ -75,14 +58,10 @@ mod tests {
     };
 
     #[test]
-    fn the_voltage_line_bounds_torque_and_speed() {
+    fn supply_and_power_stage_bound_torque_and_speed() {
         assert!((MOTOR.no_load_speed() - 571.428_571).abs() < 1e-6);
         // 12 V across 2.3 Ω drive 5.217 A, above the 5.2 A of the power stage.
         assert!((MOTOR.stall_torque() - 0.1092).abs() < 1e-12);
-        let torque = MOTOR.torque_at(300.0);
-        assert!((torque - 0.021 * (12.0 - 6.3) / 2.3).abs() < 1e-15, "{torque}");
-        assert!((MOTOR.voltage_for(torque, 300.0) - 12.0).abs() < 1e-12);
-        assert!(MOTOR.torque_at(600.0) < 0.0);
     }
 
     #[test]

@@ -13,6 +13,8 @@ pub mod link;
 pub mod rest;
 pub mod screw;
 
+use nalgebra::{SMatrix, SVector};
+
 /// A linear spring and damper, both in translation, or both in torsion where the joint turns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Elasticity {
@@ -31,6 +33,22 @@ impl Elasticity {
     pub fn damped(stiffness: f64, mass: f64, damping_ratio: f64) -> Self {
         Self { stiffness, damping: 2.0 * damping_ratio * (stiffness * mass).sqrt() }
     }
+}
+
+/// The stiffness of joints with a spring each, in joint coordinates [N/m or N·m/rad]: diagonal, `N`
+/// by `N`; `None` where they are rigid.
+pub fn stiffness<const N: usize>(springs: Option<[Elasticity; N]>) -> Option<SMatrix<f64, N, N>> {
+    springs.map(|springs| diagonal(springs.map(|spring| spring.stiffness)))
+}
+
+/// The damping of joints with a damper each, in joint coordinates [N·s/m or N·m·s/rad]: diagonal, `N`
+/// by `N`; zero where they are rigid.
+pub fn damping<const N: usize>(springs: Option<[Elasticity; N]>) -> SMatrix<f64, N, N> {
+    springs.map_or_else(SMatrix::zeros, |springs| diagonal(springs.map(|spring| spring.damping)))
+}
+
+fn diagonal<const N: usize>(values: [f64; N]) -> SMatrix<f64, N, N> {
+    SMatrix::from_diagonal(&SVector::from(values))
 }
 
 /// The stiffness of springs in a row, all seen at the same place and in the same unit.

@@ -84,7 +84,7 @@ fn the_twin_actuator_conforms_on_a_base_line_that_lies_askew() {
         housing_inertia: 0.01 * mass,
         rod_mass: mass,
         rod_inertia: 0.002,
-        rod_centre: 0.15,
+        rod_center: 0.15,
     };
     for elbow in [1, -1] {
         let mechanism = TwinActuator {

@@ -3,17 +3,18 @@
 use machine::kinematics::{Attitude, Freedom, Joints, ToolMotion};
 use machine::{Mechanism, Pose};
 use nalgebra::{SVector, Vector3};
+use signals::random::SplitMix64;
 
-/// Repeatable numbers from -1 to 1 (xorshift64*).
-pub(crate) struct Random(pub(crate) u64);
+/// Repeatable numbers from -1 to 1.
+pub(crate) struct Random(SplitMix64);
 
 impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(SplitMix64::new(seed))
+    }
+
     pub(crate) fn next(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        let bits = self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11;
-        bits as f64 / (1_u64 << 52) as f64 - 1.0
+        self.0.between(-1.0, 1.0)
     }
 
     pub(crate) fn vector(&mut self, scale: f64) -> Vector3<f64> {

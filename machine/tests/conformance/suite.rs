@@ -26,7 +26,7 @@ pub(crate) fn conforms<const N: usize, M: Mechanism<N>>(
     branches: &[M::Branch],
     mut joints: impl FnMut(&mut Random) -> Joints<N>,
 ) {
-    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut random = Random::new(0x9e37_79b9_7f4a_7c15);
     let mut taken = vec![0; branches.len()];
     let (mut cases, mut tries) = (0, 0);
     while cases < CASES {

@@ -9,6 +9,7 @@ use machine::kinematics::{Attitude, Joints, KinematicsError, ToolMotion};
 use machine::{Mechanism, Pose};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
+use signals::random::SplitMix64;
 
 pub fn golden(name: &str) -> Value {
     let path = format!("{}/../tests/golden/{name}.json", env!("CARGO_MANIFEST_DIR"));
@@ -42,16 +43,16 @@ pub fn code_of<T: core::fmt::Debug>(result: Result<T, KinematicsError>) -> &'sta
     result.unwrap_err().code
 }
 
-/// Repeatable numbers from -1 to 1 (xorshift64*).
-pub struct Random(pub u64);
+/// Repeatable numbers from -1 to 1.
+pub struct Random(SplitMix64);
 
 impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self(SplitMix64::new(seed))
+    }
+
     pub fn next(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        let bits = self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11;
-        bits as f64 / (1_u64 << 52) as f64 - 1.0
+        self.0.between(-1.0, 1.0)
     }
 
     pub fn vector(&mut self, scale: f64) -> Vector3<f64> {
@@ -92,7 +93,7 @@ pub fn conforms<const N: usize, M: Mechanism<N>>(
     branch: M::Branch,
     mut draw: impl FnMut(&mut Random) -> ToolMotion,
 ) {
-    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut random = Random::new(0x9e37_79b9_7f4a_7c15);
     for case in 0..300 {
         let tool = draw(&mut random);
         let context = format!("{} case {case}: {tool:?}", M::NAME);

@@ -10,6 +10,8 @@ use machine::focus::{marginal_travel, paraxial_travel};
 use nalgebra::Vector3;
 use signals::math;
 
+use signals::random::SplitMix64;
+
 use crate::drawing::{Action, Drawing, Note, Step};
 
 /// How a cloud is marked.
@@ -48,18 +50,11 @@ pub struct Ordered {
 
 /// `count` points evenly at random inside a sphere of `radius` [m] about `center` [m].
 pub fn sphere(center: Vector3<f64>, radius: f64, count: usize, seed: u64) -> Vec<Vector3<f64>> {
-    let mut state = seed;
-    let mut random = move || {
-        // splitmix64.
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut value = state;
-        value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((value ^ (value >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0
-    };
+    let mut random = SplitMix64::new(seed);
+    let mut share = || random.between(-1.0, 1.0);
     let mut points = Vec::with_capacity(count);
     while points.len() < count {
-        let point = Vector3::new(random(), random(), random());
+        let point = Vector3::new(share(), share(), share());
         if point.norm_squared() <= 1.0 {
             points.push(center + point * radius);
         }

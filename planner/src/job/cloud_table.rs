@@ -1,8 +1,11 @@
 //! The job file's table of a cloud of points.
 
+use core::ops::RangeInclusive;
 use std::path::Path;
 
-use machine::document::{Findings, Located, NonNegative, Number, Point, Positive, Quantity};
+use machine::document::{
+    Findings, Located, NonNegative, Number, Point, Positive, ProblemKind, Quantity, Range,
+};
 use machine::quantity::{Angle, AngularSpeed, Duration, Length};
 use machine::{DocumentError, Machine, table};
 use nalgebra::Vector3;
@@ -59,7 +62,7 @@ table! {
         pub radius: Quantity<Length, Positive>,
         /// How many points.
         pub count: Number<Positive> = 1000.0,
-        /// Which of all such clouds.
+        /// Which of all such clouds, a whole number.
         pub seed: Number<NonNegative> = 1.0,
     }
 }
@@ -75,6 +78,8 @@ pub(super) fn draw(
     let line = findings.position(table.place).map_or(0, |(line, _)| line as u64);
     let points = points(table, folder, findings);
     let dwell = dwell(table, findings);
+    let from = whole(&table.from, 0..=MOST_POINTS, "from", findings);
+    let from = from.unwrap_or(0) as usize;
     let cloud = Cloud {
         layer: table.layer.value,
         ring: table.ring.value,
@@ -87,18 +92,37 @@ pub(super) fn draw(
         glass: table.face.as_ref().map(|face| (face.value, table.index.value)),
         half_angle: table.half_angle.as_ref().map_or(0.0, |angle| angle.value),
         dwell,
-        from: table.from.value as usize,
+        from,
     };
     let stem = Path::new(findings.file()).file_stem().and_then(|stem| stem.to_str());
     let name = stem.unwrap_or("cloud").to_owned();
     Ok(cloud.draw(&name, &points, power, Vector3::from(machine.home), line))
 }
 
-/// Whether so many points can be made.
-fn is_count(number: f64) -> bool {
-    /// More would not fit into the week that a job may last.
-    const MOST: f64 = 1e7;
-    (1.0..=MOST).contains(&number) && number.fract() == 0.0
+/// The most points: more would not fit into the week that a job may last.
+const MOST_POINTS: u64 = 10_000_000;
+
+/// The largest seed: what a number in TOML holds without rounding, 2⁵³.
+const LARGEST_SEED: u64 = 1 << 53;
+
+/// The whole number in `range` that the `number` of `key` is; else notes what would be right.
+fn whole<R: Range>(
+    number: &Number<R>,
+    range: RangeInclusive<u64>,
+    key: &str,
+    findings: &mut Findings,
+) -> Option<u64> {
+    let value = number.value;
+    if value.fract() == 0.0 && (*range.start() as f64..=*range.end() as f64).contains(&value) {
+        return Some(value as u64);
+    }
+    findings.refuse(
+        ProblemKind::OutOfRange,
+        number.place,
+        format!("`{key}` cannot be {value}"),
+        Some(format!("write a whole number from {} to {}", range.start(), range.end())),
+    );
+    None
 }
 
 fn points(table: &CloudTable, folder: &Path, findings: &mut Findings) -> Vec<Vector3<f64>> {
@@ -120,18 +144,13 @@ fn points(table: &CloudTable, folder: &Path, findings: &mut Findings) -> Vec<Vec
                 }
             }
         }
-        (None, Some(sphere)) if !is_count(sphere.count.value) => {
-            let text = format!("a cloud of {} points cannot be made", sphere.count.value);
-            let help = "write a whole number from 1 to 10,000,000";
-            findings.contradict(sphere.count.place, text, help);
-            Vec::new()
+        (None, Some(sphere)) => {
+            let count = whole(&sphere.count, 1..=MOST_POINTS, "count", findings);
+            let seed = whole(&sphere.seed, 0..=LARGEST_SEED, "seed", findings);
+            let (Some(count), Some(seed)) = (count, seed) else { return Vec::new() };
+            let center = Vector3::from(sphere.center.value) + at;
+            cloud::sphere(center, sphere.radius.value, count as usize, seed)
         }
-        (None, Some(sphere)) => cloud::sphere(
-            Vector3::from(sphere.center.value) + at,
-            sphere.radius.value,
-            sphere.count.value as usize,
-            sphere.seed.value as u64,
-        ),
         (Some(file), Some(_)) => {
             let help = "keep one of `file` and `sphere`";
             findings.contradict(file.place, "a cloud has one source".to_owned(), help);

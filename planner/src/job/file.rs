@@ -87,7 +87,8 @@ table! {
         pub speed: Option<Either<Optimum, Quantity<Speed, Positive>>>,
         /// Largest speed while the laser is on.
         pub max_speed: Option<Quantity<Speed, Positive>>,
-        /// How far a smoothed join may lie from the drawn line.
+        /// How far a smoothed join may lie from the drawn line, and the tool from its path between two
+        /// setpoints.
         pub tolerance: Option<Quantity<Length, Positive>>,
         /// Power of the laser, full power when left out.
         pub power: Option<Fraction<Positive>>,

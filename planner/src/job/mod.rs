@@ -65,7 +65,8 @@ pub struct Marking {
     pub speed: Option<MarkingSpeed>,
     /// Largest speed while the laser is on [m/s].
     pub max_speed: Option<f64>,
-    /// How far a smoothed join may lie from the drawn line [m].
+    /// How far a smoothed join may lie from the drawn line, and the tool from its path between two
+    /// setpoints [m].
     pub tolerance: Option<f64>,
 }
 

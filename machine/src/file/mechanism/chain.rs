@@ -114,8 +114,7 @@ pub(super) fn joints<const N: usize, M: Mechanism<N>>(
     let mut joints = Vec::with_capacity(N);
     let mut springs = Vec::with_capacity(N);
     for (index, (name, unit)) in names.into_iter().enumerate() {
-        let axis = table.axis.entries.iter().find(|(found, _)| found.value == name);
-        let output = axis.and_then(|(_, axis)| transmission(name, unit, axis, findings));
+        let output = axis(site, name).and_then(|axis| transmission(name, unit, axis, findings));
         let load = mass[(index, index)];
         let spring = output.as_ref().and_then(|output| output.spring.as_ref());
         springs.extend(
@@ -241,17 +240,17 @@ fn transmission<'a>(
     axis: &'a AxisTable,
     findings: &mut Findings,
 ) -> Option<Output<'a>> {
-    let mut found = output(axis);
-    if found.len() > 1 {
+    let found = output(axis);
+    if let [_, second, ..] = found.as_slice() {
         findings.contradict(
-            found[1].place,
+            second.place,
             format!("axis `{name}` has two transmissions"),
             "keep one",
         );
     }
-    let only = found.drain(..).next();
+    let only = found.into_iter().next();
     match (&only, unit) {
-        (Some(output), unit) if output.unit != unit => findings.contradict(
+        (Some(output), _) if output.unit != unit => findings.contradict(
             output.place,
             format!(
                 "axis `{name}` cannot have this transmission: it is measured in {}",

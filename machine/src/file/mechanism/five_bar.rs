@@ -2,7 +2,7 @@
 
 use super::chain::{self, sign};
 use super::{Built, Site};
-use crate::document::{Findings, Number, Positive, Quantity};
+use crate::document::{Findings, NonNegative, Number, Positive, Quantity};
 use crate::file::axes::JointUnit;
 use crate::mechanisms::MechanismKind;
 use crate::mechanisms::five_bar::{FiveBar, FiveBarBranch};
@@ -32,7 +32,7 @@ table! {
         /// Mass of the tool.
         pub tool_mass: Above<unit::Mass>,
         /// Mass of a bar that guides the tool and moves in y only.
-        pub bar_mass: Quantity<unit::Mass, crate::document::NonNegative> = "0 kg",
+        pub bar_mass: Quantity<unit::Mass, NonNegative> = "0 kg",
         /// For each arm, 1 with its elbow to the left of the way from motor to tool, −1 to the right.
         pub working_mode: [Number; 2],
         /// 1 with the tool to the left of the way from the first elbow to the second, −1 to the right.

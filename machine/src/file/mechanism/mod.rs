@@ -131,7 +131,7 @@ pub(super) fn damping_ratios(table: &MachineTable) -> impl Iterator<Item = &Numb
         .cartesian
         .iter()
         .flat_map(|cartesian| [&cartesian.x, &cartesian.y].into_iter().chain(&cartesian.z));
-    let sprung = screws.filter(|screw| screw.stiffness.is_some());
+    let sprung = screws.filter(|screw| screw.stiffness.is_some() || screw.shaft.is_some());
     let belt = kinds.corexy.iter().flat_map(|corexy| &corexy.belt);
     let axes = table.axis.entries.iter().filter_map(|(_, axis)| chain::damping_ratio(axis));
     sprung.map(|screw| &screw.damping_ratio).chain(belt.map(|belt| &belt.damping_ratio)).chain(axes)

@@ -50,7 +50,7 @@ table! {
         /// Inertia of the rod about its centre of mass.
         pub rod_inertia: Above<unit::Inertia>,
         /// Distance of the rod's centre of mass from the joint, towards the base.
-        pub rod_centre: Quantity<unit::Length, NonNegative>,
+        pub rod_center: Quantity<unit::Length, NonNegative>,
     }
 }
 
@@ -59,7 +59,7 @@ fn bodies(table: &ActuatorTable) -> ActuatorBodies {
         housing_inertia: table.housing_inertia.value,
         rod_mass: table.rod_mass.value,
         rod_inertia: table.rod_inertia.value,
-        rod_centre: table.rod_centre.value,
+        rod_center: table.rod_center.value,
     }
 }
 

@@ -77,11 +77,3 @@ impl Polar {
         [self.arm * force.y + moment.z, force.z]
     }
 }
-
-/// The share of its speed, at most 1, at which a motion keeps every joint's `velocity` within its
-/// `limit` [both m/s or rad/s].
-pub fn feed_scale<const N: usize>(velocity: &Joints<N>, limit: &Joints<N>) -> f64 {
-    velocity.iter().zip(limit.iter()).fold(1.0, |share, (speed, most)| {
-        if speed.abs() * share > *most { most / speed.abs() } else { share }
-    })
-}

@@ -7,7 +7,7 @@ use signals::math;
 
 use super::task::ROWS;
 use super::{JointKind, Serial};
-use crate::kinematics::{Freedom, JointMotion, Joints, KinematicsError, Pose, ToolMotion};
+use crate::kinematics::{Freedom, JointMotion, Joints, KinematicsError, Pose, ToolMotion, finite};
 use crate::taylor::Taylor;
 
 /// How near the tool must come to its target, position [m] and direction [rad].
@@ -32,6 +32,15 @@ const LONGEST_STEP: f64 = 1.0;
 /// A tool velocity that a chain with fewer joints than rows may miss, as a share.
 const MISSED: f64 = 1e-9;
 
+/// Why a start does not lead to the target.
+#[derive(Debug, Clone, Copy)]
+enum Miss {
+    /// The chain comes no nearer than `distance` [m]; `limit` would do.
+    Far { distance: f64, limit: f64 },
+    /// It comes there, but may not.
+    Refused(KinematicsError),
+}
+
 /// Where a start ended.
 struct Descent<const N: usize> {
     q: Joints<N>,
@@ -50,16 +59,16 @@ impl<const N: usize> Serial<N> {
         let reach = self.reach();
         let first = match self.settle(pose, previous, previous, reach) {
             Ok(q) => return Ok(q),
-            Err(error) => error,
+            Err(miss) => miss,
         };
         let mut nearest = first;
         for start in 0..STARTS {
             match self.settle(pose, &self.start(start), previous, reach) {
                 Ok(q) => return Ok(q),
-                Err(error) => nearest = clearer(nearest, error),
+                Err(miss) => nearest = nearest.clearer(miss),
             }
         }
-        Err(nearest)
+        Err(nearest.error())
     }
 
     /// The joints' motion for a motion of the tool, next to `previous`.
@@ -71,7 +80,7 @@ impl<const N: usize> Serial<N> {
         let pose = tool.pose();
         check_numbers(&pose, previous)?;
         let reach = self.reach();
-        let position = self.settle(&pose, previous, previous, reach)?;
+        let position = self.settle(&pose, previous, previous, reach).map_err(Miss::error)?;
         let turn = &tool.attitude;
         let linear: [Taylor; 3] = tool.series().map(Taylor::derivative);
         let angular: [Taylor; 3] = core::array::from_fn(|row| {
@@ -119,29 +128,23 @@ impl<const N: usize> Serial<N> {
         start: &Joints<N>,
         previous: &Joints<N>,
         reach: f64,
-    ) -> Result<Joints<N>, KinematicsError> {
+    ) -> Result<Joints<N>, Miss> {
         let Descent { mut q, distance } = self.descend(pose, start, reach);
         let limit = dimensionless_tolerance(reach);
         if distance > limit || distance.is_nan() {
-            return Err(KinematicsError {
-                code: "unreachable",
-                axis: None,
-                value: distance * reach,
-                limit: limit * reach,
-                detail: "the nearest that the chain comes to the target",
-            });
+            return Err(Miss::Far { distance: distance * reach, limit: limit * reach });
         }
         if self.freedom == Freedom::Plane {
             let joints: [f64; N] = q.into();
             let off = pose.position.z - self.chain(&joints).tool.origin[2];
             if off.abs() > PLANE_TOLERANCE {
-                return Err(KinematicsError {
+                return Err(Miss::Refused(KinematicsError {
                     code: "out_of_plane",
                     axis: None,
                     value: off,
                     limit: PLANE_TOLERANCE,
                     detail: "the mechanism moves in x and y only",
-                });
+                }));
             }
         }
         for (joint, link) in self.links.iter().enumerate() {
@@ -160,7 +163,7 @@ impl<const N: usize> Serial<N> {
                 q[joint] = if inside { within } else { near };
             }
         }
-        self.check_limits(&q)?;
+        self.check_limits(&q).map_err(Miss::Refused)?;
         Ok(q)
     }
 
@@ -255,28 +258,40 @@ fn norm(parts: &[f64]) -> f64 {
     parts.iter().map(|part| part * part).sum::<f64>().sqrt()
 }
 
-/// The failure that says more: a joint's limit before a distance, and the shorter distance.
-fn clearer(one: KinematicsError, other: KinematicsError) -> KinematicsError {
-    let far = |error: &KinematicsError| error.code == "unreachable";
-    match (far(&one), far(&other)) {
-        (true, false) => other,
-        (true, true) if other.value < one.value => other,
-        _ => one,
+impl Miss {
+    /// The one that says more: a joint's limit before a distance, and the shorter distance.
+    fn clearer(self, other: Self) -> Self {
+        match (&self, &other) {
+            (Self::Far { .. }, Self::Refused(_)) => other,
+            (Self::Far { distance: one, .. }, Self::Far { distance, .. }) if distance < one => {
+                other
+            }
+            _ => self,
+        }
+    }
+
+    /// What is told of it.
+    fn error(self) -> KinematicsError {
+        match self {
+            Self::Far { distance, limit } => KinematicsError {
+                code: "unreachable",
+                axis: None,
+                value: distance,
+                limit,
+                detail: "the nearest that the chain comes to the target",
+            },
+            Self::Refused(cause) => cause,
+        }
     }
 }
 
+/// Refuses what is not a number: its descent would end nowhere.
 fn check_numbers<const N: usize>(pose: &Pose, previous: &Joints<N>) -> Result<(), KinematicsError> {
-    let mut numbers = pose.position.iter().chain(pose.rotation.iter()).chain(previous.iter());
-    match numbers.find(|number| !number.is_finite()) {
-        None => Ok(()),
-        Some(number) => Err(KinematicsError {
-            code: "unreachable",
-            axis: None,
-            value: *number,
-            limit: TOLERANCE,
-            detail: "the pose is not a finite number",
-        }),
+    finite(&pose.position)?;
+    for column in pose.rotation.column_iter() {
+        finite(&column.into_owned())?;
     }
+    finite(previous)
 }
 
 /// Refuses a motion that a chain with too few joints cannot make.

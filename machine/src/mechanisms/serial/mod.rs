@@ -9,7 +9,7 @@ mod frame;
 mod inverse;
 mod task;
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 pub use dynamics::SerialAssembly;
 
@@ -17,7 +17,7 @@ use crate::kinematics::{
     Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
     ToolMotion,
 };
-use crate::transmission::Elasticity;
+use crate::transmission::{self, Elasticity};
 
 /// How a joint moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -152,14 +152,10 @@ impl<const N: usize> Mechanism<N> for Serial<N> {
     }
 
     fn stiffness(&self) -> Option<SMatrix<f64, N, N>> {
-        self.elasticity.map(|springs| {
-            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.stiffness)))
-        })
+        transmission::stiffness(self.elasticity)
     }
 
     fn damping(&self) -> SMatrix<f64, N, N> {
-        self.elasticity.map_or_else(SMatrix::zeros, |springs| {
-            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.damping)))
-        })
+        transmission::damping(self.elasticity)
     }
 }

@@ -147,12 +147,13 @@ impl<const N: usize> Rows<f64, N> {
     /// there are fewer joints than rows, the least that a unit of joint motion moves the tool.
     pub(super) fn smallest_singular_value(&self) -> f64 {
         let (size, matrix) = self.normal(0.0);
-        // Beyond the task the matrix is that of unit rows, larger than any smallest one.
+        // Beyond the task its diagonal is what no smallest eigenvalue exceeds: the square of a row of
+        // six entries of at most 1.
         let padded = Matrix6::from_fn(|row, column| {
             if row < size && column < size {
                 matrix[row][column]
             } else if row == column {
-                f64::from(6_u8)
+                ROWS as f64
             } else {
                 0.0
             }

@@ -22,7 +22,7 @@ use crate::kinematics::{
     Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
     ToolMotion,
 };
-use crate::transmission::Elasticity;
+use crate::transmission::{self, Elasticity};
 
 /// Which way a leg leans from its hinge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -216,14 +216,10 @@ impl Mechanism<6> for TriPlanar {
     }
 
     fn stiffness(&self) -> Option<SMatrix<f64, 6, 6>> {
-        self.elasticity.map(|springs| {
-            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.stiffness)))
-        })
+        transmission::stiffness(self.elasticity)
     }
 
     fn damping(&self) -> SMatrix<f64, 6, 6> {
-        self.elasticity.map_or_else(SMatrix::zeros, |springs| {
-            SMatrix::from_diagonal(&SVector::from(springs.map(|spring| spring.damping)))
-        })
+        transmission::damping(self.elasticity)
     }
 }

@@ -3,22 +3,23 @@
 use core::f64::consts::{PI, TAU};
 
 use signals::math;
+use signals::random::SplitMix64;
 
 use super::super::arc::{Arc, Form, axes, rounding};
 use super::super::codes::{MILLIMETRE, Plane};
 use super::*;
-use crate::random::Random;
+use crate::random::logarithmic;
 
 const PLANES: [Plane; 3] = [Plane::Xy, Plane::Zx, Plane::Yz];
 
 #[test]
 fn random_arcs_keep_their_ends_and_radius() {
-    let mut random = Random::new(2);
+    let mut random = SplitMix64::new(2);
     for case in 0..20_000 {
-        let plane = PLANES[(random.next() % 3) as usize];
+        let plane = PLANES[(random.bits() % 3) as usize];
         let [u, v, w] = axes(plane);
-        let radius = random.logarithmic(1e-5, 1.0);
-        let counterclockwise = random.next().is_multiple_of(2);
+        let radius = logarithmic(&mut random, 1e-5, 1.0);
+        let counterclockwise = random.bits().is_multiple_of(2);
         let first = random.between(-PI, PI);
         let sweep = random.between(1e-3, TAU - 1e-3);
         let last = if counterclockwise { first + sweep } else { first - sweep };
@@ -32,14 +33,14 @@ fn random_arcs_keep_their_ends_and_radius() {
         };
         let start = on(first, random.between(-0.1, 0.1));
         let end = on(last, random.between(-0.1, 0.1));
-        let by_radius = random.next().is_multiple_of(2);
+        let by_radius = random.bits().is_multiple_of(2);
         let form = if by_radius {
             Form::Radius(if sweep < PI { radius } else { -radius })
         } else {
             Form::Centre(centre)
         };
         let input = format!("case {case}: {plane:?} {start:?} {end:?} {form:?}");
-        let turns = if by_radius { 1.0 } else { 1.0 + (random.next() % 3) as f64 };
+        let turns = if by_radius { 1.0 } else { 1.0 + (random.bits() % 3) as f64 };
         let arc = Arc::new(plane, counterclockwise, start, end, form, turns, rounding(MILLIMETRE))
             .unwrap();
         // Coordinates are rounded at 5e-17 m; a centre from R amplifies that near a half turn by
@@ -56,10 +57,10 @@ fn random_arcs_keep_their_ends_and_radius() {
 
 #[test]
 fn rounded_arcs_meet_their_ends_and_stay_near_their_circle() {
-    let mut random = Random::new(3);
+    let mut random = SplitMix64::new(3);
     let rounded = |value: f64| (value / 1e-5).round() * 1e-5;
     for case in 0..20_000 {
-        let radius = random.logarithmic(2e-4, 0.1);
+        let radius = logarithmic(&mut random, 2e-4, 0.1);
         let centre = Vector3::zeros();
         let first = random.between(-PI, PI);
         let sweep = random.between(2e-3, TAU);

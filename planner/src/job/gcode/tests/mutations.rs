@@ -2,7 +2,7 @@
 
 use super::samples::ALL;
 use super::*;
-use crate::random::Random;
+use signals::random::SplitMix64;
 
 /// Reads `text` on both kinds of machine; gives back the refusal's line.
 fn try_read(text: &str) -> Option<u64> {
@@ -113,25 +113,25 @@ fn random_text_never_panics() {
         "G20", "G28", "G92", "G53", "G54", "G59.3", "G64", "G4", "\n", "\n", "\n", " ", "(c)", ";",
         "/", "%", "e", "1", ".", "-", "\u{e9}", "\0", "\u{feff}", "N1", "T1", "M0", "M8", "1e400",
     ];
-    let mut random = Random::new(1);
+    let mut random = SplitMix64::new(1);
     for _ in 0..20_000 {
-        let count = 1 + random.next() % 24;
+        let count = 1 + random.bits() % 24;
         let mut text =
-            String::from(if random.next().is_multiple_of(2) { "F60 M3 S9\n" } else { "" });
+            String::from(if random.bits().is_multiple_of(2) { "F60 M3 S9\n" } else { "" });
         for _ in 0..count {
-            text.push_str(PIECES[(random.next() % PIECES.len() as u64) as usize]);
+            text.push_str(PIECES[(random.bits() % PIECES.len() as u64) as usize]);
         }
         try_read(&text);
     }
     for _ in 0..5_000 {
-        let bytes: Vec<u8> = (0..random.next() % 64).map(|_| random.next() as u8).collect();
+        let bytes: Vec<u8> = (0..random.bits() % 64).map(|_| random.bits() as u8).collect();
         try_read(&String::from_utf8_lossy(&bytes));
     }
     for _ in 0..5_000 {
-        let mut bytes = ALL[(random.next() % 3) as usize].as_bytes().to_vec();
-        for _ in 0..1 + random.next() % 4 {
-            let at = (random.next() % bytes.len() as u64) as usize;
-            bytes[at] = random.next() as u8;
+        let mut bytes = ALL[(random.bits() % 3) as usize].as_bytes().to_vec();
+        for _ in 0..1 + random.bits() % 4 {
+            let at = (random.bits() % bytes.len() as u64) as usize;
+            bytes[at] = random.bits() as u8;
         }
         try_read(&String::from_utf8_lossy(&bytes));
     }

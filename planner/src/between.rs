@@ -1,0 +1,122 @@
+//! How far the tool strays from the drawn path between two setpoints, where its joints do not go
+//! straight with it.
+//!
+//! Setpoints are exact, a millisecond apart; between them the controller joins their positions and
+//! velocities by a cubic for each joint. The tool then leaves the path by what the fourth derivative of
+//! the joints makes in that time: nanometres, except where the joints turn fast, as beside the centre
+//! of a rotary table.
+
+use machine::Mechanism;
+use machine::kinematics::{Joints, KinematicsError};
+use signals::Setpoint;
+use signals::time::CYCLE_TIME;
+
+use crate::check::{Breach, Quantity};
+use crate::sampler::Sampler;
+use crate::trajectory::{Reference, Trajectory};
+
+/// Looks at the middle between two setpoints that follow each other, where a cubic that fits both
+/// ends strays most.
+#[derive(Debug)]
+pub(crate) struct Between {
+    /// How far the tool may stray [m].
+    tolerance: f64,
+    before: Option<Setpoint>,
+    cursor: usize,
+}
+
+impl Between {
+    /// Allows the tool to stray by `tolerance` [m].
+    pub(crate) fn new(tolerance: f64) -> Self {
+        Self { tolerance, before: None, cursor: 0 }
+    }
+
+    /// Looks between the setpoint before and this one of `trajectory`, the last that `sampler` has
+    /// made, if the laser is on there. Gives the breach where the tool strays too far.
+    ///
+    /// # Errors
+    /// Where a chain does not close.
+    pub(crate) fn look<const N: usize, M: Mechanism<N>>(
+        &mut self,
+        setpoint: &Setpoint,
+        sampler: &Sampler<N, M>,
+        trajectory: &Trajectory,
+    ) -> Result<Option<Breach>, KinematicsError> {
+        let Some(before) = self.before.replace(*setpoint) else { return Ok(None) };
+        if !before.laser.is_lit() {
+            return Ok(None);
+        }
+        let time = (before.sequence as f64 + 0.5) * CYCLE_TIME;
+        let Reference::Tool(tool) = trajectory.at(time, &mut self.cursor) else {
+            return Ok(None);
+        };
+        let there = sampler.locate(&middle(&before, setpoint))?;
+        // From where it should be at that time: never less than from the path.
+        let value = (there - tool.position).norm();
+        if value <= self.tolerance {
+            return Ok(None);
+        }
+        let (quantity, limit) = (Quantity::PathDeviation, self.tolerance);
+        Ok(Some(Breach { time, axis: None, quantity, value, limit, unit: "m" }))
+    }
+}
+
+/// The joints in the middle of the cubic that has the positions and velocities of both ends.
+fn middle<const N: usize>(from: &Setpoint, to: &Setpoint) -> Joints<N> {
+    Joints::from_fn(|axis, _| {
+        (from.position[axis] + to.position[axis]) / 2.0
+            + (from.velocity[axis] - to.velocity[axis]) * (CYCLE_TIME / 8.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::sync::Arc;
+
+    use machine::{Axis, Machine, MechanismVisitor};
+
+    use super::*;
+    use crate::Job;
+
+    /// Looks between all setpoints of a trajectory, allowing so much.
+    struct LookAll<'a>(&'a Arc<Trajectory>, &'a [Axis], f64);
+
+    impl MechanismVisitor for LookAll<'_> {
+        type Output = Result<(), Breach>;
+
+        fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
+            let Self(trajectory, axes, tolerance) = self;
+            let mut sampler = Sampler::new(mechanism, axes, Arc::clone(trajectory), 1).unwrap();
+            let mut between = Between::new(tolerance);
+            while let Some(setpoint) = sampler.next() {
+                if let Some(breach) = between.look(&setpoint, &sampler, trajectory).unwrap() {
+                    return Err(breach);
+                }
+            }
+            Ok(())
+        }
+    }
+
+    /// On the letters a five-bar strays by a few nanometres: by the fourth derivative of its joints over
+    /// 384 times the fourth power of a millisecond, and by what the steps of the jerk add.
+    #[test]
+    fn the_tool_strays_by_nanometres_between_setpoints_and_that_is_told() {
+        let text = include_str!("../../machines/five_bar.toml");
+        let machine = Machine::parse("five_bar.toml", text, &[]).unwrap();
+        let job = Job::builtin(&[], &machine).unwrap();
+        let trajectory = crate::plan(&machine, &job).unwrap().trajectory;
+        let look =
+            |tolerance| machine.mechanism.visit(LookAll(&trajectory, &machine.axes, tolerance));
+        look(5e-9).unwrap();
+        let breach = look(1e-9).unwrap_err();
+        assert_eq!(
+            (breach.quantity, breach.limit, breach.unit),
+            (Quantity::PathDeviation, 1e-9, "m")
+        );
+        assert!(breach.value > 1e-9 && breach.value < 5e-9, "{breach:?}");
+        assert!(!breach.quantity.is_place(), "a slower stroke strays less");
+        // Half a cycle after a setpoint.
+        assert!(((breach.time * 1e3).fract() - 0.5).abs() < 1e-6, "{breach:?}");
+    }
+}
