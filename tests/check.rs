@@ -65,7 +65,8 @@ fn a_five_bar_reaches_what_its_triangles_allow() {
     assert!((share - expected).abs() < 1e-12, "{share}, not {expected}");
     assert_eq!(report["axes"][0]["unit"], "rad");
     assert!(report["job"].is_null());
-    assert!(report["sample_job"].as_str().unwrap().ends_with("jobs/five_bar.toml"));
+    let sample = report["sample_job"].as_str().unwrap();
+    assert!(sample.ends_with("jobs/five_bar.toml") && !sample.contains(".."), "{sample}");
 }
 
 #[test]
@@ -129,6 +130,10 @@ fn steppers_are_told_by_pulses_and_a_picture_is_drawn() {
     // Screws reach the whole area, and know no singularity.
     assert_eq!(number(&report, "/reach/reached"), 1.0);
     assert_eq!(report["job"]["margins"], json!([]));
+    // Half a pulse on each of two screws at right angles.
+    let half: [f64; 2] = [0, 1].map(|axis| number(&report["axes"][axis], "/resolution") / 2.0);
+    let expected = math::hypot(half[0], half[1]);
+    assert!((number(&report, "/reach/count_error") - expected).abs() < 1e-12, "{expected}");
     for motor in report["job"]["motors"].as_array().unwrap() {
         assert!(motor["voltage"].is_null() && motor["heat"].is_null(), "{motor}");
         let share = number(motor, "/pulse_rate");

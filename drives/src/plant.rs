@@ -37,6 +37,7 @@ use machine::motor::BeyondTorque;
 use machine::transmission::rest;
 use machine::{Axis, LaserSource, Machine, Mechanism, MechanismVisitor};
 use nalgebra::SVector;
+use signals::random::SplitMix64;
 use signals::time::CYCLE_TIME;
 use signals::{
     AxisArray, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, MAX_AXES, Nanoseconds,
@@ -459,15 +460,11 @@ fn saturate(value: f64, limit: f64) -> f64 {
     value.max(-limit).min(limit)
 }
 
-/// A phase −0.5..0.5 [counts] for an encoder, 0 for seed 0 (SplitMix64, Steele et al. 2014).
+/// A phase −0.5..0.5 [counts] for the encoder of `axis`, 0 for seed 0.
 fn encoder_phase(seed: u64, axis: u64) -> f64 {
     if seed == 0 {
         return 0.0;
     }
-    let mut state = seed.wrapping_add(axis.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    state = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    state = (state ^ (state >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    state ^= state >> 31;
-    // The upper 53 bits as a fraction of one.
-    (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    let mut random = SplitMix64::new(seed);
+    (0..=axis).map(|_| random.fraction()).last().unwrap_or(0.5) - 0.5
 }

@@ -20,7 +20,7 @@ use planner::Plan;
 use planner::request::JobRequest;
 use serde::Serialize;
 use signals::artwork::Artwork;
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
 /// What `check --json` prints.
 #[derive(Debug, Serialize, schemars::JsonSchema)]
@@ -94,7 +94,21 @@ fn plan(input: &MachineInput, path: &Path) -> Result<(JobRequest, Plan), Failure
 fn sample_job(input: &MachineInput) -> Option<String> {
     let sample = input.machine.sample_job.as_ref()?;
     let path = input.folder.as_ref().map_or(sample.clone(), |folder| folder.join(sample));
-    Some(path.display().to_string())
+    Some(tidy(&path).display().to_string())
+}
+
+/// `path` without what `..` takes back: `machines/../jobs/a.ngc` is `jobs/a.ngc`.
+fn tidy(path: &Path) -> PathBuf {
+    let mut tidy = PathBuf::new();
+    for part in path.components() {
+        let back = part == Component::ParentDir;
+        if back && matches!(tidy.components().next_back(), Some(Component::Normal(_))) {
+            tidy.pop();
+        } else {
+            tidy.push(part);
+        }
+    }
+    tidy
 }
 
 fn warnings(machine: &Machine) -> Vec<CheckWarning> {

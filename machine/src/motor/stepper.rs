@@ -69,6 +69,12 @@ impl StepperMotor {
         self.full_steps / STEPS_PER_PERIOD
     }
 
+    /// Whether it is a linear or planar motor unrolled, a turn being one tooth pitch: nothing of it
+    /// rotates.
+    pub fn is_planar(&self) -> bool {
+        self.full_steps == STEPS_PER_PERIOD
+    }
+
     /// Pulses per radian of the shaft.
     pub fn pulses_per_radian(&self) -> f64 {
         self.pulses_per_turn() / TAU

@@ -22,10 +22,11 @@ pub struct AxisReport {
     pub stall_torque: f64,
     /// The same at the joint, after what gear and screw lose from standstill [N or N·m].
     pub stall_effort: f64,
-    /// Inertia of the load beside the rotor's, seen at the shaft.
-    pub inertia_ratio: f64,
+    /// Inertia of the load beside the rotor's, seen at the shaft; null for a planar motor, which has
+    /// no rotor.
+    pub inertia_ratio: Option<f64>,
     /// What a gear calls such a load.
-    pub load_class: LoadClassName,
+    pub load_class: Option<LoadClassName>,
     /// How far the joint moves freely [m or rad].
     pub backlash: f64,
     /// Angle of one encoder count or pulse, seen at the joint [m or rad].
@@ -44,6 +45,18 @@ pub enum LoadClassName {
     Heavy,
     /// More.
     Extreme,
+}
+
+impl LoadClassName {
+    /// The word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Uniform => "uniform",
+            Self::Medium => "medium",
+            Self::Heavy => "heavy",
+            Self::Extreme => "extreme",
+        }
+    }
 }
 
 impl From<LoadClass> for LoadClassName {
@@ -84,7 +97,8 @@ pub fn axes(machine: &Machine) -> Vec<AxisReport> {
 
 fn report(axis: &Axis) -> AxisReport {
     let motor = &axis.motor;
-    let inertia_ratio = axis.gains.inertia / motor.rotor_inertia() - 1.0;
+    let has_rotor = motor.stepper().is_none_or(|stepper| !stepper.is_planar());
+    let inertia_ratio = has_rotor.then(|| axis.gains.inertia / motor.rotor_inertia() - 1.0);
     let lost = axis.efficiency.dynamic * axis.efficiency.at_start;
     AxisReport {
         name: axis.name.clone(),
@@ -95,7 +109,7 @@ fn report(axis: &Axis) -> AxisReport {
         stall_torque: motor.stall_torque(),
         stall_effort: motor.stall_torque() / axis.ratio * lost,
         inertia_ratio,
-        load_class: LoadClass::of(inertia_ratio).into(),
+        load_class: inertia_ratio.map(|ratio| LoadClass::of(ratio).into()),
         backlash: axis.backlash,
         resolution: axis.encoder.resolution() * axis.ratio,
     }

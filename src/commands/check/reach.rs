@@ -2,6 +2,7 @@
 //! attitude of home, on the branch in which the machine is built.
 
 use machine::kinematics::{Branch, Joints, KinematicsError, Margin};
+use machine::pulses::quantisation_bound;
 use machine::{Machine, Mechanism, MechanismVisitor, Pose};
 use monitor::report::workspace::Ground;
 use nalgebra::{Matrix3, Vector3};
@@ -27,6 +28,9 @@ pub struct ReachReport {
     pub singular: f64,
     /// Box around the reached places; null where there is none.
     pub bounds: Option<Bounds>,
+    /// How far half an encoder count or pulse on each axis puts the tool off, at the reached place
+    /// where it is most [m].
+    pub count_error: f64,
     /// Every margin of the mechanism where it is least among the reached places.
     pub margins: Vec<PlaceMargin>,
     /// Why the other places are not reached, the most frequent first.
@@ -95,8 +99,7 @@ impl MechanismVisitor for Survey<'_> {
             self.machine.home_joints.get(axis).copied().unwrap_or_default()
         });
         // Whichever turn a table is in.
-        let own = mechanism.branch();
-        let branch = own.choose("table_turn", &[]).unwrap_or(own);
+        let branch = mechanism.branch().in_any_turn();
         let rotation = mechanism.forward(&home, branch)?.rotation;
         let mut grid = Grid {
             machine: self.machine,
@@ -104,6 +107,10 @@ impl MechanismVisitor for Survey<'_> {
             branch,
             rotation,
             home,
+            counts: core::array::from_fn(|axis| {
+                let axis = self.machine.axes.get(axis);
+                axis.map_or(f64::INFINITY, |axis| 1.0 / (axis.encoder.resolution() * axis.ratio))
+            }),
             previous: home,
             tally: Tally::default(),
         };
@@ -126,12 +133,23 @@ impl From<KinematicsError> for Refused {
     }
 }
 
+/// How the tool comes to a place.
+struct Reached<const N: usize> {
+    /// [m or rad].
+    joints: Joints<N>,
+    margins: Vec<Margin>,
+    /// What half a count on each axis comes to at the tool [m].
+    count_error: f64,
+}
+
 struct Grid<'a, const N: usize, M: Mechanism<N>> {
     machine: &'a Machine,
     mechanism: M,
     branch: M::Branch,
     rotation: Matrix3<f64>,
     home: Joints<N>,
+    /// Counts or pulses of each joint [1/m or 1/rad].
+    counts: [f64; N],
     /// The joints at the last place that was reached [m or rad].
     previous: Joints<N>,
     tally: Tally,
@@ -159,8 +177,9 @@ impl<const N: usize, M: Mechanism<N>> Grid<'_, N, M> {
         };
         let position = Vector3::new(along(0, column), along(1, row), self.machine.home[2]);
         match self.reach(&position) {
-            Ok(margins) => {
-                self.tally.reach(&position, &margins);
+            Ok(reached) => {
+                self.tally.reach(&position, &reached);
+                self.previous = reached.joints;
                 Ground::Reached
             }
             Err(refused) => {
@@ -171,20 +190,13 @@ impl<const N: usize, M: Mechanism<N>> Grid<'_, N, M> {
         }
     }
 
-    /// The margins with the tool at `position`, reached on from the place before or else from home.
-    fn reach(&mut self, position: &Vector3<f64>) -> Result<Vec<Margin>, Refused> {
+    /// The tool at `position`, reached on from the place before or else from home.
+    fn reach(&self, position: &Vector3<f64>) -> Result<Reached<N>, Refused> {
         let pose = Pose { position: *position, rotation: self.rotation };
-        let (joints, margins) =
-            self.solve(&pose, &self.previous).or_else(|_| self.solve(&pose, &self.home))?;
-        self.previous = joints;
-        Ok(margins)
+        self.solve(&pose, &self.previous).or_else(|_| self.solve(&pose, &self.home))
     }
 
-    fn solve(
-        &self,
-        pose: &Pose,
-        previous: &Joints<N>,
-    ) -> Result<(Joints<N>, Vec<Margin>), Refused> {
+    fn solve(&self, pose: &Pose, previous: &Joints<N>) -> Result<Reached<N>, Refused> {
         let joints = self.mechanism.inverse(pose, self.branch, previous)?;
         for (axis, (settings, joint)) in self.machine.axes.iter().zip(joints.iter()).enumerate() {
             let [lower, upper] = settings.limits.position;
@@ -197,7 +209,11 @@ impl<const N: usize, M: Mechanism<N>> Grid<'_, N, M> {
         let margins = self.mechanism.margins(&assembly);
         match margins.iter().find(|margin| margin.value < margin.limit) {
             Some(margin) => Err(Refused { code: margin.name, axis: None, singular: true }),
-            None => Ok((joints, margins)),
+            None => {
+                let jacobian = self.mechanism.jacobian(&assembly);
+                let count_error = quantisation_bound(&jacobian, &self.counts);
+                Ok(Reached { joints, margins, count_error })
+            }
         }
     }
 }
@@ -208,18 +224,20 @@ struct Tally {
     reached: usize,
     singular: usize,
     bounds: Option<Bounds>,
+    count_error: f64,
     margins: Vec<PlaceMargin>,
     refusals: Vec<(String, Option<String>, usize)>,
 }
 
 impl Tally {
-    fn reach(&mut self, position: &Vector3<f64>, margins: &[Margin]) {
+    fn reach<const N: usize>(&mut self, position: &Vector3<f64>, reached: &Reached<N>) {
         self.reached += 1;
+        self.count_error = self.count_error.max(reached.count_error);
         let [x, y] = [position.x, position.y];
         let bounds = self.bounds.get_or_insert(Bounds { x: [x, x], y: [y, y] });
         bounds.x = [bounds.x[0].min(x), bounds.x[1].max(x)];
         bounds.y = [bounds.y[0].min(y), bounds.y[1].max(y)];
-        for margin in margins {
+        for margin in &reached.margins {
             let found = PlaceMargin {
                 name: margin.name.to_owned(),
                 value: margin.value,
@@ -255,6 +273,7 @@ impl Tally {
             reached: share(self.reached),
             singular: share(self.singular),
             bounds: self.bounds,
+            count_error: self.count_error,
             margins: self.margins,
             refusals: self.refusals.into_iter().map(obstacle).collect(),
         }

@@ -1,6 +1,6 @@
 //! The report for a person.
 
-use super::axes::{AxisReport, LoadClassName, Unit};
+use super::axes::{AxisReport, Unit};
 use super::job::{JobReport, MotorUse};
 use super::reach::{Obstacle, ReachReport};
 use super::{CheckReport, CheckWarning};
@@ -52,18 +52,14 @@ fn transmission_line(axis: &AxisReport) -> String {
         Unit::Metre => (format!("{effort:.1} N"), format!("{:.1} µm", axis.backlash * 1e6)),
         Unit::Radian => (format!("{effort:.3} N·m"), format!("{:.4}°", axis.backlash.to_degrees())),
     };
-    let class = match axis.load_class {
-        LoadClassName::Uniform => "uniform",
-        LoadClassName::Medium => "medium",
-        LoadClassName::Heavy => "heavy",
-        LoadClassName::Extreme => "extreme",
+    let load = match (axis.inertia_ratio, axis.load_class) {
+        (Some(ratio), Some(class)) => {
+            format!(", load of {ratio:.2} rotor inertias ({})", class.name())
+        }
+        _ => String::new(),
     };
     let play = if axis.backlash > 0.0 { format!(", backlash {play}") } else { String::new() };
-    format!(
-        "          {effort} at the joint from standstill, load of {:.2} rotor inertias ({class})\
-         {play}",
-        axis.inertia_ratio
-    )
+    format!("          {effort} at the joint from standstill{load}{play}")
 }
 
 /// The soft limits, in millimetres or degrees.
@@ -96,6 +92,10 @@ fn reach(reach: &ReachReport) {
         let [x, y] = [bounds.x, bounds.y].map(|range| range.map(|at| at * 1e3));
         eprintln!("reached   x {:.1} to {:.1} mm, y {:.1} to {:.1} mm", x[0], x[1], y[0], y[1]);
     }
+    eprintln!(
+        "counts    half a count on each axis puts the tool off by up to {:.1} µm",
+        reach.count_error * 1e6
+    );
     for margin in &reach.margins {
         let [x, y, _] = margin.position.map(|at| at * 1e3);
         eprintln!(
