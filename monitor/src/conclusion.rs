@@ -13,6 +13,7 @@ use crate::summary::{
     ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, Summary,
 };
 use machine::{Axis, Machine};
+use runtime::thread;
 use serde::{Deserialize, Serialize};
 use signals::artwork::Artwork;
 use signals::time::CYCLE_TIME;
@@ -200,28 +201,13 @@ fn judged(report: Option<&ControllerReport>, findings: &Findings) -> Result<Mark
 fn realtime(ending: &Ending) -> Realtime {
     let controller = ending.controller.map(|report| report.realtime);
     let drives = ending.drives.map(|report| report.realtime);
-    let reported = [controller, drives];
-    let mut missing = Vec::new();
-    if reported.iter().flatten().any(|facts| facts.fifo == 0) {
-        missing.push(
-            "no SCHED_FIFO (allow it with `ulimit -r 90`, LimitRTPRIO=90 in a unit, or \
-             CAP_SYS_NICE)",
-        );
-    }
-    if reported.iter().flatten().any(|facts| facts.locked == 0) {
-        missing.push(
-            "no locked memory (allow it with `ulimit -l unlimited`, LimitMEMLOCK=infinity in a \
-             unit, or CAP_IPC_LOCK)",
-        );
-    }
-    let warnings = match missing.as_slice() {
-        [] => Vec::new(),
-        missing => {
-            vec![format!("controller and drives are not real-time: {}", missing.join(" and "))]
-        }
-    };
+    let reported: Vec<(&str, RealtimeFacts)> = [("controller", controller), ("drives", drives)]
+        .into_iter()
+        .filter_map(|(name, facts)| Some((name, facts?)))
+        .collect();
     // Of a thread that did not report, nothing is claimed.
     let unknown = RealtimeFacts { core: -1, ..RealtimeFacts::default() };
+    let warnings = thread::missing(&reported);
     Realtime::of(&controller.unwrap_or(unknown), &drives.unwrap_or(unknown), warnings)
 }
 

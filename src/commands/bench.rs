@@ -72,7 +72,7 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     let ending = Ending {
-        controller: Some(heard.controller),
+        controller: Some(heard.controller).filter(|report| report.stream != 0),
         drives: Some(heard.drives),
         ..Ending::default()
     };

@@ -6,6 +6,7 @@ use crate::recording::CycleRecord;
 use crate::recording::file::RecordingWriter;
 use signals::artwork::Stroke;
 use signals::feedback::status;
+use signals::report::refused;
 use signals::{Command, Cycle, Fault, FaultCode, Feedback, LaserCycle, Nanoseconds};
 
 /// The first cycle that is played, and the last.
@@ -198,17 +199,32 @@ fn real_time_is_claimed_and_missed_only_as_reported() {
         };
         summarise(&machine, &plan(), &ending, None, Clock::Real).realtime
     };
-    let good = RealtimeFacts { fifo: 1, priority: 80, core: 1, locked: 1 };
-    let plain = RealtimeFacts { core: -1, ..RealtimeFacts::default() };
+    let none = RealtimeFacts { core: -1, asked_priority: 80, ..RealtimeFacts::default() };
+    let good = RealtimeFacts { fifo: 1, priority: 80, core: 1, locked: 1, ..none };
+    let bare = RealtimeFacts {
+        refused: refused::PRIORITY | refused::MEMORY | refused::CORE,
+        priority_error: 1,
+        memory_limit: 8 << 20,
+        memory_needed: 300 << 20,
+        asked_core: 3,
+        ..none
+    };
 
     let both = of(Some(good), Some(good));
     assert_eq!((both.scheduler.as_str(), both.priority, both.locked), ("fifo", 80, true));
     assert_eq!((both.cores.len(), both.warnings.len()), (2, 0));
-    let one = of(Some(good), Some(plain));
+    let one = of(Some(good), Some(bare));
     assert_eq!((one.scheduler.as_str(), one.priority, one.locked), ("other", 0, false));
     assert_eq!(one.cores.keys().collect::<Vec<_>>(), ["controller"]);
-    assert_eq!(one.warnings.len(), 1, "{:?}", one.warnings);
-    assert!(["SCHED_FIFO", "locked memory"].iter().all(|what| one.warnings[0].contains(what)));
+    let expect = [
+        "no real-time priority for drives (SCHED_FIFO 80: Operation not permitted",
+        "memory is not locked for drives (the limit is 8 MiB, 300 MiB are needed)",
+        "not pinned: drives to CPU 3",
+    ];
+    assert_eq!(one.warnings.len(), expect.len(), "{:?}", one.warnings);
+    for (warning, expect) in one.warnings.iter().zip(expect) {
+        assert!(warning.starts_with(expect), "{warning}");
+    }
     // A refused job: the controller had nothing to report.
     let refused = of(None, Some(good));
     assert_eq!(refused.cores.keys().collect::<Vec<_>>(), ["drives"]);
