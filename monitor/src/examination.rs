@@ -2,7 +2,7 @@
 //! record, in bounded memory, whether they come from a simulation or from a file.
 
 use crate::latency::HopHistograms;
-use crate::marks::{Judge, Marks, Source, Unjudged};
+use crate::marks::{Judge, Marks, Unjudged};
 use crate::recording::CycleRecord;
 use crate::stage::Clock;
 use crate::trace::Trace;
@@ -38,7 +38,7 @@ impl<'a> Examination<'a> {
     pub fn new(artwork: &'a Artwork, clock: Clock) -> Self {
         Self {
             clock,
-            judge: Judge::new(artwork, Source::Plant),
+            judge: Judge::new(artwork),
             histograms: HopHistograms::new(),
             trace: Trace::new(clock == Clock::Real),
             first: None,

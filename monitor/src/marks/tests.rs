@@ -403,20 +403,6 @@ fn rather_no_judgement_than_a_wrong_one() {
     assert_eq!(judge(&one_line(), &blind), Err(Unjudged::ToolUnknown { cycle: FIRST + 60 }));
 }
 
-#[test]
-fn kinematics_can_tell_where_the_tool_was() {
-    let art = one_line();
-    let mut judge = Judge::new(&art, Source::Feedback);
-    for record in play(&one_plan(), |_, tool| tool, |_, _| 0.0) {
-        let mut blind = record;
-        blind.feedback.status = 0;
-        judge.push_at(&blind, Some(record.feedback.tool));
-    }
-    let marks = judge.finish().unwrap();
-    near(marks.missing, 0.0, ROUNDING, "missing");
-    assert_eq!(marks.source, Source::Feedback);
-}
-
 /// A closed figure of eight: it crosses itself, and ends where it starts.
 struct Eight {
     points: Vec<Point>,
