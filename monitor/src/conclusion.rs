@@ -3,12 +3,11 @@
 //! What cannot be read or judged leaves a gap in the summary and a warning that says why; a figure
 //! that might be wrong is never given.
 
-use crate::examination::{Examination, Findings};
+use crate::examination::{Clock, Examination, Findings};
 use crate::marks::Marks;
 use crate::recording::file::{RecordingError, RecordingReader};
 use crate::report::Report;
 use crate::run_folder::{self, RunFolder};
-use crate::stage::Clock;
 use crate::summary::{
     ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, Summary,
 };

@@ -4,9 +4,17 @@
 use crate::latency::HopHistograms;
 use crate::marks::{Judge, Marks, Unjudged};
 use crate::recording::CycleRecord;
-use crate::stage::Clock;
 use crate::trace::Trace;
 use signals::artwork::Artwork;
+
+/// Whether the stamps in the samples are those of a real clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Clock {
+    /// They are: latencies are measured.
+    Real,
+    /// They are made up: there are no latencies.
+    Virtual,
+}
 
 /// An examination under way.
 #[derive(Debug)]

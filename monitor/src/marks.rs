@@ -80,16 +80,6 @@ pub enum Unjudged {
     },
 }
 
-/// Judges the marks of a whole recording, with the tool where drives reported it.
-///
-/// # Errors
-/// [`Unjudged`] where records are missing in between, or where the tool was not known while lit.
-pub fn judge(artwork: &Artwork, records: &[CycleRecord]) -> Result<Marks, Unjudged> {
-    let mut judge = Judge::new(artwork);
-    records.iter().for_each(|record| judge.push(record));
-    judge.finish()
-}
-
 /// Judges marks record by record.
 #[derive(Debug)]
 pub struct Judge<'a> {

@@ -8,7 +8,7 @@ use crate::conclusion::{self, Ending, LIGHT_LAG, WatchNote};
 use crate::latency::IntervalLog;
 use crate::recording::file::RecordingWriter;
 use crate::run_folder::{self, RunFolder};
-use crate::stage::{Clock, Inputs, MonitorStage, Outputs};
+use crate::stage::{Inputs, MonitorStage, Outputs};
 use crate::summary::{ErrorSummary, Outcome};
 use machine::Machine;
 use runtime::peer::{PeerState, Peers};
@@ -182,7 +182,7 @@ impl Recording {
         let log = BufWriter::new(File::create(folder.file(run_folder::LATENCY))?);
         Ok(Self {
             stream,
-            stage: MonitorStage::new(Clock::Real),
+            stage: MonitorStage::new(),
             outputs: Outputs::default(),
             writer: RecordingWriter::new(samples)?,
             log: IntervalLog::new(log, SystemTime::now())?,

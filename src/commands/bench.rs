@@ -7,10 +7,9 @@ use crate::pipeline::{LOOK, Pipeline, Starter};
 use crate::{inputs, output};
 use drives::PlantOptions;
 use monitor::conclusion::{Ending, PlanNote, summarise};
-use monitor::examination::Findings;
-use monitor::latency::{HopHistograms, HopLatency};
-use monitor::recording::Recorder;
-use monitor::stage::Clock;
+use monitor::examination::{Clock, Findings};
+use monitor::latency::HopLatency;
+use monitor::stage::{Inputs, MonitorStage, Outputs};
 use monitor::summary::Realtime;
 use planner::request::JobRequest;
 use runtime::{Domain, Instance, Reading, Role, Subscriber, signal};
@@ -83,7 +82,7 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Exit, Failure> {
         cycles: measured.periods.len() as u64,
         overruns: heard.drives.overruns,
         missed: heard.drives.missed,
-        latency: measured.histograms.summary(),
+        latency: measured.stage.histograms().summary(),
         period_error: measured.period_error(),
         realtime: summary.realtime,
     };
@@ -126,7 +125,7 @@ fn print_latency(report: &LatencyReport) {
 }
 
 struct Measured {
-    histograms: HopHistograms,
+    stage: MonitorStage,
     /// Periods of the drives' clock [ns].
     periods: Vec<i64>,
 }
@@ -169,8 +168,9 @@ fn measure(
         observer.subscriber(Reading::Every).map_err(Failure::service)?;
     let mut commands: Subscriber<Command> =
         observer.subscriber(Reading::Every).map_err(Failure::service)?;
-    let mut recorder = Recorder::new();
-    let mut measured = Measured { histograms: HopHistograms::new(), periods: Vec::new() };
+    let (mut feedback_batch, mut command_batch) = (Vec::new(), Vec::new());
+    let mut outputs = Outputs::default();
+    let mut measured = Measured { stage: MonitorStage::new(), periods: Vec::new() };
     let mut previous: Option<Feedback> = None;
     let mut stream = 0;
     let mut started_stream = 0;
@@ -190,6 +190,8 @@ fn measure(
             pipeline.ask(OperatorVerb::Start, stream as f64);
             started_stream = stream;
         }
+        feedback_batch.clear();
+        command_batch.clear();
         while let Some(feedback) = feedbacks.receive().map_err(Failure::service)? {
             if let Some(previous) = previous
                 && feedback.cycle == previous.cycle.next()
@@ -197,14 +199,13 @@ fn measure(
                 measured.periods.push((feedback.measured - previous.measured).0);
             }
             previous = Some(feedback);
-            recorder.feedback(&feedback);
+            feedback_batch.push(feedback);
         }
         while let Some(command) = commands.receive().map_err(Failure::service)? {
-            recorder.command(&command);
+            command_batch.push(command);
         }
-        for record in recorder.take() {
-            measured.histograms.push(&record);
-        }
+        let inputs = Inputs { feedbacks: &feedback_batch, commands: &command_batch };
+        measured.stage.step(&inputs, &mut outputs);
         std::thread::sleep(LOOK);
     }
     Ok(measured)

@@ -8,6 +8,13 @@ use signals::{Command, Cycle, Feedback, GateEdge, LaserCycle, Nanoseconds, Sampl
 
 type Point = [f64; 3];
 
+/// Judges the marks of a whole recording.
+fn judge(artwork: &Artwork, records: &[CycleRecord]) -> Result<Marks, Unjudged> {
+    let mut judge = Judge::new(artwork);
+    records.iter().for_each(|record| judge.push(record));
+    judge.finish()
+}
+
 const SPEED: f64 = 0.25;
 
 /// A plan by time [s]: where the tool is, which stroke has light, if any.

@@ -206,7 +206,8 @@ impl LitSpans {
 
     /// Share of the cycle that is lit, 0..=1.
     pub fn share(&self) -> f64 {
-        self.as_slice().iter().map(|span| span.to - span.from).sum()
+        // An empty sum of floats is −0, which a table would show.
+        self.as_slice().iter().fold(0.0, |share, span| share + (span.to - span.from))
     }
 }
 
