@@ -7,7 +7,7 @@ use crate::examination::{Clock, Examination, Findings};
 use crate::marks::Marks;
 use crate::recording::file::{RecordingError, RecordingReader};
 use crate::report::Report;
-use crate::run_folder::{self, RunFolder};
+use crate::run_folder::RunFolder;
 use crate::summary::{
     ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, Summary,
 };
@@ -15,8 +15,9 @@ use machine::{Axis, Machine};
 use runtime::thread;
 use serde::{Deserialize, Serialize};
 use signals::artwork::Artwork;
+use signals::plan::PlanFacts;
 use signals::time::CYCLE_TIME;
-use signals::{ControllerReport, DrivesReport, RealtimeFacts};
+use signals::{ControllerReport, DrivesReport, RealtimeFacts, run_folder};
 use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::time::Instant;
@@ -24,9 +25,6 @@ use std::time::Instant;
 /// Cycles after the stream's last during which its light is still reported: the command acts one
 /// cycle later, and the feedback tells one after that.
 pub const LIGHT_LAG: u64 = 2;
-
-/// Name of the [`WatchNote`] in a run folder.
-pub const WATCH_FILE: &str = "monitor.json";
 
 /// Cycles that the controller counts beyond a stream's setpoints: the one that finds it at rest.
 const END_CYCLES: u64 = 1;
@@ -45,7 +43,7 @@ pub struct WatchNote {
 impl WatchNote {
     /// The note in a run folder; `None` while there is none that can be read.
     pub fn read(folder: &RunFolder) -> Option<Self> {
-        serde_json::from_slice(&fs::read(folder.file(WATCH_FILE)).ok()?).ok()
+        serde_json::from_slice(&fs::read(folder.file(run_folder::WATCH)).ok()?).ok()
     }
 
     /// Writes it into the run folder.
@@ -53,35 +51,8 @@ impl WatchNote {
     /// # Errors
     /// Whatever the operating system reports.
     pub fn write(&self, folder: &RunFolder) -> io::Result<()> {
-        folder.write(WATCH_FILE, serde_json::to_vec_pretty(self)?)
+        folder.write(run_folder::WATCH, serde_json::to_vec_pretty(self)?)
     }
-}
-
-/// The part of the planner's facts, `plan.json`, that a summary repeats.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-pub struct PlanNote {
-    /// The job's name.
-    pub name: String,
-    /// Strokes and dots.
-    pub strokes: u64,
-    /// Length to mark [m].
-    pub length: f64,
-    /// From the first motion to the last, as planned [s].
-    pub duration: f64,
-    /// Setpoints in the stream: the motion, and rest before and after it.
-    pub samples: u64,
-    /// What a person should know.
-    #[serde(default)]
-    pub notes: Vec<PlanRemark>,
-}
-
-/// A remark of the planner.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-pub struct PlanRemark {
-    /// Line of the job file from 1, 0 for none.
-    pub line: u64,
-    /// What to know.
-    pub text: String,
 }
 
 /// How a run ended, as whoever watched it knows.
@@ -113,14 +84,14 @@ pub struct Ending {
 /// `None` without a recording.
 pub fn summarise(
     machine: &Machine,
-    plan: &PlanNote,
+    plan: &PlanFacts,
     ending: &Ending,
     findings: Option<&Findings>,
     clock: Clock,
 ) -> Summary {
     let job = JobSummary {
         name: if plan.name.is_empty() { ending.job.clone() } else { plan.name.clone() },
-        strokes: plan.strokes,
+        strokes: plan.strokes as u64,
         length: plan.length,
     };
     let mut summary = Summary::new(Outcome::Aborted, job, machine_summary(machine));
@@ -223,7 +194,7 @@ pub fn conclude(
 ) -> io::Result<Summary> {
     let began = Instant::now();
     let mut ending = ending.clone();
-    let (mut plan, mut artwork, mut findings) = (PlanNote::default(), Artwork::default(), None);
+    let (mut plan, mut artwork, mut findings) = (PlanFacts::default(), Artwork::default(), None);
     // A job that was refused has no plan: one in the folder is that of an earlier job.
     if ending.outcome != Some(Outcome::Refused) {
         let warnings = &mut ending.warnings;

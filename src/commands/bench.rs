@@ -6,7 +6,7 @@ use crate::pipeline::configuration::Configuration;
 use crate::pipeline::{LOOK, Pipeline, Starter};
 use crate::{inputs, output};
 use drives::PlantOptions;
-use monitor::conclusion::{Ending, PlanNote, summarise};
+use monitor::conclusion::{Ending, summarise};
 use monitor::examination::{Clock, Findings};
 use monitor::latency::HopLatency;
 use monitor::stage::{Inputs, MonitorStage, Outputs};
@@ -14,8 +14,9 @@ use monitor::summary::Realtime;
 use planner::request::JobRequest;
 use runtime::{Domain, Instance, Reading, Role, Subscriber, signal};
 use serde::Serialize;
+use signals::plan::PlanFacts;
 use signals::time::CYCLE_TIME;
-use signals::{Command, Feedback, OperatorVerb, PlannerPhase};
+use signals::{Command, Feedback, OperatorVerb, PlannerPhase, run_folder};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::time::{Duration, Instant};
@@ -76,7 +77,7 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Exit, Failure> {
         ..Ending::default()
     };
     let summary =
-        summarise(&input.machine, &PlanNote::default(), &ending, None::<&Findings>, Clock::Real);
+        summarise(&input.machine, &PlanFacts::default(), &ending, None::<&Findings>, Clock::Real);
     let report = LatencyReport {
         seconds: arguments.seconds,
         cycles: measured.periods.len() as u64,
@@ -162,7 +163,7 @@ fn measure(
     seconds: f64,
 ) -> Result<Measured, Failure> {
     let text = serde_json::to_vec(request).map_err(Failure::service)?;
-    std::fs::write(folder.join(planner::request::REQUEST_FILE), text).map_err(Failure::service)?;
+    std::fs::write(folder.join(run_folder::REQUEST), text).map_err(Failure::service)?;
     let observer = Domain::join(instance, Role::Observer).map_err(Failure::service)?;
     let mut feedbacks: Subscriber<Feedback> =
         observer.subscriber(Reading::Every).map_err(Failure::service)?;

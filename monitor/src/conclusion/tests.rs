@@ -6,6 +6,7 @@ use crate::recording::CycleRecord;
 use crate::recording::file::RecordingWriter;
 use signals::artwork::Stroke;
 use signals::feedback::status;
+use signals::plan::Note;
 use signals::report::refused;
 use signals::{Command, Cycle, Fault, FaultCode, Feedback, LaserCycle, Nanoseconds};
 
@@ -60,17 +61,18 @@ fn report() -> ControllerReport {
     }
 }
 
-fn plan() -> PlanNote {
-    PlanNote {
+fn plan() -> PlanFacts {
+    PlanFacts {
         name: "line".into(),
         strokes: 1,
         length: LENGTH,
         duration: 0.08,
         samples: 99,
         notes: vec![
-            PlanRemark { line: 0, text: "everywhere".into() },
-            PlanRemark { line: 7, text: "here".into() },
+            Note { line: 0, text: "everywhere".into() },
+            Note { line: 7, text: "here".into() },
         ],
+        ..PlanFacts::default()
     }
 }
 
@@ -238,11 +240,8 @@ fn real_time_is_claimed_and_missed_only_as_reported() {
 fn folder(below: &tempfile::TempDir, records: &[CycleRecord]) -> RunFolder {
     let folder = RunFolder::create_at(below.path()).unwrap();
     folder.write(run_folder::ARTWORK, serde_json::to_vec(&artwork()).unwrap()).unwrap();
-    // The planner says more than a summary repeats.
-    let plan = r#"{
-        "name": "line", "strokes": 1, "length": 0.02, "duration": 0.08, "samples": 99,
-        "speed": 0.25, "notes": [{"line": 7, "text": "here"}], "uses": {"path_speed": 0.5}
-    }"#;
+    let notes = vec![Note { line: 7, text: "here".into() }];
+    let plan = serde_json::to_vec(&PlanFacts { notes, ..plan() }).unwrap();
     folder.write(run_folder::PLAN, plan).unwrap();
     let mut writer = RecordingWriter::new(Vec::new()).unwrap();
     writer.write(records).unwrap();
@@ -333,6 +332,6 @@ fn the_note_of_a_recording_is_read_as_it_was_written() {
     let note = WatchNote { stream: 3, records: 4711, lost: 2 };
     note.write(&folder).unwrap();
     assert_eq!(WatchNote::read(&folder), Some(note));
-    folder.write(WATCH_FILE, "{\"stream\": 3").unwrap();
+    folder.write(run_folder::WATCH, "{\"stream\": 3").unwrap();
     assert_eq!(WatchNote::read(&folder), None);
 }
