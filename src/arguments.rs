@@ -1,6 +1,6 @@
 //! The command line.
 
-use crate::exit::EXIT_CODES;
+use crate::exit;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -56,7 +56,7 @@ the machine at rest.";
 
 /// Real-time motion controller for laser marking and engraving machines.
 #[derive(Debug, Parser)]
-#[command(name = "graver", version, after_help = EXIT_CODES, propagate_version = true)]
+#[command(name = "graver", version, after_help = exit::help(), propagate_version = true)]
 pub struct Arguments {
     /// What to do.
     #[command(subcommand)]

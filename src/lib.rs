@@ -30,7 +30,7 @@ pub fn main() -> ExitCode {
         Ok(exit) => exit.into(),
         Err(failure) => {
             output::failure(&failure, json);
-            failure.exit.into()
+            failure.exit().into()
         }
     }
 }
