@@ -52,7 +52,7 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Exit, Failure> {
     let request =
         inputs::job_request(None, &input.machine, input.folder.as_deref(), &input.job_overrides)
             .absolute();
-    let configuration = Configuration::new(&arguments.machine, &arguments.drives)?;
+    let configuration = Configuration::new(input.source.clone(), &arguments.drives)?;
     let mut pipeline = Pipeline::start(&instance, configuration, Starter::Own)?;
     let folder = std::env::temp_dir().join(format!("graver-{name}"));
     let measured = std::fs::create_dir_all(&folder)

@@ -251,7 +251,7 @@ impl<'a> JobRun<'a> {
             self.await_recording();
         }
         self.ending.drives = Some(self.drives_with_cause());
-        let machine = self.pipeline.configuration.machine()?;
+        let machine = self.pipeline.configuration.source.machine()?;
         let summary = conclusion::conclude(&self.folder, &machine, &self.ending, self.started)
             .map_err(Failure::service)?;
         self.pipeline.board.name_job(None);
