@@ -116,9 +116,10 @@ pub fn summarise(
     }
     if let Some(report) = &ending.drives {
         summary.overruns = report.overruns.saturating_sub(ending.overruns_before);
-        let axes = &summary.machine.axes;
-        summary.fault = summary.fault.take().or(FaultSummary::of(&report.fault, axes));
     }
+    let faults = [ending.controller.map(|report| report.fault), ending.drives.map(|it| it.fault)];
+    summary.fault =
+        faults.iter().flatten().find_map(|fault| FaultSummary::of(fault, &machine.axes));
     summary.outcome = outcome(ending, summary.fault.is_some());
     if let Some(findings) = findings {
         summary.latency = findings.histograms.summary();
