@@ -1,8 +1,8 @@
 //! The monitor as a stage beside a running pipeline: pairs the samples of two channels into records
 //! and measures their latencies. Pure; the service around it moves samples and writes files.
 //!
-//! What a run's records tell beyond that is an [`Examination`](crate::examination::Examination), made
-//! of the whole recording when the run has ended.
+//! What a run's records tell beyond that is an [`Examination`](crate::examination::Examination),
+//! made of the whole recording when the run has ended.
 
 use crate::latency::HopHistograms;
 use crate::recording::{CycleRecord, Recorder};

@@ -28,8 +28,8 @@ pub(crate) fn timespec(time: Nanoseconds) -> libc::timespec {
     libc::timespec { tv_sec: time.0 / SECOND, tv_nsec: time.0 % SECOND }
 }
 
-/// Sleeps until `deadline` on the monotonic clock; at once when it has passed. Goes on sleeping after a
-/// signal.
+/// Sleeps until `deadline` on the monotonic clock; at once when it has passed. Goes on sleeping
+/// after a signal.
 pub fn sleep_until(deadline: Nanoseconds) {
     let until = timespec(Nanoseconds(deadline.0.max(0)));
     loop {

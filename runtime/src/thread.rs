@@ -1,8 +1,8 @@
 //! Making the calling thread real-time, as far as this computer and user allow.
 //!
-//! Nothing here fails: without privileges the pipeline runs all the same. What was refused is in the
-//! facts, which travel with the reports; whoever concludes a run says it once, with the way to get
-//! it ([`missing`]).
+//! Nothing here fails: without privileges the pipeline runs all the same. What was refused is in
+//! the facts, which travel with the reports; whoever concludes a run says it once, with the way to
+//! get it ([`missing`]).
 //!
 //! A SCHED_FIFO thread that never sleeps is stopped by the kernel for 50 ms every second (real-time
 //! throttling), so a cycle may spin only briefly before its deadline.

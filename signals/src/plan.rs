@@ -41,8 +41,8 @@ pub struct Uses {
     /// Heating of each DC motor's winding, the root mean square of its current against what it
     /// bears for ever; 0 where the machine file does not say that.
     pub heat: Vec<f64>,
-    /// Motor torque as the efficiencies of gear and screw have it, in place of friction: for sizing,
-    /// against the power stage's limit or the pull-out torque. No limit is held to it.
+    /// Motor torque as the efficiencies of gear and screw have it, in place of friction: for
+    /// sizing, against the power stage's limit or the pull-out torque. No limit is held to it.
     pub sizing: Vec<f64>,
     /// Speed of the tool.
     pub path_speed: f64,

@@ -90,8 +90,8 @@ fn approach(job: &mut Job, machine: &Machine, standing: &AxisArray) -> Result<()
 }
 
 /// Where the joints stand behind motors at rest: short of them by what gravity makes of springs,
-/// gaps and steppers' fields. Home itself where that is within what rounding makes of it, so that a job plans
-/// alike from every start there.
+/// gaps and steppers' fields. Home itself where that is within what rounding
+/// makes of it, so that a job plans alike from every start there.
 struct Standing<'a> {
     motors: &'a AxisArray,
     machine: &'a Machine,
