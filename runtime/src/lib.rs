@@ -9,6 +9,8 @@
 //! [`thread::enter_realtime`], then the cycle. After that nothing here allocates, except the one
 //! small block inside iceoryx2 for each [`Publisher::publish`](channel::Publisher::publish).
 
+#![deny(rustdoc::broken_intra_doc_links)]
+
 pub mod allocation;
 pub mod channel;
 pub mod child;

@@ -2,7 +2,7 @@
 //!
 //! Nothing here fails: without privileges the pipeline runs all the same. What was refused is in
 //! the facts, which travel with the reports; whoever concludes a run says it once, with the way to
-//! get it ([`missing`]).
+//! get it ([`missing()`]).
 //!
 //! A SCHED_FIFO thread that never sleeps is stopped by the kernel for 50 ms every second (real-time
 //! throttling), so a cycle may spin only briefly before its deadline.
@@ -187,7 +187,7 @@ fn lock_memory(facts: &mut RealtimeFacts) {
     facts.memory_needed = needed;
 }
 
-/// The address space of this process [bytes], which is what the lock limit is compared with.
+/// The address space of this process in bytes, which is what the lock limit is compared with.
 fn virtual_memory() -> u64 {
     let pages = std::fs::read_to_string("/proc/self/statm")
         .ok()
