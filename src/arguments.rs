@@ -1,6 +1,6 @@
 //! The command line.
 
-use crate::exit::EXIT_CODES;
+use crate::exit;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -43,6 +43,13 @@ Examples, one object a line in and out, SI units and radians:
 A line that asks for what cannot be gets {\"error\": {\"code\", \"detail\", ..}}, and the next one
 its answer; a line that is not such an object ends the command with exit code 2.";
 
+const EXPORT_EXAMPLES: &str = "\
+Examples:
+  graver export runs/20260101-120000-letters > samples.csv
+  graver export runs/a/samples.bin --out samples.csv
+
+SI units and radians, one line a millisecond; a field that was not known is empty.";
+
 const SERVICES: &str = "\
 The services are graver drives, controller, planner and monitor with the same --instance;
 machine and drives are the domain's. deploy/ has systemd units. SIGTERM or Ctrl-C ends it with
@@ -50,7 +57,7 @@ the machine at rest.";
 
 /// Real-time motion controller for laser marking and engraving machines.
 #[derive(Debug, Parser)]
-#[command(name = "graver", version, after_help = EXIT_CODES, propagate_version = true)]
+#[command(name = "graver", version, after_help = exit::help(), propagate_version = true)]
 pub struct Arguments {
     /// What to do.
     #[command(subcommand)]
@@ -75,6 +82,9 @@ pub enum Command {
     /// Kinematics and dynamics: JSON lines in, JSON lines out.
     #[command(after_help = KINEMATICS_EXAMPLES)]
     Kinematics(KinematicsArguments),
+    /// Write the recording of a run as comma-separated values.
+    #[command(after_help = EXPORT_EXAMPLES)]
+    Export(ExportArguments),
     /// Measure this PC: latencies, planning speed, simulation speed.
     #[command(subcommand)]
     Bench(BenchCommand),
@@ -278,6 +288,17 @@ pub enum KinematicsVerb {
     Dynamics,
     /// Velocity and force ellipses.
     Ellipse,
+}
+
+/// Arguments of `export`.
+#[derive(Debug, Clone, Args)]
+pub struct ExportArguments {
+    /// Run folder, or a `samples.bin`; the axes' names are those of the summary beside it.
+    #[arg(value_name = "RUN_FOLDER")]
+    pub recording: PathBuf,
+    /// Write to this file; without it to stdout.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }
 
 /// What `bench` measures.

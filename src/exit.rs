@@ -9,7 +9,7 @@ use planner::request::Refusal;
 pub enum Exit {
     /// Done.
     Done = 0,
-    /// Stopped by a person, or a check that failed.
+    /// Stopped by a person, or a request that was refused.
     Stopped = 1,
     /// Bad arguments, machine file or job.
     BadInput = 2,
@@ -19,14 +19,31 @@ pub enum Exit {
     Service = 4,
 }
 
+impl Exit {
+    /// All of them, by their codes.
+    const ALL: [Self; 5] = [Self::Done, Self::Stopped, Self::BadInput, Self::Fault, Self::Service];
+
+    /// What it means, as `--help` and `docs/operating.md` say.
+    fn meaning(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Stopped => {
+                "stopped by a person (Ctrl-C, graver stop), or a request that was refused"
+            }
+            Self::BadInput => "bad arguments, machine file or job",
+            Self::Fault => "a fault stopped the machine",
+            Self::Service => {
+                "a service could not start or died, or the instance is in use (its pid is named)"
+            }
+        }
+    }
+}
+
 /// The exit codes as `--help` shows them.
-pub const EXIT_CODES: &str = "\
-Exit codes:
-  0  done
-  1  stopped by a person (Ctrl-C, graver stop), or a check that failed
-  2  bad arguments, machine file or job
-  3  a fault stopped the machine
-  4  a service could not start or died, or the instance is in use";
+pub fn help() -> String {
+    let lines = Exit::ALL.map(|exit| format!("\n  {}  {}", exit as u8, exit.meaning()));
+    format!("Exit codes:{}", lines.concat())
+}
 
 impl From<Exit> for std::process::ExitCode {
     fn from(exit: Exit) -> Self {
@@ -49,8 +66,8 @@ impl From<Outcome> for Exit {
 /// Why a command could not do what it was asked.
 #[derive(Debug, Clone)]
 pub struct Failure {
-    /// The exit code that goes with it.
-    pub exit: Exit,
+    /// How a run ends that fails this way.
+    pub outcome: Outcome,
     /// What is wrong, where, and what would be right.
     pub refusal: Refusal,
 }
@@ -58,23 +75,17 @@ pub struct Failure {
 impl Failure {
     /// Bad input.
     pub fn bad_input(message: impl std::fmt::Display) -> Self {
-        Self { exit: Exit::BadInput, refusal: Refusal::internal(message) }
+        Self { outcome: Outcome::Refused, refusal: Refusal::internal(message) }
     }
 
     /// A service that could not start or died.
     pub fn service(error: impl std::fmt::Display) -> Self {
-        Self { exit: Exit::Service, refusal: Refusal::internal(error) }
+        Self { outcome: Outcome::Aborted, refusal: Refusal::internal(error) }
     }
 
-    /// How a run ends that fails this way.
-    pub fn outcome(&self) -> Outcome {
-        match self.exit {
-            Exit::Done => Outcome::Completed,
-            Exit::Stopped => Outcome::Stopped,
-            Exit::BadInput => Outcome::Refused,
-            Exit::Fault => Outcome::Faulted,
-            Exit::Service => Outcome::Aborted,
-        }
+    /// The exit code that goes with it.
+    pub fn exit(&self) -> Exit {
+        self.outcome.into()
     }
 
     /// The error as a summary tells it.
@@ -95,12 +106,41 @@ pub fn error_summary(refusal: &Refusal) -> ErrorSummary {
 
 impl From<Refusal> for Failure {
     fn from(refusal: Refusal) -> Self {
-        Self { exit: Exit::BadInput, refusal }
+        Self { outcome: Outcome::Refused, refusal }
     }
 }
 
 impl From<DocumentError> for Failure {
     fn from(error: DocumentError) -> Self {
         Refusal::of_document(&error).into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn outcomes_have_the_documented_codes() {
+        for (outcome, code) in [
+            (Outcome::Completed, 0),
+            (Outcome::Stopped, 1),
+            (Outcome::Refused, 2),
+            (Outcome::Faulted, 3),
+            (Outcome::Aborted, 4),
+        ] {
+            assert_eq!(Exit::from(outcome) as u8, code);
+        }
+    }
+
+    #[test]
+    fn the_manual_says_what_the_help_says() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/operating.md");
+        let manual = std::fs::read_to_string(path).unwrap().replace('`', "");
+        for exit in Exit::ALL {
+            let row = format!("\n| {} | {} |\n", exit as u8, exit.meaning());
+            assert!(manual.contains(&row), "docs/operating.md lacks:{row}");
+        }
     }
 }

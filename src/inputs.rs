@@ -3,13 +3,69 @@
 use crate::arguments::MachineArguments;
 use crate::exit::Failure;
 use machine::Machine;
-use machine::document::Override;
+use machine::document::{Document, Override};
 use planner::request::JobRequest;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+/// What machine and plant are built from: read once, and the same for every process.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct MachineSource {
+    /// The machine file; `None` for the built-in machine.
+    file: Option<MachineText>,
+    /// The values of `--set`.
+    set: Vec<String>,
+}
+
+/// A machine file as it was read.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct MachineText {
+    path: PathBuf,
+    text: String,
+}
+
+impl MachineSource {
+    /// Reads the machine file, if one is named.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read(arguments: &MachineArguments) -> Result<Self, Failure> {
+        let read = |path: &PathBuf| {
+            Ok::<_, Failure>(MachineText { path: path.clone(), text: Document::text(path)? })
+        };
+        let file = arguments.machine.as_ref().map(read).transpose()?;
+        Ok(Self { file, set: arguments.set.clone() })
+    }
+
+    /// The machine that is planned for and controlled.
+    ///
+    /// # Errors
+    /// A machine file or an override that does not hold.
+    pub fn machine(&self) -> Result<Machine, Failure> {
+        self.build(&Overrides::sort(&self.set)?.machine, &[])
+    }
+
+    /// The machine that is simulated: the same, but for `--set plant.…`.
+    ///
+    /// # Errors
+    /// A machine file or an override that does not hold.
+    pub fn plant(&self) -> Result<Machine, Failure> {
+        let sorted = Overrides::sort(&self.set)?;
+        self.build(&sorted.machine, &sorted.plant)
+    }
+
+    fn build(&self, machine: &[Override], plant: &[Override]) -> Result<Machine, Failure> {
+        let name = self.file.as_ref().map(|file| file.path.display().to_string());
+        let text = self.file.as_ref().map(|file| file.text.as_str());
+        Ok(Machine::simulated(name.as_deref().zip(text), machine, plant)?)
+    }
+}
 
 /// What the arguments `--machine` and `--set` say together.
 #[derive(Debug, Clone)]
 pub struct MachineInput {
+    /// What machine and plant are built from.
+    pub source: MachineSource,
     /// The machine that is planned for and controlled.
     pub machine: Machine,
     /// The machine that is simulated: the same, but for `--set plant.…`.
@@ -25,28 +81,14 @@ pub struct MachineInput {
 /// # Errors
 /// A machine file or an override that does not hold.
 pub fn machine(arguments: &MachineArguments) -> Result<MachineInput, Failure> {
-    let sorted = Overrides::sort(&arguments.set)?;
-    let file = arguments.machine.as_deref();
-    let machine = load(file, &sorted.machine)?;
-    let plant = if sorted.plant.is_empty() {
-        machine.clone()
-    } else {
-        Machine::simulated(file, &sorted.machine, &sorted.plant)?
-    };
-    let folder = file.and_then(Path::parent).map(Path::to_owned);
-    Ok(MachineInput { machine, plant, folder, job_overrides: sorted.job })
-}
-
-/// Loads a machine file, or the built-in machine.
-///
-/// # Errors
-/// A file or an override that does not hold.
-pub fn load(file: Option<&Path>, overrides: &[Override]) -> Result<Machine, Failure> {
-    match file {
-        Some(path) => Machine::load(path, overrides),
-        None => Machine::builtin_with(overrides),
-    }
-    .map_err(Failure::from)
+    let source = MachineSource::read(arguments)?;
+    Ok(MachineInput {
+        machine: source.machine()?,
+        plant: source.plant()?,
+        folder: arguments.machine.as_deref().and_then(Path::parent).map(Path::to_owned),
+        job_overrides: Overrides::sort(&arguments.set)?.job,
+        source,
+    })
 }
 
 /// The job that the command line names, or the machine's sample job, or the built-in one.
@@ -97,5 +139,43 @@ impl Overrides {
             }
         }
         Ok(sorted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn source(machine: Option<PathBuf>, set: &[&str]) -> MachineSource {
+        let set = set.iter().map(|change| (*change).to_owned()).collect();
+        MachineSource::read(&MachineArguments { machine, set }).unwrap()
+    }
+
+    #[test]
+    fn a_file_edited_after_it_was_read_changes_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.toml");
+        let original = concat!(env!("CARGO_MANIFEST_DIR"), "/machines/cartesian.toml");
+        std::fs::copy(original, &path).unwrap();
+        let source = source(Some(path.clone()), &[]);
+        let before = source.machine().unwrap();
+        std::fs::write(&path, "no machine any more").unwrap();
+        assert_eq!(source.machine().unwrap(), before);
+        // As the services read it from the domain's holder.
+        let sent: MachineSource =
+            serde_json::from_slice(&serde_json::to_vec(&source).unwrap()).unwrap();
+        assert_eq!((sent.machine().unwrap(), sent.plant().unwrap()), (before.clone(), before));
+    }
+
+    #[test]
+    fn only_the_plant_has_the_plants_keys_and_names_them_as_they_were_written() {
+        let both = source(None, &["machine.path.jerk=400 m/s^3", "plant.path.jerk=300 m/s^3"]);
+        assert_eq!(both.machine().unwrap().path.jerk, 400.0);
+        assert_eq!(both.plant().unwrap().path.jerk, 300.0);
+        let wrong = source(None, &["plant.path.jrk=3"]);
+        assert!(wrong.machine().is_ok());
+        let text = wrong.plant().unwrap_err().refusal.text;
+        assert!(text.contains("--set plant.path.jrk=3"), "{text}");
     }
 }

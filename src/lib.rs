@@ -14,7 +14,9 @@ pub mod simulation;
 
 use arguments::{Arguments, BenchCommand, Command};
 use clap::Parser;
-use commands::{bench, check, kinematics, manual, operator, plan, run, service, simulate, verify};
+use commands::{
+    bench, check, export, kinematics, manual, operator, plan, run, service, simulate, verify,
+};
 use exit::{Exit, Failure};
 use pipeline::operators::Verb;
 use runtime::domain::Role;
@@ -28,7 +30,7 @@ pub fn main() -> ExitCode {
         Ok(exit) => exit.into(),
         Err(failure) => {
             output::failure(&failure, json);
-            failure.exit.into()
+            failure.exit().into()
         }
     }
 }
@@ -40,6 +42,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Plan(arguments) => plan::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Kinematics(arguments) => kinematics::run(arguments),
+        Command::Export(arguments) => export::run(arguments),
         Command::Bench(BenchCommand::Latency(arguments)) => bench::latency(arguments),
         Command::Bench(BenchCommand::Plan(arguments)) => bench::plan(arguments),
         Command::Bench(BenchCommand::Simulate(arguments)) => bench::simulate(arguments),

@@ -40,7 +40,7 @@ pub fn failure(failure: &Failure, as_json: bool) {
     eprintln!("graver: {}", failure.refusal.text.trim());
     if as_json {
         let mut summary =
-            Summary::new(failure.outcome(), JobSummary::default(), MachineSummary::default());
+            Summary::new(failure.outcome, JobSummary::default(), MachineSummary::default());
         summary.error = Some(failure.summary());
         // With standard output closed there is nobody to tell.
         let _ = json(&summary);

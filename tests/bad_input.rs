@@ -64,7 +64,7 @@ fn assert_told(
     let verdict = verdict.unwrap_or_else(|_| panic!("panicked: {what}"));
     let Verdict::Refused { stage, failure } = verdict else { return false };
     let refusal = &failure.refusal;
-    assert_eq!(failure.exit, Exit::BadInput, "{what}");
+    assert_eq!(failure.exit(), Exit::BadInput, "{what}");
     assert!(!refusal.message.trim().is_empty() && !refusal.text.trim().is_empty(), "{what}");
     let file = refusal.file.as_deref().unwrap_or_else(|| panic!("{what}: no file: {refusal:?}"));
     if stage == Stage::Plan {

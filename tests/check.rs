@@ -19,8 +19,8 @@ fn check(machine: &str, more: &[&str]) -> Value {
     report
 }
 
-/// Whether the five-bar of machines/five_bar.toml comes to `(x, y)`, by the law of cosines from each
-/// motor, elbows out, with its axes' limits and margins of 0.1.
+/// Whether the five-bar of machines/five_bar.toml comes to `(x, y)`, by the law of cosines from
+/// each motor, elbows out, with its axes' limits and margins of 0.1.
 fn five_bar_reaches(x: f64, y: f64) -> bool {
     let (base, proximal, distal) = (0.05, 0.2, 0.25);
     let mut elbows = [[0.0; 2]; 2];

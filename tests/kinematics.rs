@@ -195,7 +195,8 @@ impl Golden {
         }
     }
 
-    /// Asserts that a pose is refused with the golden code; a limit names its axis and both numbers.
+    /// Asserts that a pose is refused with the golden code; a limit names its axis and both
+    /// numbers.
     fn refuses(&self, case: &Value, request: &Value) {
         let reply = &self.ask("inverse", std::slice::from_ref(request), Value::clone)[0];
         let code = case["expect"].as_str().unwrap();

@@ -179,8 +179,8 @@ fn a_stroke_marked_in_parts_has_no_step_where_the_table_was_turned_back() {
     let job = place.file("spiral.ngc", &spiral());
     let travel = "machine.axis.th2.limits.position=[\"-540 deg\", \"540 deg\"]";
     let summary = simulate(&place, "polar", &[job.to_str().unwrap(), "--set", travel]);
-    // While the table turns back for two seconds, the arm creeps by less than a count of its encoder:
-    // nothing may wind up in its loop.
+    // While the table turns back for two seconds, the arm creeps by less than a count of its
+    // encoder: nothing may wind up in its loop.
     assert_done("the spiral", &summary, 5e-6);
     assert_eq!(summary["job"]["strokes"], 3);
 }

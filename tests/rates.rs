@@ -1,4 +1,5 @@
-//! The tool while the rate changes: planner, controller and elastic plant together, in virtual time.
+//! The tool while the rate changes: planner, controller and elastic plant together, in virtual
+//! time.
 
 #![allow(clippy::unwrap_used)]
 

@@ -9,19 +9,8 @@ use std::path::Path;
 
 use monitor::recording::CycleRecord;
 use serde_json::Value;
+use signals::run_folder;
 use support::{INTERRUPT, Place, Random, TERMINATE, is_lit, lines, number, service, services};
-
-/// What a run folder holds.
-const FILES: [&str; 8] = [
-    "artwork.json",
-    "latency.hlog",
-    "path.svg",
-    "plan.json",
-    "report.html",
-    "request.json",
-    "samples.bin",
-    "summary.json",
-];
 
 /// The tool at every instant of stream time at which it was lit, in milliseconds.
 fn lit_path(records: &[CycleRecord]) -> BTreeMap<u64, [f64; 3]> {
@@ -61,7 +50,7 @@ fn the_default_job_marks_what_simulate_marks() {
     assert_eq!(summary["outcome"], "completed");
     assert_eq!((&summary["fault"], &summary["error"]), (&Value::Null, &Value::Null));
     assert_eq!(place.summary("run"), summary);
-    for file in FILES {
+    for file in run_folder::ALL.into_iter().filter(|file| *file != run_folder::REFUSAL) {
         assert!(out.join(file).metadata().is_ok_and(|file| file.len() > 0), "{file}");
     }
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
@@ -107,6 +96,11 @@ fn a_job_that_cannot_be_read_is_refused_before_anything_starts() {
 #[test]
 fn a_job_that_the_machine_cannot_do_is_refused_by_the_planner() {
     let place = Place::new();
+    // Of an earlier run in the same folder nothing stays.
+    std::fs::create_dir(place.path("run")).unwrap();
+    for file in run_folder::ALL {
+        place.file(&format!("run/{file}"), "old");
+    }
     let job = place.file("far.ngc", "G21 G90 G54\nM3 S100 F6000\nG1 X10\nG1 Y150\nM2\n");
     let ended = place.run(&job, "run", &[]).wait();
     let summary = ended.json(2);
@@ -116,6 +110,10 @@ fn a_job_that_the_machine_cannot_do_is_refused_by_the_planner() {
     assert_eq!(summary["error"]["line"], 4, "{summary}");
     assert_eq!(summary["marks"], Value::Null);
     assert_eq!(place.summary("run")["outcome"], "refused");
+    for file in run_folder::ALL {
+        let text = std::fs::read(place.path("run").join(file)).unwrap_or_default();
+        assert_ne!(text, b"old", "{file}");
+    }
     place.assert_nothing_left(&[]);
 }
 

@@ -33,7 +33,7 @@ pub fn run(
     realtime: &RealtimeOptions,
 ) -> Result<(), ServiceError> {
     let mut cycle = ServiceCycle::open(domain, machine)?;
-    // What is missing for real time is in the facts; the supervisor says it once for all.
+    // What was refused is in the facts, which travel with the reports to the summary.
     let realtime = thread::enter_realtime(realtime);
     cycle.controller.set_realtime(realtime.facts);
     cycle.wake.drain()?;

@@ -55,7 +55,7 @@ pub fn run(
     options: &ServiceOptions,
 ) -> Result<(), ServiceError> {
     let mut cycle = ServiceCycle::open(domain, port, options)?;
-    // What is missing for real time is in the facts; the supervisor says it once for all.
+    // What was refused is in the facts, which travel with the reports to the summary.
     let realtime = thread::enter_realtime(&options.realtime);
     let _core = realtime.claim_core().map_err(std::io::Error::other)?;
     let result = cycle.keep_running(realtime.spin_margin(), realtime.facts);

@@ -3,20 +3,21 @@
 //! What cannot be read or judged leaves a gap in the summary and a warning that says why; a figure
 //! that might be wrong is never given.
 
-use crate::examination::{Examination, Findings};
+use crate::examination::{Clock, Examination, Findings};
 use crate::marks::Marks;
 use crate::recording::file::{RecordingError, RecordingReader};
 use crate::report::Report;
-use crate::run_folder::{self, RunFolder};
-use crate::stage::Clock;
+use crate::run_folder::RunFolder;
 use crate::summary::{
     ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, Summary,
 };
 use machine::{Axis, Machine};
+use runtime::thread;
 use serde::{Deserialize, Serialize};
 use signals::artwork::Artwork;
+use signals::plan::PlanFacts;
 use signals::time::CYCLE_TIME;
-use signals::{ControllerReport, DrivesReport, RealtimeFacts};
+use signals::{ControllerReport, DrivesReport, RealtimeFacts, run_folder};
 use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::time::Instant;
@@ -24,9 +25,6 @@ use std::time::Instant;
 /// Cycles after the stream's last during which its light is still reported: the command acts one
 /// cycle later, and the feedback tells one after that.
 pub const LIGHT_LAG: u64 = 2;
-
-/// Name of the [`WatchNote`] in a run folder.
-pub const WATCH_FILE: &str = "monitor.json";
 
 /// Cycles that the controller counts beyond a stream's setpoints: the one that finds it at rest.
 const END_CYCLES: u64 = 1;
@@ -45,7 +43,7 @@ pub struct WatchNote {
 impl WatchNote {
     /// The note in a run folder; `None` while there is none that can be read.
     pub fn read(folder: &RunFolder) -> Option<Self> {
-        serde_json::from_slice(&fs::read(folder.file(WATCH_FILE)).ok()?).ok()
+        serde_json::from_slice(&fs::read(folder.file(run_folder::WATCH)).ok()?).ok()
     }
 
     /// Writes it into the run folder.
@@ -53,35 +51,8 @@ impl WatchNote {
     /// # Errors
     /// Whatever the operating system reports.
     pub fn write(&self, folder: &RunFolder) -> io::Result<()> {
-        folder.write(WATCH_FILE, serde_json::to_vec_pretty(self)?)
+        folder.write(run_folder::WATCH, serde_json::to_vec_pretty(self)?)
     }
-}
-
-/// The part of the planner's facts, `plan.json`, that a summary repeats.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-pub struct PlanNote {
-    /// The job's name.
-    pub name: String,
-    /// Strokes and dots.
-    pub strokes: u64,
-    /// Length to mark [m].
-    pub length: f64,
-    /// From the first motion to the last, as planned [s].
-    pub duration: f64,
-    /// Setpoints in the stream: the motion, and rest before and after it.
-    pub samples: u64,
-    /// What a person should know.
-    #[serde(default)]
-    pub notes: Vec<PlanRemark>,
-}
-
-/// A remark of the planner.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-pub struct PlanRemark {
-    /// Line of the job file from 1, 0 for none.
-    pub line: u64,
-    /// What to know.
-    pub text: String,
 }
 
 /// How a run ended, as whoever watched it knows.
@@ -113,14 +84,14 @@ pub struct Ending {
 /// `None` without a recording.
 pub fn summarise(
     machine: &Machine,
-    plan: &PlanNote,
+    plan: &PlanFacts,
     ending: &Ending,
     findings: Option<&Findings>,
     clock: Clock,
 ) -> Summary {
     let job = JobSummary {
         name: if plan.name.is_empty() { ending.job.clone() } else { plan.name.clone() },
-        strokes: plan.strokes,
+        strokes: plan.strokes as u64,
         length: plan.length,
     };
     let mut summary = Summary::new(Outcome::Aborted, job, machine_summary(machine));
@@ -145,9 +116,10 @@ pub fn summarise(
     }
     if let Some(report) = &ending.drives {
         summary.overruns = report.overruns.saturating_sub(ending.overruns_before);
-        let axes = &summary.machine.axes;
-        summary.fault = summary.fault.take().or(FaultSummary::of(&report.fault, axes));
     }
+    let faults = [ending.controller.map(|report| report.fault), ending.drives.map(|it| it.fault)];
+    summary.fault =
+        faults.iter().flatten().find_map(|fault| FaultSummary::of(fault, &machine.axes));
     summary.outcome = outcome(ending, summary.fault.is_some());
     if let Some(findings) = findings {
         summary.latency = findings.histograms.summary();
@@ -200,28 +172,13 @@ fn judged(report: Option<&ControllerReport>, findings: &Findings) -> Result<Mark
 fn realtime(ending: &Ending) -> Realtime {
     let controller = ending.controller.map(|report| report.realtime);
     let drives = ending.drives.map(|report| report.realtime);
-    let reported = [controller, drives];
-    let mut missing = Vec::new();
-    if reported.iter().flatten().any(|facts| facts.fifo == 0) {
-        missing.push(
-            "no SCHED_FIFO (allow it with `ulimit -r 90`, LimitRTPRIO=90 in a unit, or \
-             CAP_SYS_NICE)",
-        );
-    }
-    if reported.iter().flatten().any(|facts| facts.locked == 0) {
-        missing.push(
-            "no locked memory (allow it with `ulimit -l unlimited`, LimitMEMLOCK=infinity in a \
-             unit, or CAP_IPC_LOCK)",
-        );
-    }
-    let warnings = match missing.as_slice() {
-        [] => Vec::new(),
-        missing => {
-            vec![format!("controller and drives are not real-time: {}", missing.join(" and "))]
-        }
-    };
+    let reported: Vec<(&str, RealtimeFacts)> = [("controller", controller), ("drives", drives)]
+        .into_iter()
+        .filter_map(|(name, facts)| Some((name, facts?)))
+        .collect();
     // Of a thread that did not report, nothing is claimed.
     let unknown = RealtimeFacts { core: -1, ..RealtimeFacts::default() };
+    let warnings = thread::missing(&reported);
     Realtime::of(&controller.unwrap_or(unknown), &drives.unwrap_or(unknown), warnings)
 }
 
@@ -238,7 +195,7 @@ pub fn conclude(
 ) -> io::Result<Summary> {
     let began = Instant::now();
     let mut ending = ending.clone();
-    let (mut plan, mut artwork, mut findings) = (PlanNote::default(), Artwork::default(), None);
+    let (mut plan, mut artwork, mut findings) = (PlanFacts::default(), Artwork::default(), None);
     // A job that was refused has no plan: one in the folder is that of an earlier job.
     if ending.outcome != Some(Outcome::Refused) {
         let warnings = &mut ending.warnings;

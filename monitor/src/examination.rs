@@ -2,11 +2,19 @@
 //! record, in bounded memory, whether they come from a simulation or from a file.
 
 use crate::latency::HopHistograms;
-use crate::marks::{Judge, Marks, Source, Unjudged};
+use crate::marks::{Judge, Marks, Unjudged};
 use crate::recording::CycleRecord;
-use crate::stage::Clock;
 use crate::trace::Trace;
 use signals::artwork::Artwork;
+
+/// Whether the stamps in the samples are those of a real clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Clock {
+    /// They are: latencies are measured.
+    Real,
+    /// They are made up: there are no latencies.
+    Virtual,
+}
 
 /// An examination under way.
 #[derive(Debug)]
@@ -38,7 +46,7 @@ impl<'a> Examination<'a> {
     pub fn new(artwork: &'a Artwork, clock: Clock) -> Self {
         Self {
             clock,
-            judge: Judge::new(artwork, Source::Plant),
+            judge: Judge::new(artwork),
             histograms: HopHistograms::new(),
             trace: Trace::new(clock == Clock::Real),
             first: None,

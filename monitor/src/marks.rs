@@ -28,8 +28,6 @@ use tool_path::{Interval, LitSpan, Moment, ToolPath};
 pub enum Source {
     /// The simulated plant's own tool position, or a sensor at the tool.
     Plant,
-    /// Forward kinematics of the measured motor positions.
-    Feedback,
 }
 
 /// What was marked, compared with the job's geometry. Lengths in m, speeds in m/s.
@@ -82,21 +80,10 @@ pub enum Unjudged {
     },
 }
 
-/// Judges the marks of a whole recording, with the tool where drives reported it.
-///
-/// # Errors
-/// [`Unjudged`] where records are missing in between, or where the tool was not known while lit.
-pub fn judge(artwork: &Artwork, records: &[CycleRecord]) -> Result<Marks, Unjudged> {
-    let mut judge = Judge::new(artwork, Source::Plant);
-    records.iter().for_each(|record| judge.push(record));
-    judge.finish()
-}
-
 /// Judges marks record by record.
 #[derive(Debug)]
 pub struct Judge<'a> {
     artwork: &'a Artwork,
-    source: Source,
     path: ToolPath,
     newest: Option<Moment>,
     strokes: Vec<StrokeState>,
@@ -177,10 +164,9 @@ const LOST_TRACK: f64 = 2e-4;
 
 impl<'a> Judge<'a> {
     /// A judge of the marks of `artwork`, before the first record.
-    pub fn new(artwork: &'a Artwork, source: Source) -> Self {
+    pub fn new(artwork: &'a Artwork) -> Self {
         Self {
             artwork,
-            source,
             path: ToolPath::default(),
             newest: None,
             strokes: vec![StrokeState::default(); artwork.strokes.len()],
@@ -196,12 +182,6 @@ impl<'a> Judge<'a> {
     /// Takes the next record, with the tool where drives reported it.
     pub fn push(&mut self, record: &CycleRecord) {
         self.moment(Moment::of(record));
-    }
-
-    /// Takes the next record, with the tool where the caller found it by forward kinematics [m],
-    /// machine frame; `None` where they have no answer.
-    pub fn push_at(&mut self, record: &CycleRecord, tool: Option<[f64; 3]>) {
-        self.moment(Moment::new(record, tool.unwrap_or_default(), tool.is_some()));
     }
 
     /// The judgement.
@@ -233,7 +213,7 @@ impl<'a> Judge<'a> {
             double_end_max: 0.0,
             speed_min,
             speed_max,
-            source: self.source,
+            source: Source::Plant,
             strokes_lost: 0,
             stray: self.sums.stray,
         };

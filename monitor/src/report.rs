@@ -6,10 +6,11 @@ pub mod path;
 pub mod workspace;
 
 use crate::latency::HopHistograms;
-use crate::run_folder::{self, RunFolder};
+use crate::run_folder::RunFolder;
 use crate::summary::Summary;
 use crate::trace::Trace;
 use signals::artwork::Artwork;
+use signals::run_folder;
 
 /// What a report is made from.
 #[derive(Debug, Clone, Copy)]

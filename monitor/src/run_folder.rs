@@ -1,23 +1,9 @@
-//! The run folder: `runs/DATE-TIME-JOB` and the files in it.
+//! The run folder: `runs/DATE-TIME-JOB`; [`signals::run_folder`] names the files in it.
 
+use signals::run_folder;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-
-/// The summary, `docs/schema/summary.json` is its schema.
-pub const SUMMARY: &str = "summary.json";
-/// The report as one self-contained page.
-pub const REPORT: &str = "report.html";
-/// The picture of planned and marked path.
-pub const PICTURE: &str = "path.svg";
-/// Latencies as HdrHistogram interval log.
-pub const LATENCY: &str = "latency.hlog";
-/// The recorded samples.
-pub const SAMPLES: &str = "samples.bin";
-/// What was to be marked; written by the planner.
-pub const ARTWORK: &str = "artwork.json";
-/// The facts of the plan; written by the planner.
-pub const PLAN: &str = "plan.json";
 
 /// The longest part of a job's name that goes into the folder's name [characters].
 const LONGEST_NAME: usize = 40;
@@ -62,6 +48,20 @@ impl RunFolder {
                 Err(error) => return Err(error),
             }
         }
+    }
+
+    /// Removes what an earlier run left in it.
+    ///
+    /// # Errors
+    /// Whatever the operating system reports.
+    pub fn clear(&self) -> io::Result<()> {
+        for name in run_folder::ALL {
+            match fs::remove_file(self.file(name)) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// Where it is.
@@ -124,9 +124,23 @@ mod tests {
         let second = RunFolder::create_named(below.path(), "20260101-120000-N").unwrap();
         assert_ne!(first, second);
         assert!(second.path().ends_with("20260101-120000-N-2"));
-        second.write(SUMMARY, "{}").unwrap();
-        assert_eq!(fs::read_to_string(second.file(SUMMARY)).unwrap(), "{}");
+        second.write(run_folder::SUMMARY, "{}").unwrap();
+        assert_eq!(fs::read_to_string(second.file(run_folder::SUMMARY)).unwrap(), "{}");
         assert_eq!(fs::read_dir(second.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_cleared_folder_keeps_only_what_is_not_of_a_run() {
+        let below = tempfile::tempdir().unwrap();
+        let folder = RunFolder::create_at(below.path()).unwrap();
+        for name in run_folder::ALL.into_iter().chain(["notes.txt"]) {
+            folder.write(name, "old").unwrap();
+        }
+        folder.clear().unwrap();
+        let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|file| file.unwrap()).collect();
+        assert_eq!(left.len(), 1);
+        assert_eq!(left[0].file_name(), "notes.txt");
+        folder.clear().unwrap();
     }
 
     #[test]

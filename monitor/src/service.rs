@@ -7,13 +7,13 @@
 use crate::conclusion::{self, Ending, LIGHT_LAG, WatchNote};
 use crate::latency::IntervalLog;
 use crate::recording::file::RecordingWriter;
-use crate::run_folder::{self, RunFolder};
-use crate::stage::{Clock, Inputs, MonitorStage, Outputs};
+use crate::run_folder::RunFolder;
+use crate::stage::{Inputs, MonitorStage, Outputs};
 use crate::summary::{ErrorSummary, Outcome};
 use machine::Machine;
 use runtime::peer::{PeerState, Peers};
 use runtime::{Domain, Reading, Role, ServiceError, Subscriber, signal};
-use signals::{Command, ControllerReport, DrivesReport, Feedback, JobOffer};
+use signals::{Command, ControllerReport, DrivesReport, Feedback, JobOffer, run_folder};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -182,7 +182,7 @@ impl Recording {
         let log = BufWriter::new(File::create(folder.file(run_folder::LATENCY))?);
         Ok(Self {
             stream,
-            stage: MonitorStage::new(Clock::Real),
+            stage: MonitorStage::new(),
             outputs: Outputs::default(),
             writer: RecordingWriter::new(samples)?,
             log: IntervalLog::new(log, SystemTime::now())?,
@@ -251,7 +251,6 @@ impl Recording {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::conclusion::WATCH_FILE;
     use crate::recording::file::RecordingReader;
     use signals::{Cycle, Nanoseconds};
     use std::io::BufReader;
@@ -324,7 +323,7 @@ mod tests {
         // One look after a second away, and one that comes too late for three samples.
         take(&mut recording, 0, 1000, STREAM);
         take(&mut recording, 1003, 1500, STREAM);
-        assert!(!folder.file(WATCH_FILE).exists());
+        assert!(!folder.file(run_folder::WATCH).exists());
         recording.finish().unwrap();
         let note = WatchNote { stream: STREAM, records: 1497, lost: 3 };
         assert_eq!(WatchNote::read(&folder), Some(note));

@@ -1,19 +1,12 @@
-//! The monitor as a stage: takes the samples of all channels, keeps what the run folder needs.
-//! Pure; the service around it moves samples and writes files.
+//! The monitor as a stage beside a running pipeline: pairs the samples of two channels into records
+//! and measures their latencies. Pure; the service around it moves samples and writes files.
+//!
+//! What a run's records tell beyond that is an [`Examination`](crate::examination::Examination),
+//! made of the whole recording when the run has ended.
 
 use crate::latency::HopHistograms;
 use crate::recording::{CycleRecord, Recorder};
-use crate::trace::Trace;
 use signals::{Command, Feedback};
-
-/// Whether the stamps in the samples are those of a real clock.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Clock {
-    /// They are: latencies are measured.
-    Real,
-    /// They are made up: there are no latencies.
-    Virtual,
-}
 
 /// The samples that arrived since the last step, each kind in order.
 #[derive(Debug, Clone, Copy, Default)]
@@ -27,28 +20,21 @@ pub struct Inputs<'a> {
 /// What a step completed.
 #[derive(Debug, Default)]
 pub struct Outputs {
-    /// Records in order of their cycle, for the recording and the judge.
+    /// Records in order of their cycle, for the recording.
     pub records: Vec<CycleRecord>,
 }
 
-/// Everything that the monitor keeps of one run.
+/// What the monitor keeps while it watches a run.
 #[derive(Debug)]
 pub struct MonitorStage {
-    clock: Clock,
     recorder: Recorder,
     histograms: HopHistograms,
-    trace: Trace,
 }
 
 impl MonitorStage {
     /// A stage that has seen nothing.
-    pub fn new(clock: Clock) -> Self {
-        Self {
-            clock,
-            recorder: Recorder::new(),
-            histograms: HopHistograms::new(),
-            trace: Trace::new(clock == Clock::Real),
-        }
+    pub fn new() -> Self {
+        Self { recorder: Recorder::new(), histograms: HopHistograms::new() }
     }
 
     /// Takes samples; `outputs` is overwritten.
@@ -64,17 +50,11 @@ impl MonitorStage {
     pub fn finish(&mut self, outputs: &mut Outputs) {
         self.recorder.finish();
         self.pass_on(outputs);
-        self.trace.finish();
     }
 
     fn pass_on(&mut self, outputs: &mut Outputs) {
         outputs.records = self.recorder.take();
-        for record in &outputs.records {
-            if self.clock == Clock::Real {
-                self.histograms.push(record);
-            }
-            self.trace.push(record);
-        }
+        outputs.records.iter().for_each(|record| self.histograms.push(record));
     }
 
     /// Samples known to be lost: with any, the marks must not be judged.
@@ -91,9 +71,10 @@ impl MonitorStage {
     pub fn histograms_mut(&mut self) -> &mut HopHistograms {
         &mut self.histograms
     }
+}
 
-    /// What the report draws.
-    pub fn trace(&self) -> &Trace {
-        &self.trace
+impl Default for MonitorStage {
+    fn default() -> Self {
+        Self::new()
     }
 }

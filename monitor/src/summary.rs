@@ -3,14 +3,17 @@
 //! The names and their meaning are what users' scripts rely on; further keys may be added.
 //! SI units and radians, latencies in nanoseconds.
 
+pub mod fault;
 pub mod text;
 
 use crate::latency::HopLatency;
 use crate::marks::Marks;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use signals::{ControllerReport, Fault, RealtimeFacts};
+use signals::{ControllerReport, RealtimeFacts};
 use std::collections::BTreeMap;
+
+pub use fault::FaultSummary;
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -29,17 +32,6 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The exit code of the process: 0 completed, 1 stopped, 2 refused, 3 faulted, 4 aborted.
-    pub fn exit_code(self) -> u8 {
-        match self {
-            Self::Completed => 0,
-            Self::Stopped => 1,
-            Self::Refused => 2,
-            Self::Faulted => 3,
-            Self::Aborted => 4,
-        }
-    }
-
     /// The name in the summary.
     pub fn name(self) -> &'static str {
         match self {
@@ -96,30 +88,6 @@ pub struct Summary {
     /// What a person should know, each said once.
     #[serde(default)]
     pub warnings: Vec<String>,
-}
-
-/// A fault as summaries tell it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct FaultSummary {
-    /// The code, such as `following_error`.
-    pub code: String,
-    /// The axis by name; null when it belongs to none.
-    pub axis: Option<String>,
-    /// What was found, with value and limit.
-    pub detail: String,
-}
-
-impl FaultSummary {
-    /// The summary of a fault, with the axes' names; `None` when there is none.
-    pub fn of(fault: &Fault, axes: &[String]) -> Option<Self> {
-        let axis = (fault.axis as usize).checked_sub(1).and_then(|index| axes.get(index)).cloned();
-        let detail = if fault.limit == 0.0 {
-            format!("value {:.6}", fault.value)
-        } else {
-            format!("{:.6} against a limit of {:.6}", fault.value, fault.limit)
-        };
-        fault.is_some().then(|| Self { code: fault.code().name().to_owned(), axis, detail })
-    }
 }
 
 /// An error in a file, or of a service.
@@ -270,7 +238,6 @@ impl Summary {
             path_acceleration: report.path_acceleration_use,
             path_jerk: report.path_jerk_use,
         };
-        self.fault = self.fault.take().or(FaultSummary::of(&report.fault, &self.machine.axes));
     }
 
     /// The JSON schema of the summary, as committed in `docs/schema/summary.json`.
@@ -283,7 +250,6 @@ impl Summary {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use signals::FaultCode;
 
     fn summary() -> Summary {
         let machine = MachineSummary {
@@ -340,31 +306,18 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_names_axis_value_and_limit() {
+    fn a_mean_is_over_the_samples_behind_it() {
         let mut report = ControllerReport { count: 4, ..ControllerReport::default() };
         report.following_error_squares[1] = 1.0;
-        report.fault = Fault {
-            code: FaultCode::FollowingError as u32,
-            axis: 2,
-            value: 0.0021,
-            limit: 0.002,
-            ..Fault::default()
-        };
         let mut summary = summary();
         summary.take_controller(&report);
         assert_eq!(summary.following_error.rms, [0.0, 0.5]);
-        let fault = summary.fault.unwrap();
-        assert_eq!((fault.code.as_str(), fault.axis.as_deref()), ("following_error", Some("b")));
-        assert_eq!(fault.detail, "0.002100 against a limit of 0.002000");
     }
 
     #[test]
-    fn outcomes_have_the_documented_exit_codes() {
+    fn outcomes_are_written_by_their_names() {
         use Outcome::*;
-        for (outcome, code) in
-            [(Completed, 0), (Stopped, 1), (Refused, 2), (Faulted, 3), (Aborted, 4)]
-        {
-            assert_eq!(outcome.exit_code(), code);
+        for outcome in [Completed, Stopped, Refused, Faulted, Aborted] {
             assert_eq!(serde_json::to_value(outcome).unwrap(), outcome.name());
         }
     }

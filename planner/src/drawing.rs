@@ -6,6 +6,8 @@
 use nalgebra::Vector3;
 use signals::math;
 
+pub use signals::plan::Note;
+
 /// A job as geometry: what to mark and how to get there, in order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
@@ -17,15 +19,6 @@ pub struct Drawing {
     pub steps: Vec<Step>,
     /// Things a person should know, each said once.
     pub notes: Vec<Note>,
-}
-
-/// One remark on a job, such as a code that was accepted without effect.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
-pub struct Note {
-    /// Line of the job file from 1, 0 for none.
-    pub line: u64,
-    /// What to know.
-    pub text: String,
 }
 
 /// One step of a drawing and the line of the job file that asked for it (from 1, 0 for none).

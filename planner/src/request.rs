@@ -33,18 +33,6 @@ pub struct Refusal {
     pub text: String,
 }
 
-/// Name of the request in a run folder.
-pub const REQUEST_FILE: &str = "request.json";
-
-/// Name of the refusal in a run folder.
-pub const REFUSAL_FILE: &str = "refused.json";
-
-/// Name of the artwork in a run folder.
-pub const ARTWORK_FILE: &str = "artwork.json";
-
-/// Name of the plan's facts in a run folder.
-pub const PLAN_FILE: &str = "plan.json";
-
 impl JobRequest {
     /// The same job by a path that holds from any folder.
     #[must_use]

@@ -8,7 +8,6 @@ use std::fmt::Debug;
 use std::marker::PhantomData;
 
 use iceoryx2::node::Node;
-use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{
     AttributeSpecifier, AttributeVerifier, BackpressureStrategy, ZeroCopySend, ipc,
 };
@@ -270,12 +269,6 @@ impl<T: Channel> Publisher<T> {
         }
         Ok(readers > 0)
     }
-
-    /// Hands the newest sample to readers that came since the last publish; for channels that are
-    /// rarely published. Not for a cycle: attaching a reader takes up to half a millisecond.
-    pub fn refresh(&self) -> Result<(), ChannelError> {
-        self.port.update_connections().map_err(|_| lost::<T>())
-    }
 }
 
 /// The reading end of a channel.
@@ -285,7 +278,6 @@ pub struct Subscriber<T: Channel> {
     origin: Option<u128>,
     serial: u64,
     lost: u64,
-    epoch: u32,
     _sample: PhantomData<T>,
     _keep: Keep,
 }
@@ -308,15 +300,7 @@ impl<T: Channel> Subscriber<T> {
             .create()
             .map_err(refused::<T>)?;
         let keep = domain.keep();
-        Ok(Self {
-            port,
-            origin: None,
-            serial: 0,
-            lost: 0,
-            epoch: 0,
-            _sample: PhantomData,
-            _keep: keep,
-        })
+        Ok(Self { port, origin: None, serial: 0, lost: 0, _sample: PhantomData, _keep: keep })
     }
 
     /// The next sample, if one waits. Does not allocate.
@@ -328,7 +312,6 @@ impl<T: Channel> Subscriber<T> {
             self.lost += serial.saturating_sub(self.serial + 1);
         } else {
             self.origin = origin;
-            self.epoch += 1;
         }
         self.serial = serial;
         Ok(Some(sample.payload().0))
@@ -347,11 +330,5 @@ impl<T: Channel> Subscriber<T> {
     /// first sample on.
     pub fn lost(&self) -> u64 {
         self.lost
-    }
-
-    /// How many publishers this reader has heard: 0 before the first sample, and one more whenever
-    /// the publisher is a new one.
-    pub fn epoch(&self) -> u32 {
-        self.epoch
     }
 }

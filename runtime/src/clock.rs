@@ -28,8 +28,8 @@ pub(crate) fn timespec(time: Nanoseconds) -> libc::timespec {
     libc::timespec { tv_sec: time.0 / SECOND, tv_nsec: time.0 % SECOND }
 }
 
-/// Sleeps until `deadline` on the monotonic clock; at once when it has passed. Goes on sleeping after a
-/// signal.
+/// Sleeps until `deadline` on the monotonic clock; at once when it has passed. Goes on sleeping
+/// after a signal.
 pub fn sleep_until(deadline: Nanoseconds) {
     let until = timespec(Nanoseconds(deadline.0.max(0)));
     loop {
@@ -64,16 +64,14 @@ pub struct PeriodicClock {
     period: Nanoseconds,
     margin: Nanoseconds,
     deadline: Nanoseconds,
-    cycle: u64,
-    overruns: u64,
 }
 
 impl PeriodicClock {
-    /// A clock whose cycle 0 has its deadline one period from now.
+    /// A clock whose first deadline is one period from now.
     ///
     /// `margin` is how long before a deadline the sleep ends and spinning begins, 0 for none.
     pub fn new(period: Nanoseconds, margin: Nanoseconds) -> Self {
-        Self { period, margin, deadline: now() + period, cycle: 0, overruns: 0 }
+        Self { period, margin, deadline: now() + period }
     }
 
     /// The deadline that is next, or at which [`Self::wait`] returned last until
@@ -82,40 +80,22 @@ impl PeriodicClock {
         self.deadline
     }
 
-    /// The cycle that begins at [`Self::deadline`].
-    pub fn cycle(&self) -> u64 {
-        self.cycle
-    }
-
-    /// The period.
-    pub fn period(&self) -> Nanoseconds {
-        self.period
-    }
-
-    /// Cycles so far whose work had not ended at the next deadline, slips included.
-    pub fn overruns(&self) -> u64 {
-        self.overruns
-    }
-
-    /// Sleeps until the deadline. One that has passed already counts as an overrun and is met at
-    /// once: cycles are late then, but none is left out.
-    pub fn wait(&mut self) {
-        if now() >= self.deadline {
-            self.overruns += 1;
-        } else {
+    /// Sleeps until the deadline. One that has passed already is met at once: cycles are late then,
+    /// but none is left out.
+    pub fn wait(&self) {
+        if now() < self.deadline {
             sleep_then_spin_until(self.deadline, self.margin);
         }
     }
 
     /// Goes on to the next cycle; returns its deadline.
     pub fn advance(&mut self) -> Nanoseconds {
-        self.cycle += 1;
         self.deadline = self.deadline + self.period;
         self.deadline
     }
 
     /// Moves this and all later deadlines so that this one is not before now: for drives that can
-    /// wait. Returns by how much, 0 when nothing had passed; does not count an overrun.
+    /// wait. Returns by how much, 0 when nothing had passed.
     pub fn slip(&mut self) -> Nanoseconds {
         let late = Nanoseconds((now() - self.deadline).0.max(0));
         self.deadline = self.deadline + late;
@@ -145,7 +125,6 @@ mod tests {
         let mut clock = PeriodicClock::new(MILLISECOND, Nanoseconds(0));
         let start = clock.deadline();
         for cycle in 0..20 {
-            assert_eq!(clock.cycle(), cycle);
             assert_eq!(clock.deadline(), start + Nanoseconds(cycle as i64 * MILLISECOND.0));
             clock.wait();
             assert!(now() >= clock.deadline());
@@ -154,17 +133,17 @@ mod tests {
     }
 
     #[test]
-    fn a_passed_deadline_is_an_overrun_and_no_cycle_is_left_out() {
+    fn after_a_late_cycle_the_passed_deadlines_are_met_at_once_and_none_is_left_out() {
         let mut clock = PeriodicClock::new(MILLISECOND, Nanoseconds(0));
         let start = clock.deadline();
         // Five deadlines pass during the work of the first cycle.
         clock.wait();
         sleep_until(start + Nanoseconds(5 * MILLISECOND.0));
         for cycle in 1..=5 {
-            let before = clock.overruns();
-            clock.advance();
+            assert_eq!(clock.advance(), start + Nanoseconds(cycle * MILLISECOND.0));
+            let before = now();
             clock.wait();
-            assert_eq!((clock.cycle(), clock.overruns()), (cycle, before + 1));
+            assert!(before >= clock.deadline(), "cycle {cycle} waited");
         }
     }
 
@@ -173,12 +152,10 @@ mod tests {
         let mut clock = PeriodicClock::new(MILLISECOND, Nanoseconds(0));
         let start = clock.deadline();
         sleep_until(start + Nanoseconds(3 * MILLISECOND.0));
-        let overruns = clock.overruns();
         let late = clock.slip();
         assert!(late.0 >= 3 * MILLISECOND.0);
         assert_eq!(clock.deadline(), start + late);
         assert_eq!(clock.advance(), start + late + MILLISECOND);
-        assert_eq!((clock.cycle(), clock.overruns()), (1, overruns));
 
         let mut early = PeriodicClock::new(Nanoseconds(1_000_000_000_000), Nanoseconds(0));
         assert_eq!(early.slip(), Nanoseconds(0));

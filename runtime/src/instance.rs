@@ -17,7 +17,7 @@ const MAX_SOCKET_PATH: usize = 108;
 /// Hexadecimal digits of the hash in all names: 48 bits.
 const HASH_DIGITS: usize = 12;
 
-/// Room that the longest socket needs below the root directory [bytes]: iceoryx2 0.10 puts its
+/// Room that the longest socket needs below the root directory, in bytes: iceoryx2 0.10 puts its
 /// event sockets at `/PREFIX`, up to 39 digits of a port's 128-bit number, `.event`.
 const SOCKET_ROOM: usize = 1 + "graver__".len() + HASH_DIGITS + 39 + ".event".len();
 

@@ -9,19 +9,19 @@
 //! [`thread::enter_realtime`], then the cycle. After that nothing here allocates, except the one
 //! small block inside iceoryx2 for each [`Publisher::publish`](channel::Publisher::publish).
 
+#![deny(rustdoc::broken_intra_doc_links)]
+
 pub mod allocation;
 pub mod channel;
 pub mod child;
 pub mod clock;
 pub mod core_lock;
 pub mod domain;
-pub mod event_ring;
 pub mod instance;
 mod lock;
 mod membership;
 pub mod operator;
 pub mod peer;
-pub mod period;
 pub mod service;
 pub mod signal;
 pub mod socket;

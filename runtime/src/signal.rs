@@ -46,21 +46,3 @@ pub fn termination() -> Option<Termination> {
         count => Some(Termination { signal: LAST.load(Ordering::Relaxed), count }),
     }
 }
-
-/// Keeps SIGINT and SIGTERM away from the calling thread; another thread of the process gets them.
-pub fn block() -> io::Result<()> {
-    // SAFETY: `set` is initialised by sigemptyset before anything reads it, and the old mask is
-    // not asked for.
-    #[allow(unsafe_code)]
-    let result = unsafe {
-        let mut set: libc::sigset_t = std::mem::zeroed();
-        libc::sigemptyset(&mut set);
-        libc::sigaddset(&mut set, libc::SIGINT);
-        libc::sigaddset(&mut set, libc::SIGTERM);
-        libc::pthread_sigmask(libc::SIG_BLOCK, &set, std::ptr::null_mut())
-    };
-    match result {
-        0 => Ok(()),
-        code => Err(io::Error::from_raw_os_error(code)),
-    }
-}

@@ -1,7 +1,8 @@
 //! Making the calling thread real-time, as far as this computer and user allow.
 //!
-//! Nothing here fails: without privileges the pipeline runs all the same, and what is missing is
-//! said once, with the way to get it.
+//! Nothing here fails: without privileges the pipeline runs all the same. What was refused is in
+//! the facts, which travel with the reports; whoever concludes a run says it once, with the way to
+//! get it ([`missing()`]).
 //!
 //! A SCHED_FIFO thread that never sleeps is stopped by the kernel for 50 ms every second (real-time
 //! throttling), so a cycle may spin only briefly before its deadline.
@@ -10,10 +11,15 @@ use std::fs::File;
 use std::io::{self, Write};
 
 use core_affinity::CoreId;
+use signals::report::refused;
 use signals::{Nanoseconds, RealtimeFacts};
 
 use crate::clock::SPIN_MARGIN;
 use crate::core_lock::{CoreError, CoreLock};
+
+mod missing;
+
+pub use missing::missing;
 
 /// Priority of the drives' cycle, above the controller on the same core.
 pub const DRIVES_PRIORITY: i32 = 85;
@@ -39,8 +45,6 @@ pub enum Placement {
     Automatic,
     /// This CPU.
     Core(usize),
-    /// Wherever the scheduler likes.
-    Anywhere,
 }
 
 /// What a thread asks for.
@@ -59,8 +63,6 @@ pub struct RealtimeOptions {
 pub struct Realtime {
     /// The facts, as reports carry them.
     pub facts: RealtimeFacts,
-    /// What is missing and how to get it, one sentence each.
-    pub warnings: Vec<String>,
     /// While open, the CPUs stay out of deep sleep states.
     _awake: Option<File>,
 }
@@ -94,51 +96,56 @@ pub fn last_core() -> usize {
 /// Makes the calling thread real-time. All ports, helper threads and peers must be there already:
 /// threads made later share its core, and memory mapped later is locked page by page.
 pub fn enter_realtime(options: &RealtimeOptions) -> Realtime {
-    let mut warnings = Vec::new();
     let mut facts = RealtimeFacts { core: -1, ..RealtimeFacts::default() };
-
     if options.lock_memory {
         keep_heap();
-        match lock_memory() {
-            Ok(()) => facts.locked = 1,
-            Err(reason) => warnings.push(reason),
-        }
+        lock_memory(&mut facts);
         touch_stack();
     }
     if let Some(priority) = options.priority {
-        match set_fifo(priority) {
-            Ok(()) => {
-                facts.fifo = 1;
-                facts.priority = priority as u32;
-            }
-            Err(error) => warnings.push(format!(
-                "no real-time priority (SCHED_FIFO {priority}: {error}): expect late cycles under \
-                 load; allow it with `LimitRTPRIO=99` in the unit, or the line `USER - rtprio 99` \
-                 in /etc/security/limits.conf and a new login"
-            )),
-        }
+        take_priority(priority, &mut facts);
     }
     let core = match options.placement {
         Placement::Automatic => (facts.fifo == 1).then(last_core),
         Placement::Core(core) => Some(core),
-        Placement::Anywhere => None,
     };
     if let Some(core) = core {
-        // Numbers beyond the mask's size would make it panic.
-        let possible = core < libc::CPU_SETSIZE as usize;
-        if possible && core_affinity::set_for_current(CoreId { id: core }) {
-            facts.core = core as i32;
-        } else {
-            warnings.push(format!(
-                "not pinned to CPU {core}: this process may use CPUs up to {}; name another core, \
-                 or widen the unit's CPUAffinity",
-                last_core()
-            ));
-        }
+        pin(core, &mut facts);
     }
     tighten_timers();
     let awake = (facts.fifo == 1).then(forbid_deep_sleep).and_then(Result::ok);
-    Realtime { facts, warnings, _awake: awake }
+    Realtime { facts, _awake: awake }
+}
+
+fn take_priority(priority: i32, facts: &mut RealtimeFacts) {
+    facts.asked_priority = priority.unsigned_abs();
+    match set_fifo(priority) {
+        Ok(()) => {
+            facts.fifo = 1;
+            facts.priority = facts.asked_priority;
+        }
+        Err(error) => {
+            facts.refused |= refused::PRIORITY;
+            facts.priority_error = number_of(&error);
+        }
+    }
+}
+
+fn pin(core: usize, facts: &mut RealtimeFacts) {
+    // Numbers beyond the mask's size would make it panic.
+    let possible = core < libc::CPU_SETSIZE as usize;
+    if possible && core_affinity::set_for_current(CoreId { id: core }) {
+        facts.core = core as i32;
+    } else {
+        facts.refused |= refused::CORE;
+        facts.asked_core = u32::try_from(core).unwrap_or(u32::MAX);
+        facts.last_core = last_core() as u32;
+    }
+}
+
+/// The operating system's number of an error, as the facts carry it.
+fn number_of(error: &io::Error) -> u32 {
+    error.raw_os_error().map_or(0, i32::unsigned_abs)
 }
 
 /// SCHED_FIFO for the calling thread; threads and processes that it starts are ordinary again.
@@ -154,34 +161,33 @@ fn set_fifo(priority: i32) -> io::Result<()> {
 }
 
 /// Locks the memory, unless the limit says that a later allocation would be refused for it.
-fn lock_memory() -> Result<(), String> {
+fn lock_memory(facts: &mut RealtimeFacts) {
     let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
     // SAFETY: `limit` is a valid rlimit for the kernel to fill.
     #[allow(unsafe_code)]
     let known = unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &mut limit) } == 0;
     let needed = virtual_memory() + HEADROOM;
     let unlimited = limit.rlim_cur == libc::RLIM_INFINITY || capable(CAP_IPC_LOCK);
-    if known && !unlimited && limit.rlim_cur < needed {
-        return Err(format!(
-            "memory is not locked: the limit is {} MiB and this process needs {} MiB: expect page \
-             faults in a cycle; raise it with `LimitMEMLOCK=infinity` in the unit, or the line \
-             `USER - memlock unlimited` in /etc/security/limits.conf and a new login",
-            limit.rlim_cur >> 20,
-            needed >> 20,
-        ));
-    }
-    // SAFETY: mlockall takes only flags.
-    #[allow(unsafe_code)]
-    match unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } {
-        0 => Ok(()),
-        _ => Err(format!(
-            "memory is not locked: {}; expect page faults in a cycle",
-            io::Error::last_os_error()
-        )),
-    }
+    let error = if known && !unlimited && limit.rlim_cur < needed {
+        0
+    } else {
+        // SAFETY: mlockall takes only flags.
+        #[allow(unsafe_code)]
+        match unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } {
+            0 => {
+                facts.locked = 1;
+                return;
+            }
+            _ => number_of(&io::Error::last_os_error()),
+        }
+    };
+    facts.refused |= refused::MEMORY;
+    facts.memory_error = error;
+    facts.memory_limit = limit.rlim_cur;
+    facts.memory_needed = needed;
 }
 
-/// The address space of this process [bytes], which is what the lock limit is compared with.
+/// The address space of this process in bytes, which is what the lock limit is compared with.
 fn virtual_memory() -> u64 {
     let pages = std::fs::read_to_string("/proc/self/statm")
         .ok()
@@ -247,39 +253,36 @@ mod tests {
 
     use super::*;
 
+    fn entered(options: RealtimeOptions) -> Realtime {
+        std::thread::spawn(move || enter_realtime(&options)).join().unwrap()
+    }
+
     #[test]
-    fn a_thread_that_asks_for_nothing_gets_no_warning() {
-        let options =
-            RealtimeOptions { priority: None, placement: Placement::Automatic, lock_memory: false };
-        let realtime = std::thread::spawn(move || enter_realtime(&options)).join().unwrap();
+    fn a_thread_that_asks_for_nothing_is_refused_nothing() {
+        let placement = Placement::Automatic;
+        let realtime = entered(RealtimeOptions { priority: None, placement, lock_memory: false });
         assert_eq!(realtime.facts, RealtimeFacts { core: -1, ..RealtimeFacts::default() });
-        assert_eq!(realtime.warnings, Vec::<String>::new());
         assert!(realtime.claim_core().unwrap().is_none());
         assert_eq!(realtime.spin_margin(), Nanoseconds(0));
     }
 
     #[test]
-    fn whatever_is_missing_is_said() {
-        let options = RealtimeOptions {
-            priority: Some(CONTROLLER_PRIORITY),
-            placement: Placement::Core(last_core()),
-            lock_memory: false,
-        };
-        let realtime = std::thread::spawn(move || enter_realtime(&options)).join().unwrap();
-        assert_eq!(realtime.facts.core, last_core() as i32);
-        assert_eq!(realtime.facts.priority, 80 * realtime.facts.fifo);
-        assert_eq!(realtime.warnings.len(), usize::from(realtime.facts.fifo == 0));
+    fn what_is_asked_for_is_got_or_refused_with_a_reason() {
+        let priority = Some(CONTROLLER_PRIORITY);
+        let placement = Placement::Core(last_core());
+        let facts = entered(RealtimeOptions { priority, placement, lock_memory: false }).facts;
+        assert_eq!(facts.core, last_core() as i32);
+        assert_eq!((facts.asked_priority, facts.priority), (80, 80 * facts.fifo));
+        assert_eq!(facts.refused, refused::PRIORITY * (1 - facts.fifo));
+        assert_eq!(facts.priority_error == 0, facts.fifo == 1);
     }
 
     #[test]
-    fn a_cpu_that_does_not_exist_is_named() {
-        let options = RealtimeOptions {
-            priority: None,
-            placement: Placement::Core(100_000),
-            lock_memory: false,
-        };
-        let realtime = std::thread::spawn(move || enter_realtime(&options)).join().unwrap();
-        assert_eq!(realtime.facts.core, -1);
-        assert!(realtime.warnings[0].starts_with("not pinned to CPU 100000"));
+    fn a_cpu_that_does_not_exist_is_refused() {
+        let placement = Placement::Core(100_000);
+        let facts =
+            entered(RealtimeOptions { priority: None, placement, lock_memory: false }).facts;
+        assert_eq!((facts.core, facts.refused), (-1, refused::CORE));
+        assert_eq!((facts.asked_core, facts.last_core), (100_000, last_core() as u32));
     }
 }

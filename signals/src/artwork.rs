@@ -1,6 +1,6 @@
 //! What a job wants marked, in the machine frame: the measure of what was marked.
 //!
-//! The one thing here that is not a fixed-size sample: the planner writes it as `artwork.json`
+//! Not a fixed-size sample, like [`plan`](crate::plan): the planner writes it as `artwork.json`
 //! into the run folder, and whoever judges the marks reads it there.
 
 use serde::{Deserialize, Serialize};

@@ -207,7 +207,7 @@ impl FaultQuantity {
             Self::Lag => ("rotor from its magnetic axis", Plain("rad")),
             Self::PulseRate => ("pulse rate", Plain("1/s")),
             Self::Number => ("number in a sample", Plain("")),
-            Self::Cycles => ("cycles", Plain("")),
+            Self::Cycles => ("cycles gone by", Plain("")),
             Self::Overruns => ("overruns in a row", Plain("")),
             Self::Losses => ("times that light was lost in one place", Plain("")),
             Self::Edges => ("gate edges in a cycle", Plain("")),

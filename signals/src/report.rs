@@ -2,9 +2,19 @@
 
 use crate::{AxisArray, Cycle, Fault, sample};
 
+/// Bits of [`RealtimeFacts::refused`].
+pub mod refused {
+    /// SCHED_FIFO with the priority asked for.
+    pub const PRIORITY: u32 = 1;
+    /// Locking the process's memory.
+    pub const MEMORY: u32 = 1 << 1;
+    /// Pinning to the CPU asked for.
+    pub const CORE: u32 = 1 << 2;
+}
+
 sample! {
-    /// Facts of a stage's real-time set-up.
-    RealtimeFacts = "graver.RealtimeFacts.v1" {
+    /// Facts of a stage's real-time set-up: what its thread got, and what it asked for in vain.
+    RealtimeFacts = "graver.RealtimeFacts.v2" {
         /// 1 when the thread runs under SCHED_FIFO, 0 otherwise.
         fifo: u32,
         /// Its priority, 0 without SCHED_FIFO.
@@ -13,6 +23,23 @@ sample! {
         core: i32,
         /// 1 when memory is locked.
         locked: u32,
+        /// What was asked for and refused: bits of [`refused`].
+        refused: u32,
+        /// The priority asked for, 1..=99; 0 when the ordinary scheduler was asked for.
+        asked_priority: u32,
+        /// The operating system's error number for a refused priority.
+        priority_error: u32,
+        /// The operating system's error number for memory that is not locked; 0 when it was not
+        /// asked, because `memory_needed` is above `memory_limit`.
+        memory_error: u32,
+        /// The CPU that was refused.
+        asked_core: u32,
+        /// The last CPU that the process may use, when one was refused.
+        last_core: u32,
+        /// What the process may lock [bytes], when locking was refused.
+        memory_limit: u64,
+        /// What it has to lock [bytes], when locking was refused.
+        memory_needed: u64,
     }
 }
 

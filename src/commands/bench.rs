@@ -6,17 +6,17 @@ use crate::pipeline::configuration::Configuration;
 use crate::pipeline::{LOOK, Pipeline, Starter};
 use crate::{inputs, output};
 use drives::PlantOptions;
-use monitor::conclusion::{Ending, PlanNote, summarise};
-use monitor::examination::Findings;
-use monitor::latency::{HopHistograms, HopLatency};
-use monitor::recording::Recorder;
-use monitor::stage::Clock;
+use monitor::conclusion::{Ending, summarise};
+use monitor::examination::{Clock, Findings};
+use monitor::latency::HopLatency;
+use monitor::stage::{Inputs, MonitorStage, Outputs};
 use monitor::summary::Realtime;
 use planner::request::JobRequest;
 use runtime::{Domain, Instance, Reading, Role, Subscriber, signal};
 use serde::Serialize;
+use signals::plan::PlanFacts;
 use signals::time::CYCLE_TIME;
-use signals::{Command, Feedback, OperatorVerb, PlannerPhase};
+use signals::{Command, Feedback, OperatorVerb, PlannerPhase, run_folder};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::time::{Duration, Instant};
@@ -52,7 +52,7 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Exit, Failure> {
     let request =
         inputs::job_request(None, &input.machine, input.folder.as_deref(), &input.job_overrides)
             .absolute();
-    let configuration = Configuration::new(&arguments.machine, &arguments.drives)?;
+    let configuration = Configuration::new(input.source.clone(), &arguments.drives)?;
     let mut pipeline = Pipeline::start(&instance, configuration, Starter::Own)?;
     let folder = std::env::temp_dir().join(format!("graver-{name}"));
     let measured = std::fs::create_dir_all(&folder)
@@ -72,18 +72,18 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     let ending = Ending {
-        controller: Some(heard.controller),
+        controller: Some(heard.controller).filter(|report| report.stream != 0),
         drives: Some(heard.drives),
         ..Ending::default()
     };
     let summary =
-        summarise(&input.machine, &PlanNote::default(), &ending, None::<&Findings>, Clock::Real);
+        summarise(&input.machine, &PlanFacts::default(), &ending, None::<&Findings>, Clock::Real);
     let report = LatencyReport {
         seconds: arguments.seconds,
         cycles: measured.periods.len() as u64,
         overruns: heard.drives.overruns,
         missed: heard.drives.missed,
-        latency: measured.histograms.summary(),
+        latency: measured.stage.histograms().summary(),
         period_error: measured.period_error(),
         realtime: summary.realtime,
     };
@@ -126,7 +126,7 @@ fn print_latency(report: &LatencyReport) {
 }
 
 struct Measured {
-    histograms: HopHistograms,
+    stage: MonitorStage,
     /// Periods of the drives' clock [ns].
     periods: Vec<i64>,
 }
@@ -163,14 +163,15 @@ fn measure(
     seconds: f64,
 ) -> Result<Measured, Failure> {
     let text = serde_json::to_vec(request).map_err(Failure::service)?;
-    std::fs::write(folder.join(planner::request::REQUEST_FILE), text).map_err(Failure::service)?;
+    std::fs::write(folder.join(run_folder::REQUEST), text).map_err(Failure::service)?;
     let observer = Domain::join(instance, Role::Observer).map_err(Failure::service)?;
     let mut feedbacks: Subscriber<Feedback> =
         observer.subscriber(Reading::Every).map_err(Failure::service)?;
     let mut commands: Subscriber<Command> =
         observer.subscriber(Reading::Every).map_err(Failure::service)?;
-    let mut recorder = Recorder::new();
-    let mut measured = Measured { histograms: HopHistograms::new(), periods: Vec::new() };
+    let (mut feedback_batch, mut command_batch) = (Vec::new(), Vec::new());
+    let mut outputs = Outputs::default();
+    let mut measured = Measured { stage: MonitorStage::new(), periods: Vec::new() };
     let mut previous: Option<Feedback> = None;
     let mut stream = 0;
     let mut started_stream = 0;
@@ -190,6 +191,8 @@ fn measure(
             pipeline.ask(OperatorVerb::Start, stream as f64);
             started_stream = stream;
         }
+        feedback_batch.clear();
+        command_batch.clear();
         while let Some(feedback) = feedbacks.receive().map_err(Failure::service)? {
             if let Some(previous) = previous
                 && feedback.cycle == previous.cycle.next()
@@ -197,14 +200,13 @@ fn measure(
                 measured.periods.push((feedback.measured - previous.measured).0);
             }
             previous = Some(feedback);
-            recorder.feedback(&feedback);
+            feedback_batch.push(feedback);
         }
         while let Some(command) = commands.receive().map_err(Failure::service)? {
-            recorder.command(&command);
+            command_batch.push(command);
         }
-        for record in recorder.take() {
-            measured.histograms.push(&record);
-        }
+        let inputs = Inputs { feedbacks: &feedback_batch, commands: &command_batch };
+        measured.stage.step(&inputs, &mut outputs);
         std::thread::sleep(LOOK);
     }
     Ok(measured)

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod check;
+pub mod export;
 pub mod kinematics;
 pub mod manual;
 pub mod operator;

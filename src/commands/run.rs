@@ -30,7 +30,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     );
     // Read here only to refuse early; the planner reads it again.
     let job = request.read(&input.machine)?;
-    let configuration = Configuration::new(&arguments.machine, &arguments.drives)?;
+    let configuration = Configuration::new(input.source, &arguments.drives)?;
     let mut pipeline = Pipeline::start(&instance, configuration, Starter::Own)?;
     let folder = run_folder(arguments.out.as_deref(), &job.drawing.name)?;
     let request = request.absolute();
@@ -55,8 +55,8 @@ fn run_folder(out: Option<&Path>, job: &str) -> Result<RunFolder, Failure> {
 pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
     signal::install().map_err(Failure::service)?;
     let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
-    inputs::machine(&arguments.machine)?;
-    let configuration = Configuration::new(&arguments.machine, &arguments.drives)?;
+    let source = inputs::machine(&arguments.machine)?.source;
+    let configuration = Configuration::new(source, &arguments.drives)?;
     let mut pipeline = Pipeline::start(&instance, configuration, Starter::Others)?;
     eprintln!("graver: instance {} waits for its services and jobs", instance.name());
     while signal::termination().is_none() {

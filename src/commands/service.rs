@@ -19,15 +19,15 @@ pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
     let domain = Domain::join(&instance, role).map_err(Failure::service)?;
     let configuration = Configuration::read(&instance).map_err(Failure::service)?;
     match role {
-        Role::Planner => planner::service::run(&domain, &configuration.machine()?),
-        Role::Monitor => monitor::service::run(&domain, &configuration.machine()?),
+        Role::Planner => planner::service::run(&domain, &configuration.source.machine()?),
+        Role::Monitor => monitor::service::run(&domain, &configuration.source.machine()?),
         Role::Controller => {
             let realtime = configuration.realtime_options(CONTROLLER_PRIORITY);
-            controller::service::run(&domain, &configuration.machine()?, &realtime)
+            controller::service::run(&domain, &configuration.source.machine()?, &realtime)
         }
         Role::Drives => {
             let Driven::Simulated = configuration.drives;
-            let port = SimulatedPlant::new(&configuration.plant()?, PlantOptions::default())
+            let port = SimulatedPlant::new(&configuration.source.plant()?, PlantOptions::default())
                 .map_err(Failure::bad_input)?;
             let options = drives::service::ServiceOptions {
                 deadlines: configuration.deadlines(),

@@ -5,12 +5,11 @@ use crate::exit::{Exit, Failure};
 use crate::simulation::simulate;
 use crate::{inputs, output};
 use drives::PlantOptions;
-use monitor::conclusion::{self, Ending, PlanNote, PlanRemark};
-use monitor::examination::Examination;
+use monitor::conclusion::{self, Ending};
+use monitor::examination::{Clock, Examination};
 use monitor::recording::file::RecordingWriter;
-use monitor::run_folder::{self, RunFolder};
-use monitor::stage::Clock;
-use planner::Plan;
+use monitor::run_folder::RunFolder;
+use signals::run_folder;
 use signals::time::CYCLE_TIME;
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -34,6 +33,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
 
     let folder = arguments.out.as_deref().map(RunFolder::create_at).transpose();
     let folder = folder.map_err(Failure::service)?;
+    folder.as_ref().map_or(Ok(()), RunFolder::clear).map_err(Failure::service)?;
     let mut writer = folder.as_ref().map(recording).transpose().map_err(Failure::service)?;
     let mut failed: io::Result<()> = Ok(());
     let mut examination = Examination::new(&plan.artwork, Clock::Virtual);
@@ -60,9 +60,9 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
         realtime_factor: Some(time / simulated.stepping.as_secs_f64()),
         ..Ending::default()
     };
-    let note = plan_note(&plan);
+    let (machine, facts) = (&input.machine, &plan.facts);
     let mut summary =
-        conclusion::summarise(&input.machine, &note, &ending, Some(&findings), Clock::Virtual);
+        conclusion::summarise(machine, facts, &ending, Some(&findings), Clock::Virtual);
     summary.report_time = examining.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
     if let Some(folder) = &folder {
@@ -76,20 +76,4 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
 
 fn recording(folder: &RunFolder) -> io::Result<RecordingWriter<BufWriter<File>>> {
     RecordingWriter::new(BufWriter::new(File::create(folder.file(run_folder::SAMPLES))?))
-}
-
-fn plan_note(plan: &Plan) -> PlanNote {
-    let facts = &plan.facts;
-    PlanNote {
-        name: facts.name.clone(),
-        strokes: facts.strokes as u64,
-        length: facts.length,
-        duration: facts.duration,
-        samples: facts.samples,
-        notes: facts
-            .notes
-            .iter()
-            .map(|note| PlanRemark { line: note.line, text: note.text.clone() })
-            .collect(),
-    }
 }

@@ -1,11 +1,10 @@
 //! What the domain's holder tells the services: one file in the domain's root, so that all of
 //! them are built from the same machine.
 
-use crate::arguments::{DrivesArguments, DrivesKind, MachineArguments};
+use crate::arguments::{DrivesArguments, DrivesKind};
 use crate::exit::Failure;
-use crate::inputs::Overrides;
+use crate::inputs::MachineSource;
 use drives::Deadlines;
-use machine::Machine;
 use runtime::Instance;
 use runtime::thread::{Placement, RealtimeOptions, last_core};
 use serde::{Deserialize, Serialize};
@@ -13,13 +12,11 @@ use std::path::PathBuf;
 
 const FILE: &str = "configuration.json";
 
-/// The machine file as it was read, and how the services shall run.
+/// What the services are built from, and how they shall run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Configuration {
-    /// The machine file with its text; `None` for the built-in machine.
-    pub machine: Option<MachineText>,
-    /// The values of `--set`.
-    pub set: Vec<String>,
+    /// What machine and plant are built from.
+    pub source: MachineSource,
     /// What is driven.
     pub drives: Driven,
     /// Whether no deadline may slip.
@@ -28,15 +25,6 @@ pub struct Configuration {
     pub core: Option<usize>,
     /// Whether to ask for real-time scheduling.
     pub realtime: bool,
-}
-
-/// A machine file.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct MachineText {
-    /// Where it is.
-    pub file: PathBuf,
-    /// What it says.
-    pub text: String,
 }
 
 /// What is driven.
@@ -50,8 +38,8 @@ impl Configuration {
     /// The configuration that the command line asks for.
     ///
     /// # Errors
-    /// A machine file that cannot be read, or a CPU that is not there.
-    pub fn new(machine: &MachineArguments, drives: &DrivesArguments) -> Result<Self, Failure> {
+    /// A CPU that is not there.
+    pub fn new(source: MachineSource, drives: &DrivesArguments) -> Result<Self, Failure> {
         if let Some(core) = drives.core
             && core > last_core()
         {
@@ -60,18 +48,8 @@ impl Configuration {
                 last_core()
             )));
         }
-        let machine_text = match &machine.machine {
-            None => None,
-            Some(path) => {
-                let text = std::fs::read_to_string(path)
-                    .map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))?;
-                let file = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-                Some(MachineText { file, text })
-            }
-        };
         Ok(Self {
-            machine: machine_text,
-            set: machine.set.clone(),
+            source,
             drives: match drives.drives {
                 DrivesKind::Sim => Driven::Simulated,
             },
@@ -95,34 +73,6 @@ impl Configuration {
     /// Whatever the operating system reports.
     pub fn read(instance: &Instance) -> std::io::Result<Self> {
         Ok(serde_json::from_slice(&std::fs::read(path(instance))?)?)
-    }
-
-    /// The machine that is planned for and controlled.
-    ///
-    /// # Errors
-    /// A machine file or an override that does not hold.
-    pub fn machine(&self) -> Result<Machine, Failure> {
-        self.parse(&Overrides::sort(&self.set)?.machine)
-    }
-
-    /// The machine that is simulated.
-    ///
-    /// # Errors
-    /// A machine file or an override that does not hold.
-    pub fn plant(&self) -> Result<Machine, Failure> {
-        let sorted = Overrides::sort(&self.set)?;
-        let both: Vec<_> = sorted.machine.into_iter().chain(sorted.plant).collect();
-        self.parse(&both)
-    }
-
-    fn parse(&self, overrides: &[machine::document::Override]) -> Result<Machine, Failure> {
-        match &self.machine {
-            Some(MachineText { file, text }) => {
-                Machine::parse(&file.to_string_lossy(), text, overrides)
-            }
-            None => Machine::builtin_with(overrides),
-        }
-        .map_err(Failure::from)
     }
 
     /// Whether the clock may slip.

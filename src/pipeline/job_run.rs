@@ -5,13 +5,13 @@ use super::services::{Ended, Remedy};
 use super::{LOOK, Pipeline, Starter};
 use crate::exit::{Failure, error_summary};
 use crate::output::ProgressLine;
-use monitor::conclusion::{self, Ending, WATCH_FILE};
-use monitor::run_folder::{self, RunFolder};
+use monitor::conclusion::{self, Ending};
+use monitor::run_folder::RunFolder;
 use monitor::summary::{ErrorSummary, Outcome, Summary};
-use planner::request::{JobRequest, REFUSAL_FILE, REQUEST_FILE, Refusal};
+use planner::request::{JobRequest, Refusal};
 use runtime::domain::Role;
 use runtime::signal;
-use signals::{DrivesReport, FaultCode, OperatorVerb, PlannerPhase};
+use signals::{DrivesReport, FaultCode, OperatorVerb, PlannerPhase, run_folder};
 use std::time::{Duration, Instant};
 
 /// How long the controller may take to bring the axes to rest and say so.
@@ -49,7 +49,7 @@ pub struct JobRun<'a> {
 }
 
 impl<'a> JobRun<'a> {
-    /// Offers the job to the planner; its run folder must exist.
+    /// Offers the job to the planner; its run folder must exist and is cleared.
     ///
     /// # Errors
     /// A folder that cannot be written, or a channel that fails.
@@ -60,21 +60,9 @@ impl<'a> JobRun<'a> {
         started: Instant,
         submission: Option<Submission>,
     ) -> Result<Self, Failure> {
+        folder.clear().map_err(Failure::service)?;
         let request = serde_json::to_vec_pretty(job).map_err(Failure::service)?;
-        folder.write(REQUEST_FILE, request).map_err(Failure::service)?;
-        for stale in [
-            REFUSAL_FILE,
-            WATCH_FILE,
-            run_folder::SAMPLES,
-            run_folder::ARTWORK,
-            run_folder::PLAN,
-            run_folder::SUMMARY,
-            run_folder::REPORT,
-            run_folder::PICTURE,
-        ] {
-            // What an earlier run left in the same folder is not ours.
-            let _ = std::fs::remove_file(folder.file(stale));
-        }
+        folder.write(run_folder::REQUEST, request).map_err(Failure::service)?;
         let path = std::path::absolute(folder.path()).map_err(Failure::service)?;
         let stream = pipeline.offer(&path.to_string_lossy())?;
         let name = job_name(job);
@@ -246,7 +234,8 @@ impl<'a> JobRun<'a> {
     }
 
     fn refuse(&mut self) -> Result<(), Failure> {
-        let text = std::fs::read(self.folder.file(REFUSAL_FILE)).map_err(Failure::service)?;
+        let text =
+            std::fs::read(self.folder.file(run_folder::REFUSAL)).map_err(Failure::service)?;
         let refusal: Refusal = serde_json::from_slice(&text).map_err(Failure::service)?;
         eprintln!("graver: {}", refusal.text.trim());
         self.ending.outcome = Some(Outcome::Refused);
@@ -262,7 +251,7 @@ impl<'a> JobRun<'a> {
             self.await_recording();
         }
         self.ending.drives = Some(self.drives_with_cause());
-        let machine = self.pipeline.configuration.machine()?;
+        let machine = self.pipeline.configuration.source.machine()?;
         let summary = conclusion::conclude(&self.folder, &machine, &self.ending, self.started)
             .map_err(Failure::service)?;
         self.pipeline.board.name_job(None);
@@ -292,7 +281,7 @@ impl<'a> JobRun<'a> {
     /// Waits until the monitor has written all of it, as long as there is one.
     fn await_recording(&mut self) {
         let since = Instant::now();
-        while !self.folder.file(WATCH_FILE).exists()
+        while !self.folder.file(run_folder::WATCH).exists()
             && since.elapsed() < WATCH_PATIENCE
             && self.pipeline.has(Role::Monitor)
         {

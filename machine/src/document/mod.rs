@@ -68,12 +68,20 @@ impl Document {
     /// # Errors
     /// Where it cannot be read, is not UTF-8, or is not TOML.
     pub fn read(path: &Path) -> Result<Self, DocumentError> {
+        Self::parse(&path.display().to_string(), &Self::text(path)?)
+    }
+
+    /// The text of the file at `path`, for [`Self::parse`].
+    ///
+    /// # Errors
+    /// Where it cannot be read, or is not UTF-8.
+    pub fn text(path: &Path) -> Result<String, DocumentError> {
         let name = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|error| {
             DocumentError::unreadable(&name, format!("cannot be read: {error}"))
         })?;
         match String::from_utf8(bytes) {
-            Ok(text) => Self::parse(&name, &text),
+            Ok(text) => Ok(text),
             Err(error) => {
                 let valid = error.utf8_error().valid_up_to();
                 let text = String::from_utf8_lossy(error.as_bytes()).into_owned();

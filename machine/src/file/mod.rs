@@ -29,21 +29,18 @@ impl Machine {
     }
 
     /// The machine that is simulated where it differs from the one that is controlled: the machine
-    /// file at `path`, or the built-in one, with `overrides` and then those of the `plant` alone
-    /// laid over it.
+    /// file of this name and text, or the built-in one, with `overrides` and then those of the
+    /// `plant` alone laid over it.
     ///
     /// # Errors
     /// As [`Self::load`].
     pub fn simulated(
-        path: Option<&Path>,
+        file: Option<(&str, &str)>,
         overrides: &[Override],
         plant: &[Override],
     ) -> Result<Self, DocumentError> {
-        let document = match path {
-            Some(path) => Document::read(path)?,
-            None => Document::parse(crate::machine::BUILTIN_NAME, crate::machine::BUILTIN)?,
-        };
-        let document = document.override_with(overrides, PREFIX)?;
+        let (name, text) = file.unwrap_or((crate::machine::BUILTIN_NAME, crate::machine::BUILTIN));
+        let document = Document::parse(name, text)?.override_with(overrides, PREFIX)?;
         validate::machine(document.override_with(plant, PLANT_PREFIX)?)
     }
 

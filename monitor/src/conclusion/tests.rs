@@ -6,6 +6,8 @@ use crate::recording::CycleRecord;
 use crate::recording::file::RecordingWriter;
 use signals::artwork::Stroke;
 use signals::feedback::status;
+use signals::plan::Note;
+use signals::report::refused;
 use signals::{Command, Cycle, Fault, FaultCode, Feedback, LaserCycle, Nanoseconds};
 
 /// The first cycle that is played, and the last.
@@ -59,17 +61,18 @@ fn report() -> ControllerReport {
     }
 }
 
-fn plan() -> PlanNote {
-    PlanNote {
+fn plan() -> PlanFacts {
+    PlanFacts {
         name: "line".into(),
         strokes: 1,
         length: LENGTH,
         duration: 0.08,
         samples: 99,
         notes: vec![
-            PlanRemark { line: 0, text: "everywhere".into() },
-            PlanRemark { line: 7, text: "here".into() },
+            Note { line: 0, text: "everywhere".into() },
+            Note { line: 7, text: "here".into() },
         ],
+        ..PlanFacts::default()
     }
 }
 
@@ -198,17 +201,32 @@ fn real_time_is_claimed_and_missed_only_as_reported() {
         };
         summarise(&machine, &plan(), &ending, None, Clock::Real).realtime
     };
-    let good = RealtimeFacts { fifo: 1, priority: 80, core: 1, locked: 1 };
-    let plain = RealtimeFacts { core: -1, ..RealtimeFacts::default() };
+    let none = RealtimeFacts { core: -1, asked_priority: 80, ..RealtimeFacts::default() };
+    let good = RealtimeFacts { fifo: 1, priority: 80, core: 1, locked: 1, ..none };
+    let bare = RealtimeFacts {
+        refused: refused::PRIORITY | refused::MEMORY | refused::CORE,
+        priority_error: 1,
+        memory_limit: 8 << 20,
+        memory_needed: 300 << 20,
+        asked_core: 3,
+        ..none
+    };
 
     let both = of(Some(good), Some(good));
     assert_eq!((both.scheduler.as_str(), both.priority, both.locked), ("fifo", 80, true));
     assert_eq!((both.cores.len(), both.warnings.len()), (2, 0));
-    let one = of(Some(good), Some(plain));
+    let one = of(Some(good), Some(bare));
     assert_eq!((one.scheduler.as_str(), one.priority, one.locked), ("other", 0, false));
     assert_eq!(one.cores.keys().collect::<Vec<_>>(), ["controller"]);
-    assert_eq!(one.warnings.len(), 1, "{:?}", one.warnings);
-    assert!(["SCHED_FIFO", "locked memory"].iter().all(|what| one.warnings[0].contains(what)));
+    let expect = [
+        "no real-time priority for drives (SCHED_FIFO 80: Operation not permitted",
+        "memory is not locked for drives (the limit is 8 MiB, 300 MiB are needed)",
+        "not pinned: drives to CPU 3",
+    ];
+    assert_eq!(one.warnings.len(), expect.len(), "{:?}", one.warnings);
+    for (warning, expect) in one.warnings.iter().zip(expect) {
+        assert!(warning.starts_with(expect), "{warning}");
+    }
     // A refused job: the controller had nothing to report.
     let refused = of(None, Some(good));
     assert_eq!(refused.cores.keys().collect::<Vec<_>>(), ["drives"]);
@@ -222,11 +240,8 @@ fn real_time_is_claimed_and_missed_only_as_reported() {
 fn folder(below: &tempfile::TempDir, records: &[CycleRecord]) -> RunFolder {
     let folder = RunFolder::create_at(below.path()).unwrap();
     folder.write(run_folder::ARTWORK, serde_json::to_vec(&artwork()).unwrap()).unwrap();
-    // The planner says more than a summary repeats.
-    let plan = r#"{
-        "name": "line", "strokes": 1, "length": 0.02, "duration": 0.08, "samples": 99,
-        "speed": 0.25, "notes": [{"line": 7, "text": "here"}], "uses": {"path_speed": 0.5}
-    }"#;
+    let notes = vec![Note { line: 7, text: "here".into() }];
+    let plan = serde_json::to_vec(&PlanFacts { notes, ..plan() }).unwrap();
     folder.write(run_folder::PLAN, plan).unwrap();
     let mut writer = RecordingWriter::new(Vec::new()).unwrap();
     writer.write(records).unwrap();
@@ -317,6 +332,6 @@ fn the_note_of_a_recording_is_read_as_it_was_written() {
     let note = WatchNote { stream: 3, records: 4711, lost: 2 };
     note.write(&folder).unwrap();
     assert_eq!(WatchNote::read(&folder), Some(note));
-    folder.write(WATCH_FILE, "{\"stream\": 3").unwrap();
+    folder.write(run_folder::WATCH, "{\"stream\": 3").unwrap();
     assert_eq!(WatchNote::read(&folder), None);
 }

@@ -8,6 +8,13 @@ use signals::{Command, Cycle, Feedback, GateEdge, LaserCycle, Nanoseconds, Sampl
 
 type Point = [f64; 3];
 
+/// Judges the marks of a whole recording.
+fn judge(artwork: &Artwork, records: &[CycleRecord]) -> Result<Marks, Unjudged> {
+    let mut judge = Judge::new(artwork);
+    records.iter().for_each(|record| judge.push(record));
+    judge.finish()
+}
+
 const SPEED: f64 = 0.25;
 
 /// A plan by time [s]: where the tool is, which stroke has light, if any.
@@ -401,20 +408,6 @@ fn rather_no_judgement_than_a_wrong_one() {
     let mut blind = records;
     blind[60].feedback.status = 0;
     assert_eq!(judge(&one_line(), &blind), Err(Unjudged::ToolUnknown { cycle: FIRST + 60 }));
-}
-
-#[test]
-fn kinematics_can_tell_where_the_tool_was() {
-    let art = one_line();
-    let mut judge = Judge::new(&art, Source::Feedback);
-    for record in play(&one_plan(), |_, tool| tool, |_, _| 0.0) {
-        let mut blind = record;
-        blind.feedback.status = 0;
-        judge.push_at(&blind, Some(record.feedback.tool));
-    }
-    let marks = judge.finish().unwrap();
-    near(marks.missing, 0.0, ROUNDING, "missing");
-    assert_eq!(marks.source, Source::Feedback);
 }
 
 /// A closed figure of eight: it crosses itself, and ends where it starts.

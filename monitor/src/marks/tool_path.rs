@@ -30,24 +30,18 @@ pub struct Moment {
 }
 
 impl Moment {
-    /// The moment of a record, with the tool where the caller found it [m].
-    pub fn new(record: &CycleRecord, tool: [f64; 3], tool_known: bool) -> Self {
+    /// The moment of a record, with the tool as drives reported it.
+    pub fn of(record: &CycleRecord) -> Self {
         let CycleRecord { feedback, command } = record;
         Self {
             cycle: feedback.cycle.0,
-            tool: Vector3::from(tool),
-            tool_known,
+            tool: Vector3::from(feedback.tool),
+            tool_known: feedback.has(status::TOOL_KNOWN),
             planned: record.is_answered().then(|| Vector3::from(command.tool)),
             laser: feedback.laser,
             stroke: command.stroke,
             in_force: (feedback.command_received.0 != 0).then_some(feedback.command_cycle.0),
         }
-    }
-
-    /// The moment of a record with the tool as drives reported it.
-    pub fn of(record: &CycleRecord) -> Self {
-        let known = record.feedback.has(status::TOOL_KNOWN);
-        Self::new(record, record.feedback.tool, known)
     }
 }
 
@@ -212,7 +206,8 @@ impl LitSpans {
 
     /// Share of the cycle that is lit, 0..=1.
     pub fn share(&self) -> f64 {
-        self.as_slice().iter().map(|span| span.to - span.from).sum()
+        // An empty sum of floats is −0, which a table would show.
+        self.as_slice().iter().fold(0.0, |share, span| share + (span.to - span.from))
     }
 }
 

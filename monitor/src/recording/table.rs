@@ -1,66 +1,139 @@
-//! `samples.csv`: the records as a table that any spreadsheet reads. SI units and radians.
+//! A recording as a table of comma-separated values that any spreadsheet reads. SI units and
+//! radians.
 
 use super::CycleRecord;
 use crate::trace::lit_share;
+use signals::MAX_AXES;
+use signals::feedback::status;
 use std::io::{self, Write};
 
-/// Writes one line per record under a line of column names.
+/// Writes one line a record under a line of column names.
 ///
-/// `axes` are the names of the machine's axes; samples carry no more of them than
-/// [`signals::MAX_AXES`]. Per axis: reference and position [rad], current [A] measured, voltage [V]
-/// commanded. `lit` is the share of the finished cycle in which the laser marked, 0..=1.
+/// `cycle` counts from the start of drives; `stream_time` [s], `rate` and `stroke` are the
+/// command's. `lit` is the share of the cycle before in which the laser marked, 0..=1; `tool_x`,
+/// `tool_y`, `tool_z` and `planned_…` are places in the machine frame [m]. Then per axis reference
+/// and position at the motor [rad], current measured [A] and voltage commanded, in volts.
 ///
-/// # Errors
-/// Whatever the writer reports.
-pub fn write_table<'a>(
-    writer: &mut impl Write,
-    axes: &[String],
-    records: impl IntoIterator<Item = &'a CycleRecord>,
-) -> io::Result<()> {
-    write!(writer, "cycle,stream_time,rate,stroke,lit,tool_x,tool_y,tool_z")?;
-    write!(writer, ",planned_x,planned_y,planned_z")?;
-    for axis in axes {
-        write!(writer, ",{axis}_reference,{axis}_position,{axis}_current,{axis}_voltage")?;
+/// What was not known is an empty field: the command's in a cycle that the controller did not
+/// answer, the tool's without a tool position.
+#[derive(Debug)]
+pub struct TableWriter<W: Write> {
+    writer: W,
+    axes: usize,
+}
+
+impl<W: Write> TableWriter<W> {
+    /// Writes the column names to `writer`, which should be buffered. `axes` are the names of the
+    /// machine's axes; those beyond [`MAX_AXES`], which samples do not carry, are left out.
+    ///
+    /// # Errors
+    /// Whatever the writer reports.
+    pub fn new(mut writer: W, axes: &[String]) -> io::Result<Self> {
+        write!(writer, "cycle,stream_time,rate,stroke,lit,tool_x,tool_y,tool_z")?;
+        write!(writer, ",planned_x,planned_y,planned_z")?;
+        for axis in axes.iter().take(MAX_AXES) {
+            write!(writer, ",{axis}_reference,{axis}_position,{axis}_current,{axis}_voltage")?;
+        }
+        writeln!(writer)?;
+        Ok(Self { writer, axes: axes.len().min(MAX_AXES) })
     }
-    writeln!(writer)?;
-    for CycleRecord { feedback, command } in records {
-        let lit = lit_share(&feedback.laser);
-        write!(writer, "{},{},{}", feedback.cycle.0, command.stream_time, command.rate)?;
-        write!(writer, ",{},{lit}", command.stroke)?;
-        for value in feedback.tool.iter().chain(&command.tool) {
-            write!(writer, ",{value}")?;
+
+    /// Appends a record.
+    ///
+    /// # Errors
+    /// Whatever the writer reports.
+    pub fn write(&mut self, record: &CycleRecord) -> io::Result<()> {
+        let CycleRecord { feedback, command } = record;
+        let answered = record.is_answered();
+        write!(self.writer, "{}", feedback.cycle.0)?;
+        self.field(answered, command.stream_time)?;
+        self.field(answered, command.rate)?;
+        self.field(answered, command.stroke)?;
+        self.field(true, lit_share(&feedback.laser))?;
+        for value in feedback.tool {
+            self.field(feedback.has(status::TOOL_KNOWN), value)?;
+        }
+        for value in command.tool {
+            self.field(answered, value)?;
         }
         let columns = command
             .reference
             .iter()
             .zip(&feedback.position)
             .zip(feedback.current.iter().zip(&command.voltage));
-        for (_, ((reference, position), (current, voltage))) in axes.iter().zip(columns) {
-            write!(writer, ",{reference},{position},{current},{voltage}")?;
+        for ((reference, position), (current, voltage)) in columns.take(self.axes) {
+            self.field(answered, reference)?;
+            self.field(true, position)?;
+            self.field(true, current)?;
+            self.field(answered, voltage)?;
         }
-        writeln!(writer)?;
+        writeln!(self.writer)
     }
-    Ok(())
+
+    /// Flushes.
+    ///
+    /// # Errors
+    /// Whatever the writer reports.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+
+    fn field(&mut self, known: bool, value: impl std::fmt::Display) -> io::Result<()> {
+        if known { write!(self.writer, ",{value}") } else { write!(self.writer, ",") }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use signals::{Command, Cycle};
     use zerocopy::FromZeros;
+
+    fn table(records: &[CycleRecord]) -> Vec<Vec<String>> {
+        let mut text = Vec::new();
+        let mut table = TableWriter::new(&mut text, &["x".into(), "y".into()]).unwrap();
+        records.iter().for_each(|record| table.write(record).unwrap());
+        table.finish().unwrap();
+        let text = String::from_utf8(text).unwrap();
+        text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
+    }
+
+    fn column(lines: &[Vec<String>], line: usize, name: &str) -> String {
+        let column = lines[0].iter().position(|column| column == name).unwrap();
+        lines[line][column].clone()
+    }
 
     #[test]
     fn every_line_has_the_columns_of_the_first() {
         let mut record = CycleRecord::new_zeroed();
+        record.feedback.cycle = Cycle(7);
+        record.feedback.status = status::TOOL_KNOWN;
         record.feedback.tool = [0.1, 0.2, 0.0];
+        record.command = Command { cycle: Cycle(7), rate: 0.5, ..Command::default() };
         record.command.voltage[1] = -3.5;
-        let mut text = Vec::new();
-        write_table(&mut text, &["x".into(), "y".into()], &[record, record]).unwrap();
-        let text = String::from_utf8(text).unwrap();
-        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        let lines = table(&[record, record]);
         assert_eq!(lines.len(), 3);
-        assert!(lines.iter().all(|line| line.len() == 19), "{text}");
-        let column = lines[0].iter().position(|name| *name == "y_voltage").unwrap();
-        assert_eq!(lines[2][column], "-3.5");
+        assert!(lines.iter().all(|line| line.len() == 19), "{lines:?}");
+        for (name, value) in [("cycle", "7"), ("rate", "0.5"), ("tool_y", "0.2")] {
+            assert_eq!(column(&lines, 1, name), value);
+        }
+        assert_eq!(column(&lines, 2, "y_voltage"), "-3.5");
+    }
+
+    #[test]
+    fn what_was_not_known_is_empty() {
+        let mut record = CycleRecord::new_zeroed();
+        record.feedback.cycle = Cycle(7);
+        record.feedback.position[1] = 1.25;
+        let lines = table(&[record]);
+        assert_eq!(lines[1].len(), lines[0].len());
+        for name in ["stream_time", "stroke", "tool_x", "planned_z", "x_reference", "y_voltage"] {
+            assert_eq!(column(&lines, 1, name), "", "{name}");
+        }
+        assert_eq!(
+            (column(&lines, 1, "y_position"), column(&lines, 1, "lit")),
+            ("1.25".into(), "0".into())
+        );
     }
 }

@@ -2,10 +2,9 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
+use crate::examination::{Clock, Examination};
 use crate::latency::IntervalLog;
-use crate::marks;
-use crate::recording::CycleRecord;
-use crate::stage::{Clock, Inputs, MonitorStage, Outputs};
+use crate::stage::{Inputs, MonitorStage, Outputs};
 use crate::summary::{JobSummary, MachineSummary, Outcome};
 use signals::artwork::Stroke;
 use signals::feedback::status;
@@ -92,18 +91,20 @@ fn samples(cycles: u64) -> (Vec<Feedback>, Vec<Command>) {
 #[test]
 fn the_page_shows_the_run_and_needs_no_network() {
     let (feedbacks, commands) = samples(1000);
-    let mut stage = MonitorStage::new(Clock::Real);
+    let mut stage = MonitorStage::new();
     let mut outputs = Outputs::default();
-    let mut records: Vec<CycleRecord> = Vec::new();
+    let artwork = artwork();
+    let mut examination = Examination::new(&artwork, Clock::Real);
+    let mut count = 0;
     for (feedbacks, commands) in feedbacks.chunks(100).zip(commands.chunks(100)) {
         stage.step(&Inputs { feedbacks, commands }, &mut outputs);
-        records.extend(&outputs.records);
+        count += outputs.records.len();
+        outputs.records.iter().for_each(|record| examination.push(record));
     }
     stage.finish(&mut outputs);
-    records.extend(&outputs.records);
-    assert_eq!((records.len(), stage.lost()), (1000, 0));
+    assert_eq!((count, outputs.records.len(), stage.lost()), (1000, 0, 0));
 
-    let artwork = artwork();
+    let findings = examination.finish();
     let machine = MachineSummary {
         name: "sample <machine>".into(),
         mechanism: "corexy".into(),
@@ -111,15 +112,16 @@ fn the_page_shows_the_run_and_needs_no_network() {
     };
     let job = JobSummary { name: "circle & cross".into(), strokes: 2, length: artwork.length() };
     let mut summary = Summary::new(Outcome::Completed, job, machine);
-    summary.marks = Some(marks::judge(&artwork, &records).unwrap());
-    summary.latency = stage.histograms().summary();
-    summary.warnings.push("no SCHED_FIFO: see graver doctor".into());
+    summary.marks = Some(findings.marks.unwrap());
+    summary.latency = findings.histograms.summary();
+    assert_eq!(stage.histograms().summary(), summary.latency);
+    summary.warnings.push("memory is not locked".into());
     let report = Report {
         summary: &summary,
         artwork: &artwork,
-        trace: stage.trace(),
+        trace: &findings.trace,
         torque_constants: &[0.0136, 0.0136],
-        histograms: stage.histograms(),
+        histograms: &findings.histograms,
     };
     // To look at the files: GRAVER_KEEP_REPORT=folder cargo test -p monitor
     let temporary = tempfile::tempdir().unwrap();
@@ -153,14 +155,14 @@ fn the_page_shows_the_run_and_needs_no_network() {
 #[test]
 fn a_run_without_marks_has_a_report_too() {
     let summary = Summary::new(Outcome::Aborted, JobSummary::default(), MachineSummary::default());
-    let stage = MonitorStage::new(Clock::Virtual);
     let artwork = Artwork::default();
+    let findings = Examination::new(&artwork, Clock::Virtual).finish();
     let report = Report {
         summary: &summary,
         artwork: &artwork,
-        trace: stage.trace(),
+        trace: &findings.trace,
         torque_constants: &[],
-        histograms: stage.histograms(),
+        histograms: &findings.histograms,
     };
     assert!(report.picture().unwrap().contains("nothing was marked"));
     assert!(report.page().unwrap().contains("aborted"));

@@ -81,8 +81,8 @@ impl Workspace<'_> {
         vec![(left, below), (right, below), (right, above), (left, above), (left, below)]
     }
 
-    /// Paints what is of one kind, runs of a row at once, each place as wide as the grid, cut off at
-    /// the area's edge.
+    /// Paints what is of one kind, runs of a row at once, each place as wide as the grid, cut off
+    /// at the area's edge.
     fn fill<'b>(
         &self,
         chart: &mut Plane<'b>,

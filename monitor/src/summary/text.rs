@@ -1,6 +1,7 @@
 //! The summary as a person reads it: aligned lines, in millimetres, micrometres and microseconds.
 
-use super::Summary;
+use super::{Realtime, Summary};
+use crate::marks::Marks;
 use std::fmt::Write;
 
 /// Width of the column of names.
@@ -23,135 +24,145 @@ pub fn latency(nanoseconds: u64) -> String {
 /// The rows of the summary, name and value, those without a value left out; the report shows the
 /// same.
 pub fn rows(summary: &Summary) -> Vec<(String, String)> {
-    let mut rows = Vec::new();
-    let mut row = |name: &str, value: String| {
+    let mut rows = Rows::default();
+    rows.ending(summary);
+    rows.job(summary);
+    rows.times(summary);
+    rows.marks(summary.marks.as_ref());
+    rows.axes(summary);
+    rows.cycles(summary);
+    rows.realtime(&summary.realtime);
+    rows.rest(summary);
+    rows.0
+}
+
+/// Rows by section, in the order in which they are read.
+#[derive(Default)]
+struct Rows(Vec<(String, String)>);
+
+impl Rows {
+    fn add(&mut self, name: &str, value: impl Into<String>) {
+        let value = value.into();
         if !value.is_empty() {
-            rows.push((name.to_owned(), value));
+            self.0.push((name.to_owned(), value));
         }
-    };
-    let Summary { job, machine, limits, realtime, .. } = summary;
-    row("outcome", summary.outcome.name().to_owned());
-    if let Some(fault) = &summary.fault {
-        let axis = fault.axis.as_ref().map(|axis| format!(" of axis {axis}")).unwrap_or_default();
-        row("fault", format!("{}{axis}: {}", fault.code, fault.detail));
     }
-    if let Some(error) = &summary.error {
-        row("error", error.message.clone());
+
+    fn ending(&mut self, summary: &Summary) {
+        self.add("outcome", summary.outcome.name());
+        if let Some(fault) = &summary.fault {
+            let axis =
+                fault.axis.as_ref().map(|axis| format!(" of axis {axis}")).unwrap_or_default();
+            self.add("fault", format!("{}{axis}: {}", fault.code, fault.detail));
+        }
+        if let Some(error) = &summary.error {
+            self.add("error", error.message.as_str());
+        }
     }
-    row("job", format!("{}, {} strokes, {}", job.name, job.strokes, length(job.length)));
-    row(
-        "machine",
-        format!("{} ({}), axes {}", machine.name, machine.mechanism, machine.axes.join(", ")),
-    );
-    let factor = summary
-        .realtime_factor
-        .map(|factor| format!(", {factor:.0} × real time"))
-        .unwrap_or_default();
-    row("time", format!("{:.3} s{factor}", summary.time));
-    row(
-        "wall time",
-        format!(
-            "{:.3} s, planning {:.3} s, report {:.3} s",
-            summary.wall, summary.plan_time, summary.report_time
-        ),
-    );
-    match &summary.marks {
-        Some(marks) => {
-            row(
-                "marked",
+
+    fn job(&mut self, summary: &Summary) {
+        let Summary { job, machine, .. } = summary;
+        let marked = length(job.length);
+        self.add("job", format!("{}, {} strokes, {marked}", job.name, job.strokes));
+        let axes = machine.axes.join(", ");
+        self.add("machine", format!("{} ({}), axes {axes}", machine.name, machine.mechanism));
+    }
+
+    fn times(&mut self, summary: &Summary) {
+        let factor = summary
+            .realtime_factor
+            .map(|factor| format!(", {factor:.0} × real time"))
+            .unwrap_or_default();
+        self.add("time", format!("{:.3} s{factor}", summary.time));
+        let Summary { wall, plan_time, report_time, .. } = summary;
+        self.add(
+            "wall time",
+            format!("{wall:.3} s, planning {plan_time:.3} s, report {report_time:.3} s"),
+        );
+    }
+
+    fn marks(&mut self, marks: Option<&Marks>) {
+        let Some(marks) = marks else {
+            self.add("marks", "not judged");
+            return;
+        };
+        let Marks { speed_min, speed_max, .. } = marks;
+        let marked = length(marks.length);
+        self.add("marked", format!("{marked}, speed {speed_min:.4} to {speed_max:.4} m/s"));
+        let pair = |first: &str, one: f64, second: &str, other: f64| {
+            format!("{first}{}, {second} {}", length(one), length(other))
+        };
+        self.add("contour error", pair("max ", marks.error_max, "rms", marks.error_rms));
+        self.add("tracking error", pair("max ", marks.tracking_max, "rms", marks.tracking_rms));
+        self.add("missing", pair("", marks.missing, "worst end", marks.missing_end_max));
+        self.add("double", pair("", marks.double, "worst end", marks.double_end_max));
+        if marks.strokes_lost > 0 {
+            self.add("strokes lost", marks.strokes_lost.to_string());
+        }
+    }
+
+    fn axes(&mut self, summary: &Summary) {
+        let Summary { following_error: following, limits, .. } = summary;
+        if !following.max.is_empty() {
+            let (max, rms) = (list(&following.max, 1e3, 2), list(&following.rms, 1e3, 2));
+            self.add("following error", format!("max {max} mrad, rms {rms} mrad"));
+        }
+        if !limits.velocity.is_empty() {
+            let share = |values: &[f64]| list(values, 100.0, 0);
+            let path = [limits.path_acceleration, limits.path_jerk].map(|share| share * 100.0);
+            self.add(
+                "limits used",
                 format!(
-                    "{}, speed {:.4} to {:.4} m/s",
-                    length(marks.length),
-                    marks.speed_min,
-                    marks.speed_max
+                    "velocity {} %, acceleration {} %, jerk {} %, current {} %, path {:.0} % and \
+                     {:.0} %",
+                    share(&limits.velocity),
+                    share(&limits.acceleration),
+                    share(&limits.jerk),
+                    share(&limits.effort),
+                    path[0],
+                    path[1],
                 ),
             );
-            row(
-                "contour error",
-                format!("max {}, rms {}", length(marks.error_max), length(marks.error_rms)),
-            );
-            row(
-                "tracking error",
-                format!("max {}, rms {}", length(marks.tracking_max), length(marks.tracking_rms)),
-            );
-            row(
-                "missing",
-                format!("{}, worst end {}", length(marks.missing), length(marks.missing_end_max)),
-            );
-            row(
-                "double",
-                format!("{}, worst end {}", length(marks.double), length(marks.double_end_max)),
-            );
-            if marks.strokes_lost > 0 {
-                row("strokes lost", marks.strokes_lost.to_string());
-            }
         }
-        None => row("marks", "not judged".to_owned()),
     }
-    let list = |values: &[f64], scale: f64, digits: usize| -> String {
-        values
-            .iter()
-            .map(|value| format!("{:.digits$}", value * scale))
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
-    let following = &summary.following_error;
-    if !following.max.is_empty() {
-        row(
-            "following error",
-            format!(
-                "max {} mrad, rms {} mrad",
-                list(&following.max, 1e3, 2),
-                list(&following.rms, 1e3, 2)
-            ),
-        );
+
+    fn cycles(&mut self, summary: &Summary) {
+        self.add("cycles", format!("{}, {} overruns", summary.cycles, summary.overruns));
+        for (hop, figures) in &summary.latency {
+            let [p50, p99, p999, max] =
+                [figures.p50, figures.p99, figures.p999, figures.max].map(latency);
+            self.add(
+                &format!("latency {hop}"),
+                format!("p50 {p50}, p99 {p99}, p99.9 {p999}, max {max}"),
+            );
+        }
     }
-    if !limits.velocity.is_empty() {
-        row(
-            "limits used",
-            format!(
-                "velocity {} %, acceleration {} %, jerk {} %, current {} %, path {:.0} % and {:.0} %",
-                list(&limits.velocity, 100.0, 0),
-                list(&limits.acceleration, 100.0, 0),
-                list(&limits.jerk, 100.0, 0),
-                list(&limits.effort, 100.0, 0),
-                limits.path_acceleration * 100.0,
-                limits.path_jerk * 100.0,
-            ),
-        );
+
+    fn realtime(&mut self, realtime: &Realtime) {
+        let scheduler = match realtime.priority {
+            0 => realtime.scheduler.clone(),
+            priority => format!("{} priority {priority}", realtime.scheduler),
+        };
+        let cores = realtime.cores.iter().map(|(name, core)| format!("{name} on CPU {core}"));
+        let locked = realtime.locked.then(|| "memory locked".to_owned());
+        let set_up: Vec<String> = std::iter::once(scheduler).chain(cores).chain(locked).collect();
+        self.add("real time", set_up.join(", "));
     }
-    row("cycles", format!("{}, {} overruns", summary.cycles, summary.overruns));
-    for (hop, figures) in &summary.latency {
-        row(
-            &format!("latency {hop}"),
-            format!(
-                "p50 {}, p99 {}, p99.9 {}, max {}",
-                latency(figures.p50),
-                latency(figures.p99),
-                latency(figures.p999),
-                latency(figures.max),
-            ),
-        );
+
+    fn rest(&mut self, summary: &Summary) {
+        self.add("digest", summary.digest.as_str());
+        self.add("run folder", summary.out.as_deref().unwrap_or_default());
+        for warning in summary.warnings.iter().chain(&summary.realtime.warnings) {
+            self.add("warning", warning.as_str());
+        }
     }
-    let cores: Vec<String> =
-        realtime.cores.iter().map(|(name, core)| format!("{name} on CPU {core}")).collect();
-    let mut set_up = vec![match realtime.priority {
-        0 => realtime.scheduler.clone(),
-        priority => format!("{} priority {priority}", realtime.scheduler),
-    }];
-    set_up.extend(cores);
-    if realtime.locked {
-        set_up.push("memory locked".to_owned());
-    }
-    row("real time", set_up.join(", "));
-    row("digest", summary.digest.clone());
-    if let Some(out) = &summary.out {
-        row("run folder", out.clone());
-    }
-    for warning in summary.warnings.iter().chain(&realtime.warnings) {
-        row("warning", warning.clone());
-    }
-    rows
+}
+
+/// Numbers times `scale` with this many decimals, separated by commas.
+fn list(values: &[f64], scale: f64, digits: usize) -> String {
+    let values: Vec<String> =
+        values.iter().map(|value| format!("{:.digits$}", value * scale)).collect();
+    values.join(", ")
 }
 
 impl Summary {

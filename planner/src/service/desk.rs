@@ -4,13 +4,13 @@ use crate::Plan;
 use crate::job::Job;
 use crate::joint_plan::IsLinear;
 use crate::plan::plan_unless;
-use crate::request::{ARTWORK_FILE, JobRequest, PLAN_FILE, REFUSAL_FILE, REQUEST_FILE, Refusal};
+use crate::request::{JobRequest, Refusal};
 use machine::kinematics::{Joints, KinematicsError};
 use machine::transmission::rest;
 use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea};
 use nalgebra::Vector3;
-use signals::AxisArray;
 use signals::axis::axis_array;
+use signals::{AxisArray, run_folder};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -44,7 +44,7 @@ pub(super) fn plan_request(
     standing: Option<&AxisArray>,
     abandoned: &AtomicBool,
 ) -> Result<Plan, Refusal> {
-    let text = std::fs::read(folder.join(REQUEST_FILE)).map_err(Refusal::internal)?;
+    let text = std::fs::read(folder.join(run_folder::REQUEST)).map_err(Refusal::internal)?;
     let request: JobRequest = serde_json::from_slice(&text).map_err(Refusal::internal)?;
     let mut job = request.read(machine)?;
     if let Some(standing) = standing {
@@ -59,7 +59,7 @@ pub(super) fn plan_request(
 /// Says in the run folder why the job was refused. Where that cannot be written, such as on a full
 /// disk, standard error is all there is.
 pub(super) fn write_refusal(folder: &Path, refusal: &Refusal) {
-    let path = folder.join(REFUSAL_FILE);
+    let path = folder.join(run_folder::REFUSAL);
     let text = serde_json::to_vec_pretty(refusal).map_err(std::io::Error::other);
     if let Err(error) = text.and_then(|text| std::fs::write(&path, text)) {
         eprintln!("graver: {}: {error}: {}", path.display(), refusal.message);
@@ -70,8 +70,8 @@ fn write_plan(folder: &Path, plan: &Plan) -> std::io::Result<()> {
     let write = |name: &str, content: serde_json::Result<Vec<u8>>| {
         std::fs::write(folder.join(name), content.map_err(std::io::Error::other)?)
     };
-    write(ARTWORK_FILE, serde_json::to_vec(&plan.artwork))?;
-    write(PLAN_FILE, serde_json::to_vec_pretty(&plan.facts))
+    write(run_folder::ARTWORK, serde_json::to_vec(&plan.artwork))?;
+    write(run_folder::PLAN, serde_json::to_vec_pretty(&plan.facts))
 }
 
 /// Lets the job begin where the axes stand, with a rapid to where it wants to begin. A machine that
@@ -90,8 +90,8 @@ fn approach(job: &mut Job, machine: &Machine, standing: &AxisArray) -> Result<()
 }
 
 /// Where the joints stand behind motors at rest: short of them by what gravity makes of springs,
-/// gaps and steppers' fields. Home itself where that is within what rounding makes of it, so that a job plans
-/// alike from every start there.
+/// gaps and steppers' fields. Home itself where that is within what rounding
+/// makes of it, so that a job plans alike from every start there.
 struct Standing<'a> {
     motors: &'a AxisArray,
     machine: &'a Machine,

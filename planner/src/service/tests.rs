@@ -3,13 +3,13 @@
 #![allow(clippy::unwrap_used)]
 
 use super::{Service, Work};
-use crate::request::{ARTWORK_FILE, JobRequest, PLAN_FILE, REFUSAL_FILE, REQUEST_FILE, Refusal};
+use crate::request::{JobRequest, Refusal};
 use machine::Machine;
 use runtime::{Domain, Instance, Publisher, Reading, Role, Subscriber};
 use signals::setpoint::flags;
 use signals::{
     AxisArray, ControllerState, JobOffer, Nanoseconds, PlannerPhase, Progress, Setpoint,
-    axis::axis_array,
+    axis::axis_array, run_folder,
 };
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -67,7 +67,7 @@ impl Bench {
     fn offer(&mut self, stream: u64, set: &[&str]) {
         let set = set.iter().map(ToString::to_string).collect();
         let request = JobRequest { job: None, set };
-        let path = self.folder.path().join(REQUEST_FILE);
+        let path = self.folder.path().join(run_folder::REQUEST);
         std::fs::write(path, serde_json::to_vec(&request).unwrap()).unwrap();
         let folder = self.folder.path().to_str().unwrap();
         self.offers.publish(&JobOffer::new(stream, folder).unwrap()).unwrap();
@@ -120,8 +120,8 @@ fn a_stream_waits_for_its_name_and_never_exceeds_its_licence() {
     let mut bench = Bench::new();
     bench.offer(1, &SMALL);
     bench.turn_until(PlannerPhase::Streaming);
-    assert!(bench.folder.path().join(ARTWORK_FILE).exists());
-    assert!(bench.folder.path().join(PLAN_FILE).exists());
+    assert!(bench.folder.path().join(run_folder::ARTWORK).exists());
+    assert!(bench.folder.path().join(run_folder::PLAN).exists());
     assert_eq!(bench.collect(1), [], "nothing goes out before the controller names the stream");
 
     bench.say(|progress| (progress.stream, progress.room) = (1, 10));
@@ -274,7 +274,7 @@ fn a_refusal_is_written_or_at_least_reported() {
     let mut bench = Bench::new();
     bench.offer(1, &["letters.text=S", "letters.height=400 mm"]);
     bench.turn_until(PlannerPhase::Refused);
-    let text = std::fs::read(bench.folder.path().join(REFUSAL_FILE)).unwrap();
+    let text = std::fs::read(bench.folder.path().join(run_folder::REFUSAL)).unwrap();
     let refusal: Refusal = serde_json::from_slice(&text).unwrap();
     assert!(refusal.message.contains("of the tool"), "{}", refusal.message);
 

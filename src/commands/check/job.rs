@@ -30,8 +30,8 @@ pub struct MotorUse {
     /// Torque: current against the power stage's limit, or against a stepper's pull-out torque at
     /// its speed.
     pub torque: f64,
-    /// Torque as the efficiencies of gear and screw have it in place of friction, at start the static
-    /// one too, against the same limit.
+    /// Torque as the efficiencies of gear and screw have it in place of friction, at start the
+    /// static one too, against the same limit.
     pub sizing: f64,
     /// Voltage against the supply; null for steppers.
     pub voltage: Option<f64>,
@@ -53,8 +53,8 @@ impl JobReport {
     }
 }
 
-/// The checker's uses by axis; for a stepper it keeps pull-out torque and pulse rate where a DC motor
-/// has current and voltage.
+/// The checker's uses by axis; for a stepper it keeps pull-out torque and pulse rate where a DC
+/// motor has current and voltage.
 fn motors(machine: &Machine, uses: &Uses) -> Vec<MotorUse> {
     let at = |list: &[f64], index: usize| list.get(index).copied().unwrap_or_default();
     let motor = |(index, axis): (usize, &machine::Axis)| {

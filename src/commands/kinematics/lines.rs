@@ -65,8 +65,8 @@ pub enum Reply {
     },
     /// Of `jacobian`.
     Jacobian {
-        /// Tool velocity per joint rate, a row for each direction; then angular velocity, or the rate
-        /// of the beam's direction, where the tool can turn.
+        /// Tool velocity per joint rate, a row for each direction; then angular velocity, or the
+        /// rate of the beam's direction, where the tool can turn.
         j: Vec<Vec<f64>>,
         /// Its determinant; where it is not square, the root of that of J·Jᵀ or Jᵀ·J.
         det: f64,

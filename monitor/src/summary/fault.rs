@@ -1,0 +1,154 @@
+//! A fault in words: what was found, with its quantity and unit, and the limit that it broke.
+
+use machine::{Axis, JointUnit};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use signals::fault::FaultUnit;
+use signals::{Fault, FaultCode, FaultQuantity};
+
+/// A fault as summaries tell it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct FaultSummary {
+    /// The code, such as `following_error`.
+    pub code: String,
+    /// The axis by name; null when it belongs to none.
+    pub axis: Option<String>,
+    /// What was found, with value, unit and limit.
+    pub detail: String,
+}
+
+impl FaultSummary {
+    /// The summary of a fault of a machine with these axes; `None` when there is none.
+    pub fn of(fault: &Fault, axes: &[Axis]) -> Option<Self> {
+        let axis = (fault.axis as usize).checked_sub(1).and_then(|index| axes.get(index));
+        fault.is_some().then(|| Self {
+            code: fault.code().name().to_owned(),
+            axis: axis.map(|axis| axis.name.clone()),
+            detail: detail(fault, axis.map(|axis| axis.unit)),
+        })
+    }
+}
+
+fn detail(fault: &Fault, joint: Option<JointUnit>) -> String {
+    let quantity = fault.quantity();
+    match (fault.code(), quantity) {
+        (code, FaultQuantity::None) => without_value(code).to_owned(),
+        (FaultCode::StaleFeedback, _) if fault.value == 0.0 => "feedback did not go on".to_owned(),
+        (FaultCode::StaleFeedback, _) if fault.limit().is_some_and(|most| fault.value <= most) => {
+            "feedback came of another run of drives".to_owned()
+        }
+        (_, FaultQuantity::Setpoint) => {
+            format!("setpoint {} came where setpoint {} was due", fault.value, fault.limit)
+        }
+        _ => {
+            let (name, unit) = quantity.name();
+            let found = format!("{name} {}", amount(fault.value, unit, joint));
+            match fault.limit() {
+                Some(limit) => format!("{found}, limit {}", amount(limit, unit, joint)),
+                None => found,
+            }
+        }
+    }
+}
+
+/// What a fault means that has no value.
+fn without_value(code: FaultCode) -> &'static str {
+    match code {
+        FaultCode::PlannerLost => "the planner process died or left",
+        FaultCode::ControllerLost => "the controller process died or left",
+        FaultCode::DrivesLost => "the drives process died or left",
+        FaultCode::SupervisorLost => "the supervisor died or left",
+        FaultCode::StaleCommand => "drives heard no fresh command and stopped the axes alone",
+        FaultCode::DriveFault => "the drives or the motors refuse",
+        _ => "no value was reported",
+    }
+}
+
+/// A value in the unit that people read it in: millimetres for places along a line.
+fn amount(value: f64, unit: FaultUnit, joint: Option<JointUnit>) -> String {
+    match (unit, joint) {
+        (FaultUnit::Joint(""), Some(JointUnit::Length)) => format!("{:.4} mm", value * 1e3),
+        (FaultUnit::Joint(per), Some(JointUnit::Length)) => format!("{value:.6} m{per}"),
+        (FaultUnit::Joint(per), Some(JointUnit::Angle)) => format!("{value:.6} rad{per}"),
+        (FaultUnit::Joint(per), None) => format!("{value:.6} (m or rad){per}"),
+        (FaultUnit::Plain(""), _) => format!("{value}"),
+        (FaultUnit::Plain(unit), _) => format!("{value:.4} {unit}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use FaultQuantity as Quantity;
+    use machine::Machine;
+
+    /// A CoreXY, whose joints are belts, with the second made to turn.
+    fn axes() -> Vec<Axis> {
+        let mut axes = Machine::builtin().axes;
+        axes[1].unit = JointUnit::Angle;
+        axes
+    }
+
+    fn check(fault: Fault, expect: &str) {
+        let summary = FaultSummary::of(&fault, &axes()).unwrap();
+        assert_eq!(summary.detail, expect);
+        assert_eq!(summary.code, fault.code().name());
+    }
+
+    #[test]
+    fn quantity_and_unit_are_those_of_the_fault_and_the_axis() {
+        let error = Fault::new(FaultCode::FollowingError);
+        let found = |axis, value| error.on(axis).beyond(Quantity::FollowingError, value, 2e-3);
+        check(found(0, 2.1e-3), "following error 2.1000 mm, limit 2.0000 mm");
+        check(found(1, 0.0125), "following error 0.012500 rad, limit 0.002000 rad");
+        let planned = Fault::new(FaultCode::SetpointLimit).on(0);
+        check(
+            planned.beyond(Quantity::Velocity, 0.3, 0.25),
+            "velocity 0.300000 m/s, limit 0.250000 m/s",
+        );
+        check(
+            planned.beyond(Quantity::Torque, 0.12, 0.1),
+            "motor torque 0.1200 N·m, limit 0.1000 N·m",
+        );
+        let light = Fault::new(FaultCode::SetpointLimit);
+        check(light.beyond(Quantity::Edges, 9.0, 8.0), "gate edges in a cycle 9, limit 8");
+        let broken = Fault::new(FaultCode::StreamBroken);
+        check(
+            broken.beyond(Quantity::Setpoint, 12.0, 10.0),
+            "setpoint 12 came where setpoint 10 was due",
+        );
+        let overrun = Fault::new(FaultCode::Overrun);
+        check(overrun.beyond(Quantity::Overruns, 4.0, 3.0), "overruns in a row 4, limit 3");
+    }
+
+    #[test]
+    fn a_limit_of_zero_is_a_limit() {
+        let fault = Fault::new(FaultCode::PositionLimit).on(0);
+        let expect = "position -1.5000 mm, limit 0.0000 mm";
+        check(fault.beyond(Quantity::Position, -1.5e-3, 0.0), expect);
+    }
+
+    #[test]
+    fn what_has_no_number_names_none() {
+        let stale = |gap| Fault::new(FaultCode::StaleFeedback).beyond(Quantity::Cycles, gap, 3.0);
+        check(Fault::new(FaultCode::PlannerLost), "the planner process died or left");
+        check(Fault::new(FaultCode::DriveFault), "the drives or the motors refuse");
+        check(stale(0.0), "feedback did not go on");
+        check(stale(1.0), "feedback came of another run of drives");
+        check(stale(4.0), "cycles gone by 4, limit 3");
+        let number = Fault::new(FaultCode::NotFinite).on(0).with(Quantity::Number, f64::NAN);
+        check(number, "number in a sample NaN");
+        assert_eq!(FaultSummary::of(&Fault::default(), &axes()), None);
+    }
+
+    #[test]
+    fn a_fault_names_its_axis() {
+        let on = |axis| {
+            let fault = Fault { axis, ..Fault::new(FaultCode::FollowingError) };
+            FaultSummary::of(&fault, &axes()).unwrap().axis
+        };
+        assert_eq!(on(2), Some(axes()[1].name.clone()));
+        assert_eq!((on(0), on(8)), (None, None));
+    }
+}

@@ -1,0 +1,97 @@
+//! `graver export`: the recording of a run as comma-separated values.
+
+use crate::arguments::ExportArguments;
+use crate::exit::{Exit, Failure};
+use monitor::recording::file::{RecordingError, RecordingReader};
+use monitor::recording::table::TableWriter;
+use monitor::summary::Summary;
+use signals::{MAX_AXES, run_folder};
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, ErrorKind, Write};
+use std::path::Path;
+
+/// Writes the recording to a file, or to standard output.
+///
+/// # Errors
+/// A recording that is not there or is none, or a file that cannot be written.
+pub fn run(arguments: &ExportArguments) -> Result<Exit, Failure> {
+    let recording = match &arguments.recording {
+        folder if folder.is_dir() => folder.join(run_folder::SAMPLES),
+        file => file.clone(),
+    };
+    let file = File::open(&recording).map_err(|error| at(&recording, error))?;
+    let reader =
+        RecordingReader::new(BufReader::new(file)).map_err(|error| at(&recording, error))?;
+    let axes = axes(&recording.with_file_name(run_folder::SUMMARY));
+    match &arguments.out {
+        Some(path) => {
+            if is_same(path, &recording) {
+                return Err(at(path, "this is the recording itself: name another file"));
+            }
+            let file = File::create(path).map_err(|error| at(path, error))?;
+            export(&recording, reader, &axes, BufWriter::new(file), |error| Err(at(path, error)))
+        }
+        None => {
+            let output = BufWriter::new(io::stdout().lock());
+            export(&recording, reader, &axes, output, |error| match error.kind() {
+                // Whoever read has read enough, as `head` does.
+                ErrorKind::BrokenPipe => Ok(Exit::Done),
+                _ => Err(Failure::service(error)),
+            })
+        }
+    }
+}
+
+/// Copies record by record; `written` judges what the writer reports.
+fn export(
+    recording: &Path,
+    reader: RecordingReader<impl io::Read>,
+    axes: &[String],
+    writer: impl Write,
+    written: impl Fn(io::Error) -> Result<Exit, Failure>,
+) -> Result<Exit, Failure> {
+    let mut table = match TableWriter::new(writer, axes) {
+        Ok(table) => table,
+        Err(error) => return written(error),
+    };
+    for record in reader {
+        match record {
+            Ok(record) => {
+                if let Err(error) = table.write(&record) {
+                    return written(error);
+                }
+            }
+            // All records before the torn one are whole.
+            Err(error @ RecordingError::Truncated { .. }) => {
+                eprintln!("graver: warning: {}: {error}", recording.display());
+            }
+            Err(error) => return Err(at(recording, error)),
+        }
+    }
+    table.finish().map_or_else(written, |()| Ok(Exit::Done))
+}
+
+/// The axes' names by the summary beside the recording; numbers where it tells none.
+fn axes(summary: &Path) -> Vec<String> {
+    let told = match std::fs::read(summary) {
+        Err(error) if error.kind() == ErrorKind::NotFound => None,
+        text => text
+            .and_then(|text| Ok(serde_json::from_slice::<Summary>(&text)?))
+            .inspect_err(|error| {
+                let path = summary.display();
+                eprintln!("graver: warning: {path}: {error}: the axes are numbered");
+            })
+            .ok(),
+    };
+    told.map(|summary| summary.machine.axes)
+        .filter(|axes| !axes.is_empty())
+        .unwrap_or_else(|| (1..=MAX_AXES).map(|axis| format!("axis_{axis}")).collect())
+}
+
+fn is_same(one: &Path, other: &Path) -> bool {
+    one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
+}
+
+fn at(path: &Path, error: impl std::fmt::Display) -> Failure {
+    Failure::bad_input(format!("{}: {error}", path.display()))
+}
