@@ -9,7 +9,7 @@ use planner::request::Refusal;
 pub enum Exit {
     /// Done.
     Done = 0,
-    /// Stopped by a person, or a request that was refused.
+    /// Stopped by a person, or a request or check that failed.
     Stopped = 1,
     /// Bad arguments, machine file or job.
     BadInput = 2,
@@ -28,7 +28,7 @@ impl Exit {
         match self {
             Self::Done => "done",
             Self::Stopped => {
-                "stopped by a person (Ctrl-C, graver stop), or a request that was refused"
+                "stopped by a person (Ctrl-C, graver stop), or a request or check that failed"
             }
             Self::BadInput => "bad arguments, machine file or job",
             Self::Fault => "a fault stopped the machine",

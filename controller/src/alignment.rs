@@ -6,6 +6,7 @@
 use crate::feedforward::Planned;
 use machine::Machine;
 use machine::motor::StepperMotor;
+use signals::time::CYCLE_TIME;
 use signals::{AxisArray, Fault, FaultCode, FaultQuantity, MAX_AXES};
 
 use crate::supervision::Finding;
@@ -60,8 +61,12 @@ impl Alignment {
         let at = f64::from(self.left) / f64::from(CYCLES);
         // The quintic from 0 to 1 with no speed and no acceleration at either end.
         let share = at * at * at * (10.0 + at * (6.0 * at - 15.0));
-        for (angle, offset) in planned.angle.iter_mut().zip(&self.offset) {
+        let slope = 30.0 * at * at * (1.0 - at) * (1.0 - at);
+        let rate = -slope / (f64::from(CYCLES) * CYCLE_TIME);
+        let planned = planned.angle.iter_mut().zip(&mut planned.speed);
+        for ((angle, speed), offset) in planned.zip(&self.offset) {
             *angle += offset * share;
+            *speed += offset * rate;
         }
     }
 }

@@ -141,6 +141,7 @@ impl Lookahead {
     pub fn setpoint(&self, sequence: u64) -> &Setpoint {
         &self.setpoints[self.nearest(sequence)]
     }
+
     /// The largest rate at `from` that all setpoints up to `to` allow, up to a block more at either
     /// end. What has not come in yet is taken to allow no more than the planned rate. `before`
     /// gives the rate from which a limit can still be kept, so many setpoints before it.

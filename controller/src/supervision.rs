@@ -136,9 +136,9 @@ impl Supervision {
         let same_run = before.filter(|before| before.epoch == seen.epoch);
         let gap = same_run.map_or(1, |before| seen.cycle.0.saturating_sub(before.cycle.0));
         self.heat(feedback, gap);
-        if let Some(index) = not_finite(feedback, self.axes.len()) {
+        if let Some((index, value)) = not_finite(feedback, self.axes.len()) {
             let fault = Fault::new(FaultCode::NotFinite).on(index);
-            return Err(Finding::lost(fault.with(FaultQuantity::Number, f64::NAN)));
+            return Err(Finding::lost(fault.with(FaultQuantity::Number, value)));
         }
         let Some(before) = before else { return Ok(Elapsed::ONE) };
         if before.epoch != seen.epoch || gap == 0 || gap > MOST_MISSES {
@@ -180,6 +180,8 @@ impl Supervision {
     /// # Errors
     /// Following error, soft limit or overload, with the axis.
     pub fn motion(&self, feedback: &Feedback, angle: &AxisArray) -> Result<(), Finding> {
+        // A winding stays too warm all the way to rest: an axis that is lost must be heard beside it.
+        let mut overload = None;
         for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
             let limits = &axis.limits;
             let measured = feedback.position[index] * axis.ratio;
@@ -202,11 +204,12 @@ impl Supervision {
                 if heating > continuous * continuous {
                     let fault = Fault::new(FaultCode::Overload).on(index);
                     let (quantity, value) = (FaultQuantity::Heating, heating.sqrt());
-                    return Err(Finding::sound(fault.beyond(quantity, value, continuous)));
+                    let finding = Finding::sound(fault.beyond(quantity, value, continuous));
+                    overload.get_or_insert(finding);
                 }
             }
         }
-        Ok(())
+        overload.map_or(Ok(()), Err)
     }
 
     /// Whether a setpoint can be played.
@@ -215,10 +218,10 @@ impl Supervision {
     /// A number that is not finite, or a value beyond its axis' limit.
     pub fn setpoint(&self, setpoint: &Setpoint) -> Result<(), Finding> {
         let scalars = [setpoint.path_velocity, setpoint.path_acceleration, setpoint.path_jerk];
-        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         let not_finite = Fault::new(FaultCode::NotFinite);
-        if !finite(&setpoint.tool) || !finite(&scalars) {
-            return Err(Finding::sound(not_finite.with(FaultQuantity::Number, f64::NAN)));
+        let mut of_the_tool = setpoint.tool.iter().chain(&scalars);
+        if let Some(value) = of_the_tool.find(|value| !value.is_finite()) {
+            return Err(Finding::sound(not_finite.with(FaultQuantity::Number, *value)));
         }
         if !setpoint.laser.is_valid() {
             return Err(Finding::sound(impossible_light(setpoint)));
@@ -333,10 +336,11 @@ fn impossible_light(setpoint: &Setpoint) -> Fault {
     Fault::new(FaultCode::SetpointLimit).with(FaultQuantity::Light, sequence)
 }
 
-/// The first axis with a measured number that is not finite.
-fn not_finite(feedback: &Feedback, axes: usize) -> Option<usize> {
-    let measured = feedback.position.iter().zip(&feedback.velocity).zip(&feedback.current);
-    measured.take(axes).position(|((position, velocity), current)| {
-        !(position.is_finite() && velocity.is_finite() && current.is_finite())
+/// The first measured number that is not finite, with its axis.
+fn not_finite(feedback: &Feedback, axes: usize) -> Option<(usize, f64)> {
+    (0..axes.min(MAX_AXES)).find_map(|index| {
+        let measured =
+            [feedback.position[index], feedback.velocity[index], feedback.current[index]];
+        measured.into_iter().find(|value| !value.is_finite()).map(|value| (index, value))
     })
 }

@@ -213,6 +213,21 @@ fn an_overloaded_winding_stops_the_machine() {
 }
 
 #[test]
+fn an_overload_hides_no_axis_that_is_lost() {
+    let mut machine = Machine::builtin();
+    machine.axes[0].motor.dc_mut().unwrap().continuous_current = Some(0.05);
+    let job = two_marks(&machine, 0.25, 0.5);
+    let mut bench = Bench::enabled(&machine);
+    assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+    bench.until(Some(&job), ControllerState::Stopping, 700);
+    assert_eq!(bench.last().command.mode(), CommandMode::Voltage);
+    bench.cycle(Some(&job), None, |feedback| feedback.position[1] += 0.81);
+    let command = bench.last().command;
+    assert_eq!(command.mode(), CommandMode::QuickStop);
+    assert_eq!(command.fault.code(), FaultCode::Overload, "the first cause stays");
+}
+
+#[test]
 fn a_planner_that_is_lost_hides_nothing_that_drives_says() {
     let machine = Machine::builtin();
     let job = two_marks(&machine, 0.25, 0.5);

@@ -240,8 +240,14 @@ fn doubt(command: &Command, axes: usize) -> Option<Fault> {
     None
 }
 
-/// The fault of a laser cycle that makes no sense: too many edges, or edges out of order.
+/// The fault of a laser cycle that cannot be carried out: more edges than a sample holds, or edges
+/// out of order, out of the cycle, or too close for the source.
 pub(crate) fn impossible_light(laser: &LaserCycle) -> Fault {
-    let (edges, limit) = (f64::from(laser.edge_count), MAX_EDGES as f64);
-    Fault::new(FaultCode::DriveFault).beyond(FaultQuantity::Edges, edges, limit)
+    let fault = Fault::new(FaultCode::DriveFault);
+    let (edges, most) = (f64::from(laser.edge_count), MAX_EDGES as f64);
+    if edges > most {
+        fault.beyond(FaultQuantity::Edges, edges, most)
+    } else {
+        fault.with(FaultQuantity::ImpossibleEdges, edges)
+    }
 }

@@ -171,7 +171,8 @@ fn judged(report: Option<&ControllerReport>, findings: &Findings) -> Result<Mark
 
 fn realtime(ending: &Ending) -> Realtime {
     let controller = ending.controller.map(|report| report.realtime);
-    let drives = ending.drives.map(|report| report.realtime);
+    // Until drives has run a cycle, its report is empty.
+    let drives = ending.drives.filter(|report| report.cycle.0 != 0).map(|report| report.realtime);
     let reported: Vec<(&str, RealtimeFacts)> = [("controller", controller), ("drives", drives)]
         .into_iter()
         .filter_map(|(name, facts)| Some((name, facts?)))

@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 /// The longest part of a job's name that goes into the folder's name [characters].
 const LONGEST_NAME: usize = 40;
 
+/// Files of which every run leaves one at least, however it ends.
+const OF_EVERY_RUN: [&str; 3] = [run_folder::REQUEST, run_folder::SAMPLES, run_folder::SUMMARY];
+
 /// A folder that exists.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunFolder {
@@ -53,8 +56,19 @@ impl RunFolder {
     /// Removes what an earlier run left in it.
     ///
     /// # Errors
-    /// Whatever the operating system reports.
+    /// A file of such a name in a folder that no run has left, or whatever the operating system
+    /// reports.
     pub fn clear(&self) -> io::Result<()> {
+        let has = |name: &str| self.file(name).exists();
+        let left_by_a_run = OF_EVERY_RUN.into_iter().any(has);
+        let any = run_folder::ALL.into_iter().find(|name| has(name));
+        if let (false, Some(name)) = (left_by_a_run, any) {
+            let place = self.path.display();
+            return Err(io::Error::new(
+                io::ErrorKind::AlreadyExists,
+                format!("{place} has a {name} that no run has left: name another folder"),
+            ));
+        }
         for name in run_folder::ALL {
             match fs::remove_file(self.file(name)) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
@@ -127,6 +141,18 @@ mod tests {
         second.write(run_folder::SUMMARY, "{}").unwrap();
         assert_eq!(fs::read_to_string(second.file(run_folder::SUMMARY)).unwrap(), "{}");
         assert_eq!(fs::read_dir(second.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_folder_of_somebody_else_is_left_alone() {
+        let below = tempfile::tempdir().unwrap();
+        let folder = RunFolder::create_at(below.path()).unwrap();
+        folder.clear().unwrap();
+        folder.write(run_folder::PLAN, "mine").unwrap();
+        let error = folder.clear().unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
+        assert!(error.to_string().contains("plan.json"), "{error}");
+        assert_eq!(fs::read_to_string(folder.file(run_folder::PLAN)).unwrap(), "mine");
     }
 
     #[test]

@@ -13,7 +13,7 @@ use signals::time::CYCLE_TIME;
 
 use crate::check::{Breach, Quantity};
 use crate::sampler::Sampler;
-use crate::trajectory::{Reference, Trajectory};
+use crate::trajectory::{Course, Piece, Reference, Trajectory};
 
 /// Looks at the middle between two setpoints that follow each other, where a cubic that fits both
 /// ends strays most.
@@ -32,7 +32,7 @@ impl Between {
     }
 
     /// Looks between the setpoint before and this one of `trajectory`, the last that `sampler` has
-    /// made, if the laser is on there. Gives the breach where the tool strays too far.
+    /// made, if a stroke is marked there. Gives the breach where the tool strays too far.
     ///
     /// # Errors
     /// Where a chain does not close.
@@ -43,10 +43,12 @@ impl Between {
         trajectory: &Trajectory,
     ) -> Result<Option<Breach>, KinematicsError> {
         let Some(before) = self.before.replace(*setpoint) else { return Ok(None) };
-        if !before.laser.is_lit() {
+        let time = (before.sequence as f64 + 0.5) * CYCLE_TIME;
+        // Where light falls, and not where the source is told to begin and to end.
+        let marks = |piece: &Piece| matches!(piece.course, Course::Stroke { .. });
+        if !trajectory.piece_at(time).is_some_and(marks) {
             return Ok(None);
         }
-        let time = (before.sequence as f64 + 0.5) * CYCLE_TIME;
         let Reference::Tool(tool) = trajectory.at(time, &mut self.cursor) else {
             return Ok(None);
         };
@@ -56,8 +58,9 @@ impl Between {
         if value <= self.tolerance {
             return Ok(None);
         }
-        let (quantity, limit) = (Quantity::PathDeviation, self.tolerance);
-        Ok(Some(Breach { time, axis: None, quantity, value, limit, unit: "m" }))
+        let (value, limit) = (value * 1e6, self.tolerance * 1e6);
+        let quantity = Quantity::PathDeviation;
+        Ok(Some(Breach { time, axis: None, quantity, value, limit, unit: "µm" }))
     }
 }
 
@@ -110,11 +113,9 @@ mod tests {
             |tolerance| machine.mechanism.visit(LookAll(&trajectory, &machine.axes, tolerance));
         look(5e-9).unwrap();
         let breach = look(1e-9).unwrap_err();
-        assert_eq!(
-            (breach.quantity, breach.limit, breach.unit),
-            (Quantity::PathDeviation, 1e-9, "m")
-        );
-        assert!(breach.value > 1e-9 && breach.value < 5e-9, "{breach:?}");
+        assert_eq!((breach.quantity, breach.unit), (Quantity::PathDeviation, "µm"));
+        assert!((breach.limit - 1e-3).abs() < 1e-15, "{breach:?}");
+        assert!(breach.value > 1e-3 && breach.value < 5e-3, "{breach:?}");
         assert!(!breach.quantity.is_place(), "a slower stroke strays less");
         // Half a cycle after a setpoint.
         assert!(((breach.time * 1e3).fract() - 0.5).abs() < 1e-6, "{breach:?}");

@@ -10,7 +10,7 @@ use crate::job::{Marking, MarkingSpeed};
 use crate::outline::Outline;
 use crate::timing::travel;
 
-/// ChosenSpeeds tried between nothing and the largest before the best is refined.
+/// Speeds tried between nothing and the largest before the best is refined.
 const TRIALS: usize = 50;
 
 /// Steps of golden section: the speed to a part in 10⁷ of a trial's width.

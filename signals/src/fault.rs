@@ -144,6 +144,8 @@ pub enum FaultQuantity {
     Mode = 22,
     /// A distance that the mechanism must keep, or can reach [by its kinematics].
     Mechanism = 23,
+    /// Gate edges of a cycle whose order, times or power cannot be carried out.
+    ImpossibleEdges = 24,
 }
 
 /// The unit of a quantity.
@@ -156,7 +158,7 @@ pub enum FaultUnit {
 }
 
 impl FaultQuantity {
-    const ALL: [Self; 24] = [
+    const ALL: [Self; 25] = [
         Self::None,
         Self::FollowingError,
         Self::Position,
@@ -181,6 +183,7 @@ impl FaultQuantity {
         Self::StreamTime,
         Self::Mode,
         Self::Mechanism,
+        Self::ImpossibleEdges,
     ];
 
     /// The quantity with this number in a sample; an unknown number reads as [`Self::None`].
@@ -216,6 +219,7 @@ impl FaultQuantity {
             Self::StreamTime => ("stream time", Plain("s")),
             Self::Mode => ("command mode", Plain("")),
             Self::Mechanism => ("distance that the mechanism must keep", Plain("")),
+            Self::ImpossibleEdges => ("gate edges of an impossible laser cycle", Plain("")),
         }
     }
 }

@@ -94,7 +94,11 @@ fn plan(input: &MachineInput, path: &Path) -> Result<(JobRequest, Plan), Failure
 fn sample_job(input: &MachineInput) -> Option<String> {
     let sample = input.machine.sample_job.as_ref()?;
     let path = input.folder.as_ref().map_or(sample.clone(), |folder| folder.join(sample));
-    Some(tidy(&path).display().to_string())
+    let tidied = tidy(&path);
+    // A symbolic link on the way may lead elsewhere.
+    let same =
+        tidied.canonicalize().is_ok_and(|tidied| path.canonicalize().is_ok_and(|it| it == tidied));
+    Some(if same { tidied } else { path }.display().to_string())
 }
 
 /// `path` without what `..` takes back: `machines/../jobs/a.ngc` is `jobs/a.ngc`.

@@ -33,7 +33,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
 
     let folder = arguments.out.as_deref().map(RunFolder::create_at).transpose();
     let folder = folder.map_err(Failure::service)?;
-    folder.as_ref().map_or(Ok(()), RunFolder::clear).map_err(Failure::service)?;
+    folder.as_ref().map_or(Ok(()), RunFolder::clear).map_err(Failure::bad_input)?;
     let mut writer = folder.as_ref().map(recording).transpose().map_err(Failure::service)?;
     let mut failed: io::Result<()> = Ok(());
     let mut examination = Examination::new(&plan.artwork, Clock::Virtual);

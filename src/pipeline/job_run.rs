@@ -11,7 +11,7 @@ use monitor::summary::{ErrorSummary, Outcome, Summary};
 use planner::request::{JobRequest, Refusal};
 use runtime::domain::Role;
 use runtime::signal;
-use signals::{DrivesReport, FaultCode, OperatorVerb, PlannerPhase, run_folder};
+use signals::{DrivesReport, Fault, FaultCode, OperatorVerb, PlannerPhase, run_folder};
 use std::time::{Duration, Instant};
 
 /// How long the controller may take to bring the axes to rest and say so.
@@ -60,7 +60,7 @@ impl<'a> JobRun<'a> {
         started: Instant,
         submission: Option<Submission>,
     ) -> Result<Self, Failure> {
-        folder.clear().map_err(Failure::service)?;
+        folder.clear().map_err(Failure::bad_input)?;
         let request = serde_json::to_vec_pretty(job).map_err(Failure::service)?;
         folder.write(run_folder::REQUEST, request).map_err(Failure::service)?;
         let path = std::path::absolute(folder.path()).map_err(Failure::service)?;
@@ -271,9 +271,9 @@ impl<'a> JobRun<'a> {
         }
         let vague = matches!(drives.fault.code(), FaultCode::None | FaultCode::StaleCommand);
         if vague && !self.pipeline.has(Role::Drives) {
-            drives.fault.code = FaultCode::DrivesLost as u32;
+            drives.fault = Fault::new(FaultCode::DrivesLost).at(drives.fault.at);
         } else if vague && !self.pipeline.has(Role::Controller) {
-            drives.fault.code = FaultCode::ControllerLost as u32;
+            drives.fault = Fault::new(FaultCode::ControllerLost).at(drives.fault.at);
         }
         drives
     }

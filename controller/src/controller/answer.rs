@@ -90,11 +90,15 @@ impl Controller {
             command.following_error[index] = error;
             let Some(cascade) = cascade else { continue };
             // In the time in which the position loop answers, a motor that creeps moves less than
-            // a count. Friction holds it, and it slips by a count now and then: what is within
-            // two, the integral would only wind itself up with until the axis leaves.
+            // a count. Friction holds it, but for a slip of a count now and then: what is within
+            // two, the integral would only wind itself up with until the axis leaves. At rest, or
+            // where no friction holds it, it is drawn to within one.
             let count = axis.encoder.resolution();
-            let creeps = self.feedforward.fastest(index) <= count * axis.gains.position;
-            let held_by_friction = creeps && error.abs() <= 2.0 * count;
+            let fastest = self.feedforward.fastest(index);
+            let slips = fastest > 0.0 && axis.friction.coulomb > 0.0;
+            let band = if slips { 2.0 * count } else { count };
+            let creeps = fastest <= count * axis.gains.position;
+            let held_by_friction = creeps && error.abs() <= band;
             let drive = cascade.step(&reference, &measured, !held_by_friction);
             command.voltage[index] = drive.voltage;
             if self.playing != 0 {

@@ -193,10 +193,14 @@ fn overruns_are_those_of_the_run() {
 #[test]
 fn real_time_is_claimed_and_missed_only_as_reported() {
     let machine = Machine::builtin();
+    let silent = RealtimeFacts::default();
     let of = |controller: Option<RealtimeFacts>, drives: Option<RealtimeFacts>| {
         let ending = Ending {
             controller: controller.map(|realtime| ControllerReport { realtime, ..report() }),
-            drives: drives.map(|realtime| DrivesReport { realtime, ..DrivesReport::default() }),
+            drives: drives.map(|realtime| {
+                let cycle = Cycle(if realtime == silent { 0 } else { LAST });
+                DrivesReport { realtime, cycle, ..DrivesReport::default() }
+            }),
             ..Ending::default()
         };
         summarise(&machine, &plan(), &ending, None, Clock::Real).realtime
@@ -231,6 +235,9 @@ fn real_time_is_claimed_and_missed_only_as_reported() {
     let refused = of(None, Some(good));
     assert_eq!(refused.cores.keys().collect::<Vec<_>>(), ["drives"]);
     assert_eq!((refused.scheduler.as_str(), refused.warnings.len()), ("other", 0));
+    // Drives before its first cycle: nothing is said of it.
+    let early = of(None, Some(silent));
+    assert_eq!((early.cores.len(), early.warnings.len()), (0, 0), "{:?}", early.warnings);
 
     let summary = summary_of(&ended(report()), None);
     assert_eq!(summary.realtime, Realtime::in_virtual_time());

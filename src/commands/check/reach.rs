@@ -29,8 +29,8 @@ pub struct ReachReport {
     /// Box around the reached places; null where there is none.
     pub bounds: Option<Bounds>,
     /// How far half an encoder count or pulse on each axis puts the tool off, at the reached place
-    /// where it is most [m].
-    pub count_error: f64,
+    /// where it is most [m]; null where none is reached.
+    pub count_error: Option<f64>,
     /// Every margin of the mechanism where it is least among the reached places.
     pub margins: Vec<PlaceMargin>,
     /// Why the other places are not reached, the most frequent first.
@@ -273,7 +273,7 @@ impl Tally {
             reached: share(self.reached),
             singular: share(self.singular),
             bounds: self.bounds,
-            count_error: self.count_error,
+            count_error: (self.reached > 0).then_some(self.count_error),
             margins: self.margins,
             refusals: self.refusals.into_iter().map(obstacle).collect(),
         }

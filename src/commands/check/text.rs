@@ -92,10 +92,10 @@ fn reach(reach: &ReachReport) {
         let [x, y] = [bounds.x, bounds.y].map(|range| range.map(|at| at * 1e3));
         eprintln!("reached   x {:.1} to {:.1} mm, y {:.1} to {:.1} mm", x[0], x[1], y[0], y[1]);
     }
-    eprintln!(
-        "counts    half a count on each axis puts the tool off by up to {:.1} µm",
-        reach.count_error * 1e6
-    );
+    if let Some(error) = reach.count_error {
+        let error = error * 1e6;
+        eprintln!("counts    half a count on each axis puts the tool off by up to {error:.1} µm");
+    }
     for margin in &reach.margins {
         let [x, y, _] = margin.position.map(|at| at * 1e3);
         eprintln!(
