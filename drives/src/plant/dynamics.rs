@@ -398,7 +398,10 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
                 course.as_ref().map_or_else(SVector::zeros, |course| value(course, weights, speed))
             };
         let shares = [part.from, part.from + 0.5 * part.length, part.end()];
-        let [at_start, halfway, at_end] = shares.map(|at| self.coupling.at(at));
+        // One by one: an array's `map` would take them through memory.
+        let at_start = self.coupling.at(shares[0]);
+        let halfway = self.coupling.at(shares[1]);
+        let at_end = self.coupling.at(shares[2]);
         let mut first = *start;
         if course.is_none() {
             first.current = SVector::zeros();
