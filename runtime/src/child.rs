@@ -1,7 +1,8 @@
 //! A child process in a process group of its own, so that Ctrl-C reaches the parent alone.
 //!
-//! A child is not killed when its parent dies: drives and controller notice that by themselves and
-//! bring the machine to rest first.
+//! A child is killed only where somebody says so, neither when its parent dies nor when the value
+//! that stands for it is dropped, in a panic for example: drives and controller notice by
+//! themselves that they are alone, and bring the machine to rest first.
 
 use std::io;
 use std::os::unix::process::CommandExt;
@@ -11,7 +12,7 @@ use std::time::Duration;
 use crate::domain::{Domain, DomainError};
 use crate::peer::Peer;
 
-/// A running child; dropping it kills and reaps it.
+/// A running child; dropping it asks the child to end, and does not wait.
 #[derive(Debug)]
 pub struct ChildProcess {
     child: Child,
@@ -97,8 +98,8 @@ impl ChildProcess {
 impl Drop for ChildProcess {
     fn drop(&mut self) {
         if self.status.is_none() {
-            let _ = self.kill();
-            let _ = self.child.wait();
+            // A child that has gone meanwhile cannot be asked.
+            let _ = self.terminate();
         }
     }
 }

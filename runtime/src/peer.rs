@@ -12,10 +12,15 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crossbeam::queue::ArrayQueue;
+use signals::Nanoseconds;
 
+use crate::clock;
 use crate::domain::{Domain, Role};
 use crate::instance::Instance;
 use crate::membership;
+
+/// A year: longer than anybody waits [ns].
+const LONG: i64 = 31_536_000_000_000_000;
 
 /// How often the searching thread of [`Peers`] looks for a peer that is missing.
 const SEARCH_PERIOD: Duration = Duration::from_millis(20);
@@ -64,15 +69,34 @@ impl Peer {
         !self.ended_within(Duration::ZERO)
     }
 
-    /// Waits at most `patience` for its end; whether it has ended.
+    /// Whether somebody has stopped it, by SIGSTOP or a debugger; `false` where that cannot be told.
+    /// Reads a file: not for a cycle.
+    pub fn is_stopped(&self) -> bool {
+        let Ok(status) = std::fs::read_to_string(format!("/proc/{}/stat", self.pid)) else {
+            return false;
+        };
+        // The name before it may have any characters, brackets too; proc_pid_stat(5).
+        let state = status.rsplit(')').next().and_then(|rest| rest.split_whitespace().next());
+        matches!(state, Some("T" | "t"))
+    }
+
+    /// Waits at most `patience` for its end, signals or not; whether it has ended.
     pub fn ended_within(&self, patience: Duration) -> bool {
-        let mut entry =
-            libc::pollfd { fd: self.descriptor.as_raw_fd(), events: libc::POLLIN, revents: 0 };
-        let milliseconds = i32::try_from(patience.as_millis()).unwrap_or(i32::MAX);
-        // SAFETY: one valid pollfd whose descriptor `self` owns.
-        #[allow(unsafe_code)]
-        let ready = unsafe { libc::poll(&mut entry, 1, milliseconds) };
-        ready > 0
+        let until = clock::now() + Nanoseconds(i64::try_from(patience.as_nanos()).unwrap_or(LONG));
+        let mut left = patience;
+        loop {
+            let mut entry =
+                libc::pollfd { fd: self.descriptor.as_raw_fd(), events: libc::POLLIN, revents: 0 };
+            let milliseconds = i32::try_from(left.as_millis()).unwrap_or(i32::MAX);
+            // SAFETY: one valid pollfd whose descriptor `self` owns.
+            #[allow(unsafe_code)]
+            let ready = unsafe { libc::poll(&mut entry, 1, milliseconds) };
+            let nanoseconds = (until - clock::now()).0;
+            if ready >= 0 || nanoseconds <= 0 {
+                return ready > 0;
+            }
+            left = Duration::from_nanos(nanoseconds.unsigned_abs());
+        }
     }
 
     /// Sends it a signal; a process that has ended is not an error.

@@ -4,6 +4,7 @@
 //! `{"part": VALUE}` and then one `{"reply": VALUE}`, or `{"error": TEXT}`.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
+use std::ops::ControlFlow;
 use std::os::fd::AsRawFd;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -21,8 +22,11 @@ use crate::instance::{Instance, user};
 /// Longest line that either side takes, in bytes.
 const MAX_LINE: u64 = 1 << 20;
 
-/// How long a client waits for a plain answer; planning happens elsewhere, so this is long.
-const ANSWER_PATIENCE: Duration = Duration::from_secs(10);
+/// How long a client waits for a plain answer: longer than the holder waits for the controller.
+pub const ANSWER_PATIENCE: Duration = Duration::from_secs(4);
+
+/// How often a client that follows a request looks up from it.
+const FOLLOW_PERIOD: Duration = Duration::from_millis(100);
 
 /// How often the accepting thread looks whether it shall end.
 const LOOK_PERIOD: Duration = Duration::from_millis(20);
@@ -52,6 +56,20 @@ pub enum SocketError {
     Ended {
         /// The instance's name.
         instance: String,
+    },
+    /// The holder lives and says nothing.
+    #[error(
+        "the pipeline of instance {instance:?} did not answer within {} s: its process {pid} is \
+         stopped or hangs",
+        .patience.as_secs_f64()
+    )]
+    Silent {
+        /// The instance's name.
+        instance: String,
+        /// The holder's process.
+        pid: i32,
+        /// How long it was waited for.
+        patience: Duration,
     },
     /// The holder refused to listen.
     #[error("{0}")]
@@ -226,6 +244,12 @@ fn write_line(mut stream: &UnixStream, value: &Value) -> io::Result<()> {
     stream.write_all(line.as_bytes())
 }
 
+/// One line of an answer.
+enum Answer {
+    Part(Value),
+    Reply(Value),
+}
+
 /// An operator's side.
 #[derive(Debug)]
 pub struct OperatorClient {
@@ -257,48 +281,107 @@ impl OperatorClient {
         }
     }
 
-    /// Sends a request and gives its reply; parts are dropped. Waits at most ten seconds.
+    /// Sends a request and gives its reply; parts are dropped.
+    ///
+    /// # Errors
+    /// [`SocketError::Silent`] when no answer comes within [`ANSWER_PATIENCE`].
     pub fn request(&mut self, request: &Value) -> Result<Value, SocketError> {
-        self.exchange(request, Some(ANSWER_PATIENCE), |_| ())
+        self.request_within(request, ANSWER_PATIENCE)
+    }
+
+    /// Like [`Self::request`], waiting at most `patience` for each line.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn request_within(
+        &mut self,
+        request: &Value,
+        patience: Duration,
+    ) -> Result<Value, SocketError> {
+        self.send(request, Some(patience))?;
+        loop {
+            if let Answer::Reply(value) = self.answer()? {
+                return Ok(value);
+            }
+        }
     }
 
     /// Sends a request, hands each part to `part` as it comes, and gives the reply, however long
-    /// it takes.
-    pub fn follow(
+    /// it takes. `part` gets `None` every tenth of a second in which nothing came, so that whoever
+    /// follows can look at other things; when it breaks, what it breaks with is given instead.
+    ///
+    /// # Errors
+    /// A holder that goes away or does not understand.
+    pub fn follow<B>(
         &mut self,
         request: &Value,
-        part: impl FnMut(Value),
-    ) -> Result<Value, SocketError> {
-        self.exchange(request, None, part)
+        mut part: impl FnMut(Option<Value>) -> ControlFlow<B>,
+    ) -> Result<ControlFlow<B, Value>, SocketError> {
+        self.send(request, None)?;
+        loop {
+            let heard = if self.has_words(FOLLOW_PERIOD) {
+                match self.answer()? {
+                    Answer::Part(value) => Some(value),
+                    Answer::Reply(value) => return Ok(ControlFlow::Continue(value)),
+                }
+            } else {
+                None
+            };
+            if let ControlFlow::Break(why) = part(heard) {
+                return Ok(ControlFlow::Break(why));
+            }
+        }
     }
 
-    fn exchange(
-        &mut self,
-        request: &Value,
-        patience: Option<Duration>,
-        mut part: impl FnMut(Value),
-    ) -> Result<Value, SocketError> {
+    fn send(&mut self, request: &Value, patience: Option<Duration>) -> Result<(), SocketError> {
+        let stream = self.reader.get_ref();
+        let sent = stream
+            .set_read_timeout(patience)
+            .and_then(|()| stream.set_write_timeout(patience))
+            .and_then(|()| write_line(stream, request));
+        sent.map_err(|error| self.failed(error))
+    }
+
+    /// The next line of the answer.
+    fn answer(&mut self) -> Result<Answer, SocketError> {
         let ended = || SocketError::Ended { instance: self.instance.clone() };
-        let failed = |source: io::Error| match source.kind() {
+        let line = read_line(&mut self.reader);
+        let line = line.map_err(|error| self.failed(error))?.ok_or_else(ended)?;
+        let mut answer: Value = serde_json::from_str(&line)
+            .map_err(|error| self.failed(io::Error::other(error.to_string())))?;
+        if let Some(value) = answer.get_mut("part") {
+            Ok(Answer::Part(value.take()))
+        } else if let Some(value) = answer.get_mut("reply") {
+            Ok(Answer::Reply(value.take()))
+        } else {
+            let text = answer["error"].as_str().unwrap_or("the answer is not understood");
+            Err(SocketError::Refused(text.into()))
+        }
+    }
+
+    /// Waits at most `patience` for something to read.
+    fn has_words(&self, patience: Duration) -> bool {
+        let descriptor = self.reader.get_ref().as_raw_fd();
+        let mut entry = libc::pollfd { fd: descriptor, events: libc::POLLIN, revents: 0 };
+        let milliseconds = i32::try_from(patience.as_millis()).unwrap_or(i32::MAX);
+        // SAFETY: one valid pollfd whose descriptor the stream in `self.reader` owns.
+        #[allow(unsafe_code)]
+        let mut ready = || unsafe { libc::poll(&mut entry, 1, milliseconds) } > 0;
+        !self.reader.buffer().is_empty() || ready()
+    }
+
+    fn failed(&self, source: io::Error) -> SocketError {
+        let instance = self.instance.clone();
+        match source.kind() {
             io::ErrorKind::BrokenPipe
             | io::ErrorKind::ConnectionReset
-            | io::ErrorKind::InvalidData => SocketError::Ended { instance: self.instance.clone() },
-            _ => SocketError::Io { path: self.path.clone(), source },
-        };
-        self.reader.get_ref().set_read_timeout(patience).map_err(failed)?;
-        write_line(self.reader.get_ref(), request).map_err(failed)?;
-        loop {
-            let line = read_line(&mut self.reader).map_err(failed)?.ok_or_else(ended)?;
-            let mut answer: Value = serde_json::from_str(&line)
-                .map_err(|error| failed(io::Error::other(error.to_string())))?;
-            if let Some(value) = answer.get_mut("part") {
-                part(value.take());
-            } else if let Some(value) = answer.get_mut("reply") {
-                return Ok(value.take());
-            } else {
-                let text = answer["error"].as_str().unwrap_or("the answer is not understood");
-                return Err(SocketError::Refused(text.into()));
+            | io::ErrorKind::InvalidData => SocketError::Ended { instance },
+            io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => {
+                let pid = credentials(self.reader.get_ref()).map_or(0, |holder| holder.pid);
+                let patience = self.reader.get_ref().read_timeout().ok().flatten();
+                SocketError::Silent { instance, pid, patience: patience.unwrap_or_default() }
             }
+            _ => SocketError::Io { path: self.path.clone(), source },
         }
     }
 }

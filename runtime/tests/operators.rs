@@ -5,6 +5,7 @@
 mod scratch;
 
 use std::io::{BufRead, BufReader, Write};
+use std::ops::ControlFlow;
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
@@ -43,7 +44,11 @@ fn requests_are_answered_in_order_with_their_parts() {
 
     assert_eq!(client.request(&json!({ "to": 3 })).unwrap(), json!({ "sum": 6 }));
     let mut parts = Vec::new();
-    let reply = client.follow(&json!({ "to": 4 }), |part| parts.push(part)).unwrap();
+    let reply = client.follow(&json!({ "to": 4 }), |part| {
+        parts.extend(part);
+        ControlFlow::<()>::Continue(())
+    });
+    let ControlFlow::Continue(reply) = reply.unwrap() else { panic!("nobody broke off") };
     assert_eq!(
         (reply, parts),
         (json!({ "sum": 10 }), vec![json!(1), json!(2), json!(3), json!(4)])

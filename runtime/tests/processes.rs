@@ -7,7 +7,7 @@
 
 mod scratch;
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -332,15 +332,19 @@ fn a_child_that_joined_gives_its_inheritance_back() {
 }
 
 #[test]
-fn a_dropped_child_is_ended() {
+fn a_dropped_child_is_asked_to_end_and_not_killed() {
     let scratch = Scratch::new();
     let holder = Domain::create(scratch.instance()).unwrap();
-    let mut cat = Command::new("cat");
-    cat.stdin(Stdio::piped()).stdout(Stdio::piped());
-    let mut child = ChildProcess::spawn(&holder, cat).unwrap();
-    child.child().stdin.as_mut().unwrap().write_all(b"alive\n").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let said = folder.path().join("said");
+    let mut shell = Command::new("sh");
+    let script = "trap 'echo asked; exit 0' TERM; echo ready; while :; do sleep 0.02; done";
+    shell.arg("-c").arg(script).stdin(Stdio::null());
+    shell.stdout(std::fs::File::create(&said).unwrap());
+    let child = ChildProcess::spawn(&holder, shell).unwrap();
     let peer = runtime::peer::Peer::open(child.pid()).unwrap();
-    assert!(peer.is_alive());
+    eventually("it is ready", || std::fs::read_to_string(&said).unwrap() == "ready\n");
     drop(child);
-    assert!(!peer.is_alive());
+    assert!(peer.ended_within(PATIENCE));
+    assert_eq!(std::fs::read_to_string(&said).unwrap(), "ready\nasked\n");
 }
