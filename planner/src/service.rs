@@ -70,6 +70,8 @@ struct Sending {
 
 struct Service {
     machine: Machine,
+    /// The domain's directory, for a refusal that the run folder cannot take.
+    spare: PathBuf,
     peers: Peers,
     offers: Subscriber<JobOffer>,
     progress: Subscriber<Progress>,
@@ -85,6 +87,7 @@ impl Service {
     fn open(domain: &Domain, machine: &Machine) -> Result<Self, ServiceError> {
         let mut service = Self {
             machine: machine.clone(),
+            spare: domain.instance().root(),
             peers: Peers::watch(domain, &[Role::Domain])?,
             offers: domain.subscriber(Reading::Newest)?,
             progress: domain.subscriber(Reading::Newest)?,
@@ -186,7 +189,7 @@ impl Service {
                 self.begin_stream(plan, plan_time)
             }
             Err(refusal) => {
-                desk::write_refusal(folder, &refusal);
+                desk::write_refusal(folder, &self.spare, &refusal);
                 self.work = Work::Idle;
                 self.enter(PlannerPhase::Refused)
             }

@@ -199,7 +199,8 @@ fn of_tables(
         Ok(findings.finish(job_of(drawing, marking))?)
     } else if let Some(cloud) = cloud {
         let drawing = cloud_table::draw(&cloud, folder, power, &mut findings, machine)?;
-        Ok(findings.finish(job_of(drawing, marking))?)
+        let files = cloud.file.iter().map(|file| folder.join(&file.value)).collect();
+        Ok(findings.finish(Job { files, ..job_of(drawing, marking) })?)
     } else if let Some(program) = gcode {
         let path: PathBuf = folder.join(&program.file.value);
         of_program(&path, marking, findings, machine)
@@ -303,7 +304,8 @@ fn of_program(
     findings.finish(())?;
     let text = super::read_program(path)?;
     let program = gcode::read(&path.display().to_string(), &text, machine)?;
-    Ok(Job { program: Some(program.facts), ..job_of(program.drawing, marking) })
+    let files = vec![path.to_owned()];
+    Ok(Job { program: Some(program.facts), files, ..job_of(program.drawing, marking) })
 }
 
 fn job_of(drawing: Drawing, marking: &MarkingTable) -> Job {

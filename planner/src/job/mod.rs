@@ -39,6 +39,8 @@ pub struct Job {
     pub surface: Option<machine::surface::Surface>,
     /// How the tool is turned.
     pub attitude: crate::attitude::AttitudeLaw,
+    /// The files that it was read from.
+    pub files: Vec<PathBuf>,
 }
 
 impl Job {
@@ -53,6 +55,7 @@ impl Job {
             standing: None,
             surface: None,
             attitude: crate::attitude::AttitudeLaw::Level,
+            files: Vec::new(),
         }
     }
 }
@@ -147,7 +150,9 @@ impl Job {
         let name = path.display().to_string();
         let document = Document::parse(&name, &text)?.override_with(overrides, "")?;
         let folder = path.parent().unwrap_or_else(|| Path::new(""));
-        file::job(document, folder, machine)
+        let mut job = file::job(document, folder, machine)?;
+        job.files.push(path.to_owned());
+        Ok(job)
     }
 
     /// The built-in job, letters at 20 mm, with `overrides` of its keys laid over it.

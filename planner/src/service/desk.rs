@@ -9,8 +9,11 @@ use machine::kinematics::{Joints, KinematicsError};
 use machine::transmission::rest;
 use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea};
 use nalgebra::Vector3;
+use runtime::message;
 use signals::axis::axis_array;
 use signals::{AxisArray, run_folder};
+use std::fmt::Display;
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -44,8 +47,10 @@ pub(super) fn plan_request(
     standing: Option<&AxisArray>,
     abandoned: &AtomicBool,
 ) -> Result<Plan, Refusal> {
-    let text = std::fs::read(folder.join(run_folder::REQUEST)).map_err(Refusal::internal)?;
-    let request: JobRequest = serde_json::from_slice(&text).map_err(Refusal::internal)?;
+    let file = folder.join(run_folder::REQUEST);
+    let failed = |error: &dyn Display| Refusal::internal(format!("{}: {error}", file.display()));
+    let text = std::fs::read(&file).map_err(|error| failed(&error))?;
+    let request: JobRequest = serde_json::from_slice(&text).map_err(|error| failed(&error))?;
     let mut job = request.read(machine)?;
     if let Some(standing) = standing {
         approach(&mut job, machine, standing).map_err(Refusal::internal)?;
@@ -57,18 +62,22 @@ pub(super) fn plan_request(
 }
 
 /// Says in the run folder why the job was refused. Where that cannot be written, such as on a full
-/// disk, standard error is all there is.
-pub(super) fn write_refusal(folder: &Path, refusal: &Refusal) {
-    let path = folder.join(run_folder::REFUSAL);
-    let text = serde_json::to_vec_pretty(refusal).map_err(std::io::Error::other);
-    if let Err(error) = text.and_then(|text| std::fs::write(&path, text)) {
-        eprintln!("graver: {}: {error}: {}", path.display(), refusal.message);
+/// disk, it is said in `spare`, and where that cannot be written either, on standard error.
+pub(super) fn write_refusal(folder: &Path, spare: &Path, refusal: &Refusal) {
+    let text = serde_json::to_vec_pretty(refusal).unwrap_or_default();
+    let places = [folder.join(run_folder::REFUSAL), spare.join(run_folder::REFUSAL)];
+    if !places.iter().any(|place| std::fs::write(place, &text).is_ok()) {
+        message::tell(refusal.text.trim());
     }
 }
 
-fn write_plan(folder: &Path, plan: &Plan) -> std::io::Result<()> {
+fn write_plan(folder: &Path, plan: &Plan) -> io::Result<()> {
     let write = |name: &str, content: serde_json::Result<Vec<u8>>| {
-        std::fs::write(folder.join(name), content.map_err(std::io::Error::other)?)
+        let path = folder.join(name);
+        let written =
+            content.map_err(io::Error::other).and_then(|text| std::fs::write(&path, text));
+        written
+            .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
     };
     write(run_folder::ARTWORK, serde_json::to_vec(&plan.artwork))?;
     write(run_folder::PLAN, serde_json::to_vec_pretty(&plan.facts))
