@@ -1,7 +1,7 @@
 //! Exit codes, in one place, and the error that carries one.
 
 use machine::document::DocumentError;
-use monitor::summary::{ErrorSummary, Outcome};
+use monitor::summary::{ErrorSummary, JobSummary, MachineSummary, Outcome, Summary};
 use planner::request::Refusal;
 
 /// How a command ended, as the shell sees it.
@@ -9,7 +9,7 @@ use planner::request::Refusal;
 pub enum Exit {
     /// Done.
     Done = 0,
-    /// Stopped by a person, or a request or check that failed.
+    /// Stopped by a person, or a request, check or output that failed.
     Stopped = 1,
     /// Bad arguments, machine file or job.
     BadInput = 2,
@@ -28,7 +28,7 @@ impl Exit {
         match self {
             Self::Done => "done",
             Self::Stopped => {
-                "stopped by a person (Ctrl-C, graver stop), or a request or check that failed"
+                "stopped by a person (Ctrl-C, graver stop), or a request, check or output that failed"
             }
             Self::BadInput => "bad arguments, machine file or job",
             Self::Fault => "a fault stopped the machine",
@@ -83,14 +83,28 @@ impl Failure {
         Self { outcome: Outcome::Aborted, refusal: Refusal::internal(error) }
     }
 
+    /// What a person took back.
+    pub fn stopped(message: impl std::fmt::Display) -> Self {
+        Self { outcome: Outcome::Stopped, refusal: Refusal::internal(message) }
+    }
+
+    /// Output that could not be written.
+    pub fn output(error: impl std::fmt::Display) -> Self {
+        Self::stopped(error)
+    }
+
     /// The exit code that goes with it.
     pub fn exit(&self) -> Exit {
         self.outcome.into()
     }
 
-    /// The error as a summary tells it.
-    pub fn summary(&self) -> ErrorSummary {
-        error_summary(&self.refusal)
+    /// The summary of a run that ended before there was a machine or a job to speak of.
+    pub fn summary(&self) -> Summary {
+        let (job, machine) = (JobSummary::default(), MachineSummary::default());
+        Summary {
+            error: Some(error_summary(&self.refusal)),
+            ..Summary::new(self.outcome, job, machine)
+        }
     }
 }
 

@@ -7,6 +7,7 @@
 pub mod arguments;
 pub mod commands;
 pub mod exit;
+pub mod files;
 pub mod inputs;
 pub mod output;
 pub mod pipeline;
@@ -60,7 +61,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Controller(arguments) => service::run(Role::Controller, arguments),
         Command::Drives(arguments) => service::run(Role::Drives, arguments),
         Command::Monitor(arguments) => service::run(Role::Monitor, arguments),
-        Command::Completions { shell } => Ok(manual::completions(*shell)),
+        Command::Completions { shell } => manual::completions(*shell),
         Command::Manual { folder } => manual::pages(folder),
         Command::VerifySummary { file } => verify::run(file),
     }

@@ -1,49 +1,65 @@
 //! What commands print: JSON for scripts on standard output, text for people on standard error.
 
 use crate::exit::{Exit, Failure};
-use monitor::summary::{JobSummary, MachineSummary, Summary};
+use monitor::summary::Summary;
+use runtime::message;
 use serde::Serialize;
-use std::io::{ErrorKind, IsTerminal, Write};
+use std::io::{self, ErrorKind, IsTerminal, Write};
+
+/// Writes one line for people on standard error, as `eprintln!` would; what cannot be written there
+/// is dropped.
+macro_rules! say {
+    ($($text:tt)*) => {
+        runtime::message::write(format_args!("{}\n", format_args!($($text)*)))
+    };
+}
+pub(crate) use say;
 
 /// Prints one JSON object.
 ///
 /// # Errors
-/// When standard output is closed.
+/// When standard output cannot be written.
 pub fn json(value: &impl Serialize) -> Result<(), Failure> {
-    let mut text = serde_json::to_string_pretty(value).map_err(Failure::service)?;
+    let mut text = serde_json::to_string_pretty(value).map_err(Failure::output)?;
     text.push('\n');
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        // Whoever read has read enough, as `head` does.
+    printed(io::stdout().lock().write_all(text.as_bytes()))
+}
+
+/// Judges what became of writing to standard output. Whoever reads there and leaves has read
+/// enough, as `head` does.
+///
+/// # Errors
+/// When it could not be written for another reason.
+pub fn printed(written: io::Result<()>) -> Result<(), Failure> {
+    match written {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        written => written.map_err(Failure::service),
+        written => written.map_err(|error| Failure::output(format!("standard output: {error}"))),
     }
 }
 
-/// Prints a summary, as JSON or as text, and gives the exit code of its outcome.
-///
-/// # Errors
-/// When standard output is closed.
-pub fn summary(summary: &Summary, as_json: bool) -> Result<Exit, Failure> {
+/// Prints a summary, as JSON or as text, and gives the exit code of its outcome: what happened on
+/// the machine, whether or not the summary could be printed.
+pub fn summary(summary: &Summary, as_json: bool) -> Exit {
     if as_json {
         for warning in summary.warnings.iter().chain(&summary.realtime.warnings) {
-            eprintln!("graver: warning: {warning}");
+            say!("graver: warning: {warning}");
         }
-        json(summary)?;
+        if let Err(failure) = json(summary) {
+            message::tell(failure.refusal.text.trim());
+            message::write(format_args!("{}", summary.text()));
+        }
     } else {
-        eprint!("{}", summary.text());
+        message::write(format_args!("{}", summary.text()));
     }
-    Ok(summary.outcome.into())
+    summary.outcome.into()
 }
 
 /// Prints a failure. With `as_json` the object is a summary too, so that scripts read one kind.
 pub fn failure(failure: &Failure, as_json: bool) {
-    eprintln!("graver: {}", failure.refusal.text.trim());
+    message::tell(failure.refusal.text.trim());
     if as_json {
-        let mut summary =
-            Summary::new(failure.outcome, JobSummary::default(), MachineSummary::default());
-        summary.error = Some(failure.summary());
-        // With standard output closed there is nobody to tell.
-        let _ = json(&summary);
+        // Where standard output cannot be written there is nobody to tell.
+        let _ = json(&failure.summary());
     }
 }
 
@@ -67,13 +83,16 @@ impl ProgressLine {
         }
         let filled = ((share.clamp(0.0, 1.0) * WIDTH as f64) as usize).min(WIDTH);
         let bar: String = "█".repeat(filled) + &"░".repeat(WIDTH - filled);
-        eprint!("\r\x1b[K{bar} {:3.0} % {text}", share.clamp(0.0, 1.0) * 100.0);
+        message::write(format_args!(
+            "\r\x1b[K{bar} {:3.0} % {text}",
+            share.clamp(0.0, 1.0) * 100.0
+        ));
     }
 
     /// Clears the line.
     pub fn clear(&self) {
         if self.shown {
-            eprint!("\r\x1b[K");
+            message::write(format_args!("\r\x1b[K"));
         }
     }
 }

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use signals::artwork::Artwork;
 use signals::plan::PlanFacts;
 use signals::time::CYCLE_TIME;
-use signals::{ControllerReport, DrivesReport, RealtimeFacts, run_folder};
+use signals::{ControllerReport, DrivesReport, Fault, RealtimeFacts, run_folder};
 use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::time::Instant;
@@ -66,6 +66,8 @@ pub struct Ending {
     pub controller: Option<ControllerReport>,
     /// The newest report of drives, if any came.
     pub drives: Option<DrivesReport>,
+    /// A fault that no report of the stream tells: one before it was played.
+    pub fault: Option<Fault>,
     /// Overruns counted before the run began.
     pub overruns_before: u64,
     /// Name of the job, for a run that was never planned.
@@ -117,7 +119,11 @@ pub fn summarise(
     if let Some(report) = &ending.drives {
         summary.overruns = report.overruns.saturating_sub(ending.overruns_before);
     }
-    let faults = [ending.controller.map(|report| report.fault), ending.drives.map(|it| it.fault)];
+    let faults = [
+        ending.controller.map(|report| report.fault),
+        ending.fault,
+        ending.drives.map(|report| report.fault),
+    ];
     summary.fault =
         faults.iter().flatten().find_map(|fault| FaultSummary::of(fault, &machine.axes));
     summary.outcome = outcome(ending, summary.fault.is_some());
@@ -193,7 +199,7 @@ pub fn conclude(
     machine: &Machine,
     ending: &Ending,
     started: Instant,
-) -> io::Result<Summary> {
+) -> Summary {
     let began = Instant::now();
     let mut ending = ending.clone();
     let (mut plan, mut artwork, mut findings) = (PlanFacts::default(), Artwork::default(), None);
@@ -212,8 +218,11 @@ pub fn conclude(
     let mut summary = summarise(machine, &plan, &ending, findings.as_ref(), Clock::Real);
     summary.report_time = began.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
-    write(folder, machine, &artwork, &mut summary, findings.as_ref())?;
-    Ok(summary)
+    if let Err(error) = write(folder, machine, &artwork, &mut summary, findings.as_ref()) {
+        let path = folder.file(run_folder::SUMMARY);
+        summary.warnings.push(format!("{} could not be written: {error}", path.display()));
+    }
+    summary
 }
 
 /// Writes report and summary into the run folder, tells the summary where that is, and adds what

@@ -73,6 +73,8 @@ struct Recording {
     newest: u64,
     /// Whether the job was taken back.
     withdrawn: bool,
+    /// Whether nothing more of it will be played.
+    closed: bool,
     /// Whether any of the stream was played.
     played: bool,
     /// Overruns counted before this recording.
@@ -127,6 +129,7 @@ impl Service {
                 && recording.stream == offer.stream
             {
                 recording.withdrawn = true;
+                recording.closed = offer.is_over == 1;
             }
             return Ok(());
         };
@@ -171,7 +174,7 @@ impl Service {
         let is_final = self.controller.is_final == 1 && self.controller.stream == stream;
         ending.controller = is_final.then_some(self.controller);
         ending.drives = self.drives;
-        conclusion::conclude(&folder, machine, &ending, began)?;
+        conclusion::conclude(&folder, machine, &ending, began);
         Ok(())
     }
 }
@@ -191,6 +194,7 @@ impl Recording {
             records: 0,
             newest: 0,
             withdrawn: false,
+            closed: false,
             played: false,
             overruns_before,
             folder,
@@ -229,7 +233,8 @@ impl Recording {
     fn is_over(&self, report: &ControllerReport, more_comes: bool) -> bool {
         let ended = report.is_final == 1 && report.stream == self.stream;
         let told = self.newest >= report.last_cycle.0.saturating_add(LIGHT_LAG);
-        (ended && told)
+        self.closed
+            || (ended && told)
             || (self.withdrawn && !self.played)
             || ((ended || self.withdrawn) && !more_comes)
     }

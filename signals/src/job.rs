@@ -39,9 +39,12 @@ sample! {
     /// A job to plan and stream. The job itself is in `request.json` in the run folder.
     ///
     /// An offer without a folder cancels the stream of its number, planned or half sent.
-    JobOffer = "graver.JobOffer.v1" {
+    JobOffer = "graver.JobOffer.v2" {
         /// The stream number the job gets; each job of a domain a new one, from 1.
         stream: u64,
+        /// 1 in an offer without a folder when nothing more of the stream will be played; 0 when
+        /// what is being played goes on until the axes rest.
+        is_over: u64,
         /// Bytes of `folder` that count.
         folder_length: u64,
         /// Path of the run folder, UTF-8.

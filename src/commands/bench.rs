@@ -2,6 +2,7 @@
 
 use crate::arguments::{BenchArguments, LatencyArguments};
 use crate::exit::{Exit, Failure};
+use crate::output::say;
 use crate::pipeline::configuration::Configuration;
 use crate::pipeline::{LOOK, Pipeline, Starter};
 use crate::{inputs, output};
@@ -53,22 +54,22 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Exit, Failure> {
         inputs::job_request(None, &input.machine, input.folder.as_deref(), &input.job_overrides)
             .absolute();
     let configuration = Configuration::new(input.source.clone(), &arguments.drives)?;
-    let mut pipeline = Pipeline::start(&instance, configuration, Starter::Own)?;
-    let folder = std::env::temp_dir().join(format!("graver-{name}"));
-    let measured = std::fs::create_dir_all(&folder)
-        .map_err(Failure::service)
-        .and_then(|()| measure(&mut pipeline, &request, &folder, &instance, arguments.seconds));
+    // Of an unpredictable name and for this user alone; it goes when this ends.
+    let folder = tempfile::Builder::new()
+        .prefix("graver-bench-")
+        .tempdir()
+        .map_err(|error| Failure::output(format!("{}: {error}", std::env::temp_dir().display())))?;
+    let mut pipeline = Pipeline::start(&instance, &configuration, Starter::Own)?;
+    let measured = pipeline.enable().and_then(|()| {
+        measure(&mut pipeline, &request, folder.path(), &instance, arguments.seconds)
+    });
     let heard = pipeline.heard;
     pipeline.shut_down();
-    // A folder in the temporary directory; what stays there harms nobody.
-    let _ = std::fs::remove_dir_all(&folder);
     let measured = measured?;
 
     if arguments.periods {
-        let mut output = std::io::stdout().lock();
-        for period in &measured.periods {
-            writeln!(output, "{period}").map_err(Failure::service)?;
-        }
+        let lines: String = measured.periods.iter().map(|period| format!("{period}\n")).collect();
+        output::printed(std::io::stdout().lock().write_all(lines.as_bytes()))?;
         return Ok(Exit::Done);
     }
     let ending = Ending {
@@ -97,12 +98,9 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Exit, Failure> {
 
 fn print_latency(report: &LatencyReport) {
     let micro = |value: u64| value as f64 * 1e-3;
-    eprintln!(
-        "{:<14}{:>9}{:>10}{:>10}{:>10}{:>10}",
-        "", "count", "p50", "p99", "p99.9", "max [µs]"
-    );
+    say!("{:<14}{:>9}{:>10}{:>10}{:>10}{:>10}", "", "count", "p50", "p99", "p99.9", "max [µs]");
     let row = |name: &str, hop: &HopLatency| {
-        eprintln!(
+        say!(
             "{name:<14}{:>9}{:>10.1}{:>10.1}{:>10.1}{:>10.1}",
             hop.count,
             micro(hop.p50),
@@ -115,13 +113,13 @@ fn print_latency(report: &LatencyReport) {
         row(name, hop);
     }
     row("period error", &report.period_error);
-    eprintln!("{} cycles, {} overruns, {} missed", report.cycles, report.overruns, report.missed);
-    eprintln!("scheduler {}, priority {}", report.realtime.scheduler, report.realtime.priority);
+    say!("{} cycles, {} overruns, {} missed", report.cycles, report.overruns, report.missed);
+    say!("scheduler {}, priority {}", report.realtime.scheduler, report.realtime.priority);
     for (name, core) in &report.realtime.cores {
-        eprintln!("{name} on CPU {core}");
+        say!("{name} on CPU {core}");
     }
     for warning in &report.realtime.warnings {
-        eprintln!("warning   {warning}");
+        say!("warning   {warning}");
     }
 }
 
@@ -163,7 +161,9 @@ fn measure(
     seconds: f64,
 ) -> Result<Measured, Failure> {
     let text = serde_json::to_vec(request).map_err(Failure::service)?;
-    std::fs::write(folder.join(run_folder::REQUEST), text).map_err(Failure::service)?;
+    let file = folder.join(run_folder::REQUEST);
+    std::fs::write(&file, text)
+        .map_err(|error| Failure::output(format!("{}: {error}", file.display())))?;
     let observer = Domain::join(instance, Role::Observer).map_err(Failure::service)?;
     let mut feedbacks: Subscriber<Feedback> =
         observer.subscriber(Reading::Every).map_err(Failure::service)?;
@@ -301,15 +301,11 @@ fn speed(
     if arguments.json {
         output::json(&report)?;
     } else {
-        eprintln!("job        {}", report.job);
-        eprintln!("repeated   {} times", report.repetitions);
-        eprintln!(
-            "wall time  {:.3} ms median, {:.3} ms least",
-            median * 1e3,
-            report.wall_min * 1e3
-        );
-        eprintln!("setpoints  {:.0} a second", report.setpoints_per_second);
-        eprintln!("speed      {:.0} × real time", report.realtime_factor);
+        say!("job        {}", report.job);
+        say!("repeated   {} times", report.repetitions);
+        say!("wall time  {:.3} ms median, {:.3} ms least", median * 1e3, report.wall_min * 1e3);
+        say!("setpoints  {:.0} a second", report.setpoints_per_second);
+        say!("speed      {:.0} × real time", report.realtime_factor);
     }
     Ok(Exit::Done)
 }

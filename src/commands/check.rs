@@ -10,6 +10,7 @@ use self::job::JobReport;
 use self::reach::{ReachReport, Surveyed};
 use crate::arguments::CheckArguments;
 use crate::exit::{Exit, Failure};
+use crate::files::Sources;
 use crate::inputs::MachineInput;
 use crate::{inputs, output};
 use machine::Machine;
@@ -20,6 +21,7 @@ use planner::Plan;
 use planner::request::JobRequest;
 use serde::Serialize;
 use signals::artwork::Artwork;
+use std::io::Write;
 use std::path::{Component, Path, PathBuf};
 
 /// What `check --json` prints.
@@ -64,10 +66,17 @@ pub fn run(arguments: &CheckArguments) -> Result<Exit, Failure> {
     let surveyed = reach::survey(machine)
         .map_err(|error| Failure::bad_input(format!("the machine at home: {error}")))?;
     if let Some(path) = &arguments.picture {
-        let artwork = planned.as_ref().map(|(_, plan)| &plan.artwork);
-        draw(path, machine, &surveyed, artwork)?;
+        let artwork = planned.as_ref().map(|planned| &planned.plan.artwork);
+        let picture = picture(machine, &surveyed, artwork)?;
+        let job = planned.as_ref().map_or(&[][..], |planned| &planned.files);
+        let mut file =
+            Sources::new(arguments.machine.machine.as_deref(), job).create("--picture", path)?;
+        file.write_all(picture.as_bytes())
+            .map_err(|error| Failure::output(format!("{}: {error}", path.display())))?;
     }
-    let job = planned.map(|(request, plan)| JobReport::new(machine, &request, plan)).transpose()?;
+    let job = planned
+        .map(|Planned { request, plan, .. }| JobReport::new(machine, &request, plan))
+        .transpose()?;
     let report = CheckReport {
         machine: machine_summary(machine),
         axes: axes::axes(machine),
@@ -84,10 +93,18 @@ pub fn run(arguments: &CheckArguments) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-fn plan(input: &MachineInput, path: &Path) -> Result<(JobRequest, Plan), Failure> {
+/// A job that was planned, with the files that it was read from.
+struct Planned {
+    request: JobRequest,
+    files: Vec<PathBuf>,
+    plan: Plan,
+}
+
+fn plan(input: &MachineInput, path: &Path) -> Result<Planned, Failure> {
     let request = inputs::job_request(Some(path), &input.machine, None, &input.job_overrides);
-    let plan = request.plan(&input.machine)?;
-    Ok((request, plan))
+    let job = request.read(&input.machine)?;
+    let plan = planner::plan(&input.machine, &job).map_err(|error| request.refuse(&error))?;
+    Ok(Planned { request, files: job.files, plan })
 }
 
 /// The sample job, by a path that holds from here.
@@ -124,13 +141,12 @@ fn warnings(machine: &Machine) -> Vec<CheckWarning> {
     warnings.collect()
 }
 
-/// Writes the picture of the workspace.
-fn draw(
-    path: &Path,
+/// The picture of the workspace, as SVG.
+fn picture(
     machine: &Machine,
     surveyed: &Surveyed,
     artwork: Option<&Artwork>,
-) -> Result<(), Failure> {
+) -> Result<String, Failure> {
     let (lower, upper) = (machine.area.lower, machine.area.upper);
     let workspace = Workspace {
         area: [[lower[0], upper[0]], [lower[1], upper[1]]],
@@ -139,7 +155,5 @@ fn draw(
         home: [machine.home[0], machine.home[1]],
         artwork,
     };
-    let picture = workspace.picture().map_err(Failure::bad_input)?;
-    std::fs::write(path, picture)
-        .map_err(|error| Failure::bad_input(format!("cannot write {}: {error}", path.display())))
+    workspace.picture().map_err(Failure::bad_input)
 }

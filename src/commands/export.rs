@@ -2,6 +2,8 @@
 
 use crate::arguments::ExportArguments;
 use crate::exit::{Exit, Failure};
+use crate::files::Sources;
+use crate::output::say;
 use monitor::recording::file::{RecordingError, RecordingReader};
 use monitor::recording::table::TableWriter;
 use monitor::summary::Summary;
@@ -25,18 +27,17 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, Failure> {
     let axes = axes(&recording.with_file_name(run_folder::SUMMARY));
     match &arguments.out {
         Some(path) => {
-            if is_same(path, &recording) {
-                return Err(at(path, "this is the recording itself: name another file"));
-            }
-            let file = File::create(path).map_err(|error| at(path, error))?;
-            export(&recording, reader, &axes, BufWriter::new(file), |error| Err(at(path, error)))
+            let file = Sources::recording(&recording).create("--out", path)?;
+            export(&recording, reader, &axes, BufWriter::new(file), |error| {
+                Err(Failure::output(format!("{}: {error}", path.display())))
+            })
         }
         None => {
             let output = BufWriter::new(io::stdout().lock());
             export(&recording, reader, &axes, output, |error| match error.kind() {
                 // Whoever read has read enough, as `head` does.
                 ErrorKind::BrokenPipe => Ok(Exit::Done),
-                _ => Err(Failure::service(error)),
+                _ => Err(Failure::output(format!("standard output: {error}"))),
             })
         }
     }
@@ -63,7 +64,7 @@ fn export(
             }
             // All records before the torn one are whole.
             Err(error @ RecordingError::Truncated { .. }) => {
-                eprintln!("graver: warning: {}: {error}", recording.display());
+                say!("graver: warning: {}: {error}", recording.display());
             }
             Err(error) => return Err(at(recording, error)),
         }
@@ -79,17 +80,13 @@ fn axes(summary: &Path) -> Vec<String> {
             .and_then(|text| Ok(serde_json::from_slice::<Summary>(&text)?))
             .inspect_err(|error| {
                 let path = summary.display();
-                eprintln!("graver: warning: {path}: {error}: the axes are numbered");
+                say!("graver: warning: {path}: {error}: the axes are numbered");
             })
             .ok(),
     };
     told.map(|summary| summary.machine.axes)
         .filter(|axes| !axes.is_empty())
         .unwrap_or_else(|| (1..=MAX_AXES).map(|axis| format!("axis_{axis}")).collect())
-}
-
-fn is_same(one: &Path, other: &Path) -> bool {
-    one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
 }
 
 fn at(path: &Path, error: impl std::fmt::Display) -> Failure {

@@ -2,14 +2,21 @@
 
 use crate::arguments::Arguments;
 use crate::exit::{Exit, Failure};
+use crate::output;
 use clap::CommandFactory;
+use std::io::Write;
 use std::path::Path;
 
 /// Prints the completion script of a shell.
-pub fn completions(shell: clap_complete::Shell) -> Exit {
-    let mut command = Arguments::command();
-    clap_complete::generate(shell, &mut command, "graver", &mut std::io::stdout());
-    Exit::Done
+///
+/// # Errors
+/// When standard output cannot be written.
+pub fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
+    let mut script = Vec::new();
+    // Into memory: it panics where it cannot write.
+    clap_complete::generate(shell, &mut Arguments::command(), "graver", &mut script);
+    output::printed(std::io::stdout().lock().write_all(&script))?;
+    Ok(Exit::Done)
 }
 
 /// Writes a man page for graver and one for each command into `folder`.

@@ -2,15 +2,23 @@
 
 use crate::arguments::{InstanceArguments, OverrideArguments, SubmitArguments};
 use crate::exit::{Exit, Failure};
+use crate::output::say;
 use crate::output::{self, ProgressLine};
-use crate::pipeline::operators::{Request, Verb};
+use crate::pipeline::operators::{Part, Request, Verb, VerbReply};
 use machine::quantity;
 use monitor::summary::Summary;
 use planner::request::JobRequest;
-use runtime::Instance;
-use runtime::socket::OperatorClient;
-use serde_json::Value;
+use runtime::operator::OperatorLink;
+use runtime::socket::{ANSWER_PATIENCE, OperatorClient, SocketError};
+use runtime::{Domain, Instance, Role, message, signal};
+use serde_json::{Value, json};
+use std::ops::ControlFlow;
 use std::path::absolute;
+use std::time::Duration;
+
+/// How long the supervisor may take to answer a stop or a hold, before the controller is asked past
+/// it.
+const URGENT_PATIENCE: Duration = Duration::from_secs(1);
 
 /// Asks for a verb without argument.
 ///
@@ -38,20 +46,48 @@ pub fn override_rate(arguments: &OverrideArguments) -> Result<Exit, Failure> {
 }
 
 fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure> {
-    let reply = send(request, arguments)?;
+    let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
+    let reply = match send(request, &instance) {
+        Err(error @ SocketError::Silent { .. }) => ask_controller(request, &instance, &error)?,
+        reply => checked(reply.map_err(Failure::service)?)?,
+    };
     if arguments.json {
         output::json(&reply)?;
     }
     let state = reply["state"].as_str().unwrap_or("unknown");
     if reply["accepted"].as_bool() == Some(true) {
         if !arguments.json {
-            eprintln!("accepted; the machine was {state}");
+            say!("accepted; the machine was {state}");
         }
         Ok(Exit::Done)
     } else {
-        eprintln!("graver: refused: not possible while the machine is {state}");
+        say!("graver: refused: not possible while the machine is {state}");
         Ok(Exit::Stopped)
     }
+}
+
+/// Asks the controller itself, past a supervisor that does not answer: a stop or a hold must not
+/// fail for want of a process that moves nothing.
+fn ask_controller(
+    request: &Request,
+    instance: &Instance,
+    silent: &SocketError,
+) -> Result<Value, Failure> {
+    let Request::Verb { verb: verb @ (Verb::Stop | Verb::Hold), value } = request else {
+        return Err(Failure::service(silent));
+    };
+    let asked = || -> Result<VerbReply, String> {
+        let domain = Domain::join_within(instance, Role::Observer, Duration::ZERO);
+        let domain = domain.map_err(|error| error.to_string())?;
+        let link = OperatorLink::start(&domain).map_err(|error| error.to_string())?;
+        let reply = link.request((*verb).into(), *value).map_err(|error| error.to_string())?;
+        Ok(VerbReply::from(reply))
+    };
+    let reply = asked().map_err(|error| {
+        Failure::service(format!("{silent}, and neither did the rest: {error}"))
+    })?;
+    message::tell(&format!("{silent}; the controller was asked past it"));
+    serde_json::to_value(reply).map_err(Failure::service)
 }
 
 /// Says what the pipeline is doing.
@@ -59,24 +95,25 @@ fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure
 /// # Errors
 /// No pipeline.
 pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
-    let status = send(&Request::Status, arguments)?;
+    let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
+    let status = checked(send(&Request::Status, &instance).map_err(Failure::service)?)?;
     if arguments.json {
         output::json(&status)?;
         return Ok(Exit::Done);
     }
     let text = |key: &str| status[key].as_str().unwrap_or("none").to_owned();
-    eprintln!("state      {}", text("state"));
-    eprintln!("job        {}", text("job"));
-    eprintln!("planner    {}", text("planner"));
-    eprintln!("played     {} of {} setpoints", status["played"], status["samples"]);
-    eprintln!("stroke     {}", status["stroke"]);
-    eprintln!("rate       {:.0} %", status["rate"].as_f64().unwrap_or(0.0) * 100.0);
-    eprintln!("fault      {}", text("fault"));
-    eprintln!("cycles     {}, {} overruns", status["cycles"], status["overruns"]);
+    say!("state      {}", text("state"));
+    say!("job        {}", text("job"));
+    say!("planner    {}", text("planner"));
+    say!("played     {} of {} setpoints", status["played"], status["samples"]);
+    say!("stroke     {}", status["stroke"]);
+    say!("rate       {:.0} %", status["rate"].as_f64().unwrap_or(0.0) * 100.0);
+    say!("fault      {}", text("fault"));
+    say!("cycles     {}, {} overruns", status["cycles"], status["overruns"]);
     for (name, pid) in status["services"].as_object().into_iter().flatten() {
         match pid.as_i64() {
-            Some(pid) => eprintln!("{name:<10} pid {pid}"),
-            None => eprintln!("{name:<10} not running"),
+            Some(pid) => say!("{name:<10} pid {pid}"),
+            None => say!("{name:<10} not running"),
         }
     }
     Ok(Exit::Done)
@@ -89,35 +126,77 @@ pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
 pub fn submit(arguments: &SubmitArguments) -> Result<Exit, Failure> {
     let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
     let mut client = OperatorClient::connect(&instance).map_err(Failure::service)?;
+    signal::install().map_err(Failure::service)?;
     let whole = |path: &std::path::Path| absolute(path).unwrap_or_else(|_| path.to_owned());
     let out = match &arguments.out {
         Some(path) => whole(path),
         None => {
             let name = arguments.job.file_stem().unwrap_or_default().to_string_lossy();
-            let here = std::env::current_dir().map_err(Failure::service)?;
+            let here = std::env::current_dir()
+                .map_err(|error| Failure::bad_input(format!("the current directory: {error}")))?;
             let folder = monitor::run_folder::RunFolder::create_below(&here, &name);
-            folder.map_err(Failure::service)?.path().to_owned()
+            folder.map_err(Failure::bad_input)?.path().to_owned()
         }
     };
     let job = JobRequest { job: Some(whole(&arguments.job)), set: arguments.set.clone() };
     let request = Request::Submit { job, out: Some(out) };
+    let mut follower = Follower { instance: &instance, job: None, told: 0 };
     let line = ProgressLine::on_terminal();
     let request = serde_json::to_value(&request).map_err(Failure::service)?;
-    let reply = client
-        .follow(&request, |part| {
-            line.draw(part["share"].as_f64().unwrap_or(0.0), "submitted job");
-        })
-        .map_err(Failure::service)?;
+    let reply =
+        client.follow(&request, |part| follower.follow(part, &line)).map_err(Failure::service)?;
     line.clear();
-    let summary: Summary = serde_json::from_value(checked(reply)?).map_err(Failure::service)?;
-    output::summary(&summary, arguments.instance.json)
+    let reply = match reply {
+        ControlFlow::Continue(reply) => checked(reply)?,
+        ControlFlow::Break(message) => return Err(Failure::stopped(message)),
+    };
+    let summary: Summary = serde_json::from_value(reply).map_err(Failure::service)?;
+    Ok(output::summary(&summary, arguments.instance.json))
 }
 
-fn send(request: &Request, arguments: &InstanceArguments) -> Result<Value, Failure> {
-    let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
-    let mut client = OperatorClient::connect(&instance).map_err(Failure::service)?;
-    let request = serde_json::to_value(request).map_err(Failure::service)?;
-    checked(client.request(&request).map_err(Failure::service)?)
+/// Follows a job that was submitted. A signal takes the job back and is told; a second one leaves
+/// the job to come to rest alone.
+struct Follower<'a> {
+    instance: &'a Instance,
+    job: Option<u64>,
+    /// Signals that were heeded.
+    told: u32,
+}
+
+impl Follower<'_> {
+    fn follow(&mut self, part: Option<Value>, line: &ProgressLine) -> ControlFlow<String> {
+        match part.map(serde_json::from_value) {
+            Some(Ok(Part::Accepted(job))) => self.job = Some(job),
+            Some(Ok(Part::Share(share))) => line.draw(share, "submitted job"),
+            // A part of a later version, or none.
+            Some(Err(_)) | None => {}
+        }
+        let signals = signal::termination().map_or(0, |termination| termination.count);
+        let Some(job) = self.job.filter(|_| signals > self.told) else {
+            return ControlFlow::Continue(());
+        };
+        let before = std::mem::replace(&mut self.told, signals);
+        line.clear();
+        if before > 0 {
+            return ControlFlow::Break(format!("job {job} is left to come to rest alone"));
+        }
+        match send(&Request::Withdraw { job }, self.instance) {
+            Ok(_) => {
+                message::tell(&format!("stopping job {job}; once more leaves it to stop alone"))
+            }
+            Err(error) => {
+                return ControlFlow::Break(format!("job {job} could not be stopped: {error}"));
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+fn send(request: &Request, instance: &Instance) -> Result<Value, SocketError> {
+    // A supervisor that lives answers a stop sooner, whatever the controller does.
+    let urgent = matches!(request, Request::Verb { verb: Verb::Stop | Verb::Hold, .. });
+    let patience = if urgent { URGENT_PATIENCE } else { ANSWER_PATIENCE };
+    OperatorClient::connect(instance)?.request_within(&json!(request), patience)
 }
 
 fn checked(reply: Value) -> Result<Value, Failure> {

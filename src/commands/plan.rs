@@ -3,6 +3,8 @@
 use crate::arguments::PlanArguments;
 use crate::commands::pulses;
 use crate::exit::{Exit, Failure};
+use crate::files::Sources;
+use crate::output::say;
 use crate::{inputs, output};
 use machine::Machine;
 use planner::{Plan, PlanFacts};
@@ -47,9 +49,13 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
     let plan = if arguments.ideal { planner::plan_ideal } else { planner::plan };
     let plan = plan(&input.machine, &job).map_err(|error| request.refuse(&error))?;
     let plan_time = started.elapsed().as_secs_f64();
+    let mut sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
+    let written = |path: &Path, result: io::Result<()>| {
+        result.map_err(|error| Failure::output(format!("{}: {error}", path.display())))
+    };
     if let Some(path) = &arguments.samples {
-        write_samples(path, &input.machine, &plan)
-            .map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))?;
+        let file = sources.create("--samples", path)?;
+        written(path, write_samples(file, &input.machine, &plan))?;
     }
     if let Some(path) = &arguments.pulses {
         if !pulses::has_steppers(&input.machine) {
@@ -57,8 +63,8 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
             let message = format!("--pulses: {name} has no steppers, and DC motors take no pulses");
             return Err(Failure::bad_input(message));
         }
-        pulses::write(path, &input.machine, &plan)
-            .map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))?;
+        let file = sources.create("--pulses", path)?;
+        written(path, pulses::write(file, &input.machine, &plan))?;
     }
     let report = PlanReport {
         machine: input.machine.name.clone(),
@@ -77,29 +83,29 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
 
 fn print_text(report: &PlanReport) {
     let facts = &report.facts;
-    eprintln!("job       {}", facts.name);
-    eprintln!("machine   {}", report.machine);
-    eprintln!("strokes   {}, {:.3} mm", facts.strokes, facts.length * 1e3);
-    eprintln!("time      {:.4} s", report.time);
-    eprintln!("speed     {:.4} m/s at most while the laser is on", facts.speed);
-    eprintln!(
+    say!("job       {}", facts.name);
+    say!("machine   {}", report.machine);
+    say!("strokes   {}, {:.3} mm", facts.strokes, facts.length * 1e3);
+    say!("time      {:.4} s", report.time);
+    say!("speed     {:.4} m/s at most while the laser is on", facts.speed);
+    say!(
         "limits    path acceleration {:.1} %, path jerk {:.1} %",
         facts.uses.path_acceleration * 100.0,
         facts.uses.path_jerk * 100.0
     );
-    eprintln!("planning  {:.1} ms", report.plan_time * 1e3);
+    say!("planning  {:.1} ms", report.plan_time * 1e3);
     for note in &facts.notes {
         match note.line {
-            0 => eprintln!("note      {}", note.text),
-            line => eprintln!("note      line {line}: {}", note.text),
+            0 => say!("note      {}", note.text),
+            line => say!("note      line {line}: {}", note.text),
         }
     }
 }
 
 /// One row a setpoint: `t`, the tool, then per axis position, velocity, acceleration and effort,
 /// then laser on and power.
-fn write_samples(path: &Path, machine: &Machine, plan: &Plan) -> io::Result<()> {
-    let mut file = BufWriter::new(File::create(path)?);
+fn write_samples(file: File, machine: &Machine, plan: &Plan) -> io::Result<()> {
+    let mut file = BufWriter::new(file);
     write!(file, "t,x,y,z")?;
     for axis in &machine.axes {
         let name = &axis.name;

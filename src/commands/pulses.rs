@@ -7,7 +7,6 @@ use signals::Setpoint;
 use signals::time::CYCLE_TIME;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
 
 /// One stepper, counted from where it stands at the start of the plan.
 struct Train {
@@ -41,8 +40,8 @@ pub fn has_steppers(machine: &Machine) -> bool {
 ///
 /// # Errors
 /// Whatever the file system reports.
-pub fn write(path: &Path, machine: &Machine, plan: &Plan) -> io::Result<()> {
-    let mut file = BufWriter::new(File::create(path)?);
+pub fn write(file: File, machine: &Machine, plan: &Plan) -> io::Result<()> {
+    let mut file = BufWriter::new(file);
     writeln!(file, "t,axis,count")?;
     let mut setpoints = plan.setpoints(1);
     let Some(first) = setpoints.next() else { return file.flush() };

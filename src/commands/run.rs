@@ -2,14 +2,15 @@
 
 use crate::arguments::{DomainArguments, RunArguments};
 use crate::exit::{Exit, Failure};
+use crate::files::Claim;
+use crate::output::say;
 use crate::pipeline::configuration::Configuration;
 use crate::pipeline::job_run::JobRun;
-use crate::pipeline::operators::News;
+use crate::pipeline::operators::{self, Submission};
 use crate::pipeline::{LOOK, Pipeline, Starter};
 use crate::{inputs, output};
 use monitor::run_folder::RunFolder;
-use runtime::{Instance, signal};
-use serde_json::json;
+use runtime::{Instance, message, signal};
 use std::path::Path;
 use std::time::Instant;
 
@@ -19,7 +20,6 @@ use std::time::Instant;
 /// Bad input, an instance in use, a service that does not start, a folder that cannot be written.
 pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let started = Instant::now();
-    signal::install().map_err(Failure::service)?;
     let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
     let input = inputs::machine(&arguments.machine)?;
     let request = inputs::job_request(
@@ -31,13 +31,17 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     // Read here only to refuse early; the planner reads it again.
     let job = request.read(&input.machine)?;
     let configuration = Configuration::new(input.source, &arguments.drives)?;
-    let mut pipeline = Pipeline::start(&instance, configuration, Starter::Own)?;
+    // From here on a signal brings the machine to rest before it ends anything.
+    signal::install().map_err(Failure::service)?;
+    let mut pipeline = Pipeline::start(&instance, &configuration, Starter::Own)?;
     let folder = run_folder(arguments.out.as_deref(), &job.drawing.name)?;
+    let claim = Claim::of(&folder)?;
     let request = request.absolute();
     let summary =
-        JobRun::offer(&mut pipeline, &request, folder, started, None).and_then(JobRun::follow);
+        JobRun::prepare(&mut pipeline, &request, folder, started, None).map(JobRun::follow);
     pipeline.shut_down();
-    output::summary(&summary?, arguments.instance.json)
+    drop(claim);
+    Ok(output::summary(&summary?, arguments.instance.json))
 }
 
 fn run_folder(out: Option<&Path>, job: &str) -> Result<RunFolder, Failure> {
@@ -45,7 +49,7 @@ fn run_folder(out: Option<&Path>, job: &str) -> Result<RunFolder, Failure> {
         Some(path) => RunFolder::create_at(path),
         None => RunFolder::create_below(Path::new("."), job),
     }
-    .map_err(Failure::service)
+    .map_err(Failure::bad_input)
 }
 
 /// Holds a domain for services that somebody else starts, and runs the jobs that operators submit.
@@ -53,29 +57,40 @@ fn run_folder(out: Option<&Path>, job: &str) -> Result<RunFolder, Failure> {
 /// # Errors
 /// Bad input, an instance in use, a channel that fails.
 pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
-    signal::install().map_err(Failure::service)?;
     let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
     let source = inputs::machine(&arguments.machine)?.source;
     let configuration = Configuration::new(source, &arguments.drives)?;
-    let mut pipeline = Pipeline::start(&instance, configuration, Starter::Others)?;
-    eprintln!("graver: instance {} waits for its services and jobs", instance.name());
+    signal::install().map_err(Failure::service)?;
+    let mut pipeline = Pipeline::start(&instance, &configuration, Starter::Others)?;
+    say!("graver: instance {} waits for its services and jobs", instance.name());
     while signal::termination().is_none() {
         pipeline.look()?;
         if let Some(submission) = pipeline.submission() {
-            let started = Instant::now();
-            let news = submission.news.clone();
-            let ran = pipeline.enable().and_then(|()| {
-                let folder = run_folder(submission.out.as_deref(), "job")?;
-                let job = submission.job.clone();
-                JobRun::offer(&mut pipeline, &job, folder, started, Some(submission))?.follow()
-            });
-            if let Err(failure) = ran {
-                eprintln!("graver: {}", failure.refusal.text.trim());
-                let _ = news.send(News::End(json!({ "error": failure.refusal.message })));
-            }
+            run_submission(&mut pipeline, submission);
         }
         std::thread::sleep(LOOK);
     }
     pipeline.shut_down();
     Ok(Exit::Done)
+}
+
+/// Runs a submitted job to its end; whoever submitted it hears of it in any case.
+fn run_submission(pipeline: &mut Pipeline, submission: Submission) {
+    let started = Instant::now();
+    let (number, news) = (submission.number, submission.news.clone());
+    let (job, out) = (submission.job.clone(), submission.out.clone());
+    let ran = if pipeline.control.begin(number) {
+        run_folder(out.as_deref(), "job").and_then(|folder| {
+            let _claim = Claim::of(&folder)?;
+            let run = JobRun::prepare(pipeline, &job, folder, started, Some(submission))?;
+            Ok(run.follow())
+        })
+    } else {
+        Err(Failure::stopped("the job was taken back before its turn came"))
+    };
+    if let Err(failure) = ran {
+        message::tell(failure.refusal.text.trim());
+        pipeline.control.end();
+        operators::tell_end(&news, &failure.summary());
+    }
 }

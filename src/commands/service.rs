@@ -17,7 +17,7 @@ pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
     signal::install().map_err(Failure::service)?;
     let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
     let domain = Domain::join(&instance, role).map_err(Failure::service)?;
-    let configuration = Configuration::read(&instance).map_err(Failure::service)?;
+    let configuration = Configuration::read(&instance)?;
     match role {
         Role::Planner => planner::service::run(&domain, &configuration.source.machine()?),
         Role::Monitor => monitor::service::run(&domain, &configuration.source.machine()?),

@@ -2,6 +2,7 @@
 
 use crate::arguments::SimulateArguments;
 use crate::exit::{Exit, Failure};
+use crate::files::Claim;
 use crate::simulation::simulate;
 use crate::{inputs, output};
 use drives::PlantOptions;
@@ -32,7 +33,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     let plan_time = started.elapsed().as_secs_f64();
 
     let folder = arguments.out.as_deref().map(RunFolder::create_at).transpose();
-    let folder = folder.map_err(Failure::service)?;
+    let folder = folder.map_err(Failure::bad_input)?;
+    let _claim = folder.as_ref().map(Claim::of).transpose()?;
     folder.as_ref().map_or(Ok(()), RunFolder::clear).map_err(Failure::bad_input)?;
     let mut writer = folder.as_ref().map(recording).transpose().map_err(Failure::service)?;
     let mut failed: io::Result<()> = Ok(());
@@ -71,7 +73,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
         conclusion::write(folder, &input.machine, &plan.artwork, &mut summary, Some(&findings))
             .map_err(Failure::service)?;
     }
-    output::summary(&summary, arguments.json)
+    Ok(output::summary(&summary, arguments.json))
 }
 
 fn recording(folder: &RunFolder) -> io::Result<RecordingWriter<BufWriter<File>>> {

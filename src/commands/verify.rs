@@ -1,6 +1,7 @@
 //! `graver verify-summary`: holds a summary to its schema; for scripts and continuous integration.
 
 use crate::exit::{Exit, Failure};
+use crate::output::say;
 use monitor::summary::{Outcome, Summary};
 use std::path::Path;
 
@@ -20,6 +21,6 @@ pub fn run(path: &Path) -> Result<Exit, Failure> {
             return Err(named(&"completed with marks that cannot be"));
         }
     }
-    eprintln!("{}: {}", path.display(), summary.outcome.name());
+    say!("{}: {}", path.display(), summary.outcome.name());
     Ok(Exit::from(summary.outcome))
 }

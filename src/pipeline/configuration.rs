@@ -62,17 +62,25 @@ impl Configuration {
     /// Writes it into the domain's root.
     ///
     /// # Errors
-    /// Whatever the operating system reports.
-    pub fn write(&self, instance: &Instance) -> std::io::Result<()> {
-        std::fs::write(path(instance), serde_json::to_vec(self)?)
+    /// A file that cannot be written.
+    pub fn write(&self, instance: &Instance) -> Result<(), Failure> {
+        let path = path(instance);
+        let text = serde_json::to_vec(self).map_err(Failure::service)?;
+        std::fs::write(&path, text)
+            .map_err(|error| Failure::service(format!("{}: {error}", path.display())))
     }
 
     /// Reads what the domain's holder wrote.
     ///
     /// # Errors
-    /// Whatever the operating system reports.
-    pub fn read(instance: &Instance) -> std::io::Result<Self> {
-        Ok(serde_json::from_slice(&std::fs::read(path(instance))?)?)
+    /// A file that cannot be read.
+    pub fn read(instance: &Instance) -> Result<Self, Failure> {
+        let path = path(instance);
+        let failed = |error: &dyn std::fmt::Display| {
+            Failure::service(format!("{}: {error}", path.display()))
+        };
+        let text = std::fs::read(&path).map_err(|error| failed(&error))?;
+        serde_json::from_slice(&text).map_err(|error| failed(&error))
     }
 
     /// Whether the clock may slip.

@@ -1,59 +1,79 @@
-//! One job in a pipeline, from offer to summary.
+//! One job in a pipeline, from the start of the machine to the summary.
 
-use super::operators::{News, Submission};
+use super::control::JobControl;
+use super::operators::{self, News, Submission};
+use super::power_up::{NotReady, PowerUp};
 use super::services::{Ended, Remedy};
-use super::{LOOK, Pipeline, Starter};
+use super::{LOOK, Pipeline, Starter, is_dark_and_at_rest};
 use crate::exit::{Failure, error_summary};
 use crate::output::ProgressLine;
-use monitor::conclusion::{self, Ending};
+use monitor::conclusion::{self, Ending, WatchNote};
 use monitor::run_folder::RunFolder;
 use monitor::summary::{ErrorSummary, Outcome, Summary};
 use planner::request::{JobRequest, Refusal};
 use runtime::domain::Role;
-use runtime::signal;
+use runtime::{message, signal};
 use signals::{DrivesReport, Fault, FaultCode, OperatorVerb, PlannerPhase, run_folder};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// How long the controller may take to bring the axes to rest and say so.
-const END_PATIENCE: Duration = Duration::from_secs(10);
+const REST_PATIENCE: Duration = Duration::from_secs(10);
+
+/// How long the controller's last word may follow when the axes rest: it comes with the next cycle,
+/// unless the controller hangs or is dead.
+const WORD_PATIENCE: Duration = Duration::from_millis(250);
 
 /// How long the monitor may take to open its recording: without it the job runs unrecorded.
-const RECORDING_PATIENCE: Duration = Duration::from_secs(2);
+const OPENING_PATIENCE: Duration = Duration::from_secs(2);
 
-/// How long the monitor may take to complete its recording.
-const WATCH_PATIENCE: Duration = Duration::from_secs(10);
+/// How long the monitor may take to complete its recording, on a loaded computer or a slow disk.
+const WRITING_PATIENCE: Duration = Duration::from_secs(5);
+
+/// How long a monitor that somebody has stopped is waited for.
+const STOPPED_PATIENCE: Duration = Duration::from_millis(250);
 
 /// How far a job has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 enum Stage {
+    /// Waiting for the services and the motors.
+    Starting(PowerUp),
     /// Offered to the planner.
     Planning,
-    /// Checked; waiting for the recording to be open.
+    /// Checked; waiting for the recording to be open, and for a person who holds it.
     Ready(Instant),
     /// Handed to the controller.
     Playing,
-    /// Told to end, or left by a service: waiting for the axes to rest.
-    Ending(Instant),
+    /// It will not go on: waiting for the axes to rest.
+    Resting(Instant),
 }
 
 /// A job under way.
 pub struct JobRun<'a> {
     pipeline: &'a mut Pipeline,
+    control: Arc<JobControl>,
     folder: RunFolder,
     name: String,
-    stream: u64,
+    /// Its number for planner and controller; `None` before it was offered.
+    stream: Option<u64>,
     stage: Stage,
+    /// Whether the controller may have played any of it.
+    played: bool,
+    /// Since when the controller has refused to play it.
+    refused: Option<Instant>,
+    /// Since when nothing can move any more, whatever the controller says.
+    quiet: Option<Instant>,
     started: Instant,
     ending: Ending,
     submission: Option<Submission>,
 }
 
 impl<'a> JobRun<'a> {
-    /// Offers the job to the planner; its run folder must exist and is cleared.
+    /// Prepares the job in its run folder, which must exist and is cleared.
     ///
     /// # Errors
-    /// A folder that cannot be written, or a channel that fails.
-    pub fn offer(
+    /// A folder that cannot be written.
+    pub fn prepare(
         pipeline: &'a mut Pipeline,
         job: &JobRequest,
         folder: RunFolder,
@@ -62,36 +82,52 @@ impl<'a> JobRun<'a> {
     ) -> Result<Self, Failure> {
         folder.clear().map_err(Failure::bad_input)?;
         let request = serde_json::to_vec_pretty(job).map_err(Failure::service)?;
-        folder.write(run_folder::REQUEST, request).map_err(Failure::service)?;
-        let path = std::path::absolute(folder.path()).map_err(Failure::service)?;
-        let stream = pipeline.offer(&path.to_string_lossy())?;
+        folder.write(run_folder::REQUEST, request).map_err(Failure::bad_input)?;
         let name = job_name(job);
         pipeline.board.name_job(Some(&name));
-        let ending = Ending {
-            job: name.clone(),
-            overruns_before: pipeline.heard.drives.overruns,
-            ..Ending::default()
-        };
-        let stage = Stage::Planning;
-        Ok(Self { pipeline, folder, name, stream, stage, started, ending, submission })
+        let ending = Ending { job: name.clone(), ..Ending::default() };
+        Ok(Self {
+            control: pipeline.control.clone(),
+            pipeline,
+            folder,
+            name,
+            stream: None,
+            stage: Stage::Starting(PowerUp::begin()),
+            played: false,
+            refused: None,
+            quiet: None,
+            started,
+            ending,
+            submission,
+        })
     }
 
     /// Follows the job to its end and writes its summary.
-    ///
-    /// # Errors
-    /// A channel that fails, or a run folder that cannot be written.
-    pub fn follow(mut self) -> Result<Summary, Failure> {
+    pub fn follow(mut self) -> Summary {
         let line = ProgressLine::on_terminal();
         loop {
-            for ended in self.pipeline.look()? {
-                line.clear();
-                self.note_ended(&ended);
+            match self.pipeline.look() {
+                Ok(ended) => {
+                    for ended in ended {
+                        line.clear();
+                        self.note_ended(&ended);
+                    }
+                }
+                // Without channels there is nothing to wait for; what follows ends the machine.
+                Err(failure) => {
+                    self.end_with(failure.refusal.message);
+                    break;
+                }
             }
             if let Some(message) = self.missing() {
                 self.end_with(message.into());
             }
-            self.heed_termination()?;
-            if self.advance()? {
+            match self.advance() {
+                Ok(false) => {}
+                Ok(true) => break,
+                Err(failure) => self.end_with(failure.refusal.message),
+            }
+            if self.heed_people() {
                 break;
             }
             let (share, text) = self.progress();
@@ -108,57 +144,124 @@ impl<'a> JobRun<'a> {
 
     /// Goes on to the next stage when its time has come; whether the job has ended.
     fn advance(&mut self) -> Result<bool, Failure> {
-        let heard = self.pipeline.heard;
-        let planner = (heard.planner.stream == self.stream)
-            .then(|| PlannerPhase::from_wire(heard.planner.phase));
-        let report = Some(heard.controller)
-            .filter(|report| report.stream == self.stream && report.is_final == 1);
         match self.stage {
-            Stage::Planning => match planner {
-                Some(PlannerPhase::Refused) => {
-                    self.refuse()?;
-                    return Ok(true);
-                }
-                Some(PlannerPhase::Streaming) => {
-                    self.ending.plan_time = heard.planner.plan_time;
-                    self.stage = Stage::Ready(Instant::now());
-                }
-                _ => {}
-            },
-            Stage::Ready(since) => {
-                let recorded = self.folder.file(run_folder::SAMPLES).exists();
-                if !recorded && since.elapsed() < RECORDING_PATIENCE {
-                    return Ok(false);
-                }
-                if !recorded {
-                    self.ending.warnings.push("the monitor is not recording this job".into());
-                }
-                self.stage = Stage::Playing;
-                if !self.pipeline.ask(OperatorVerb::Start, self.stream as f64) {
-                    self.end_with("the controller refused to start the job".into());
+            Stage::Starting(mut power_up) => {
+                let ready = power_up.advance(self.pipeline);
+                self.stage = Stage::Starting(power_up);
+                match ready {
+                    Ok(false) => {}
+                    Ok(true) => self.offer()?,
+                    Err(NotReady::Faulted(fault)) => self.fail(fault),
+                    Err(other) => self.end_with(other.to_string()),
                 }
             }
-            Stage::Playing | Stage::Ending(_) => {
-                if let Some(report) = report {
-                    self.ending.controller = Some(report);
-                    return Ok(true);
-                }
-                if let Stage::Ending(since) = self.stage {
-                    // Without drives nothing moves, and a controller without feedback says nothing.
-                    let gone = !self.pipeline.has(Role::Drives);
-                    let stopped = heard.drives.at_rest == 1 && heard.drives.fault.is_some();
-                    let silent = !self.pipeline.has(Role::Controller) && stopped;
-                    return Ok(gone || silent || since.elapsed() > END_PATIENCE);
-                }
+            Stage::Planning | Stage::Ready(_) if self.latched().is_some() => {
+                self.fail(self.latched());
             }
+            Stage::Planning => return self.heed_planner(),
+            Stage::Ready(since) => self.play(since),
+            Stage::Playing | Stage::Resting(_) => return Ok(self.is_over()),
         }
         Ok(false)
+    }
+
+    fn offer(&mut self) -> Result<(), Failure> {
+        let path = std::path::absolute(self.folder.path()).map_err(|error| {
+            Failure::bad_input(format!("{}: {error}", self.folder.path().display()))
+        })?;
+        self.ending.overruns_before = self.pipeline.heard.drives.overruns;
+        self.stream = Some(self.pipeline.offer(&path.to_string_lossy())?);
+        self.stage = Stage::Planning;
+        Ok(())
+    }
+
+    /// Whether the planner has refused the job; a plan that it streams is ready to be played.
+    fn heed_planner(&mut self) -> Result<bool, Failure> {
+        let report = self.pipeline.heard.planner;
+        if Some(report.stream) != self.stream {
+            return Ok(false);
+        }
+        match PlannerPhase::from_wire(report.phase) {
+            PlannerPhase::Refused => {
+                self.refuse();
+                return Ok(true);
+            }
+            PlannerPhase::Streaming => {
+                self.ending.plan_time = report.plan_time;
+                self.stage = Stage::Ready(Instant::now());
+            }
+            _ => {}
+        }
+        Ok(false)
+    }
+
+    /// Hands the job to the controller as soon as it is recorded, or nobody is there to record it,
+    /// and nobody holds it.
+    fn play(&mut self, since: Instant) {
+        let recorded = self.folder.file(run_folder::SAMPLES).exists();
+        let awaited = self.pipeline.has(Role::Monitor) || self.pipeline.starts(Role::Monitor);
+        if !recorded && awaited && since.elapsed() < OPENING_PATIENCE {
+            return;
+        }
+        let stream = self.stream.unwrap_or_default();
+        if !self.control.play() {
+            return;
+        }
+        if !recorded {
+            self.ending.warnings.push("the monitor is not recording this job".into());
+        }
+        let answer = self.pipeline.request(OperatorVerb::Start, stream as f64, WORD_PATIENCE);
+        if !answer.is_ok_and(|reply| reply.accepted == 0) {
+            // Without an answer it may be playing all the same.
+            self.stage = Stage::Playing;
+            self.played = true;
+            return;
+        }
+        // The fault for which it refuses is heard with the next look, if there is one.
+        let refused = *self.refused.get_or_insert_with(Instant::now);
+        if refused.elapsed() > WORD_PATIENCE {
+            self.end_with("the controller refused to start the job".into());
+        }
+    }
+
+    /// Whether the controller has said how the job ended, or nothing more can be expected of it.
+    fn is_over(&mut self) -> bool {
+        let heard = &self.pipeline.heard;
+        let report = heard.controller;
+        if Some(report.stream) == self.stream && report.is_final == 1 {
+            self.ending.controller = Some(report);
+            return true;
+        }
+        let since = match self.stage {
+            Stage::Resting(_) if !self.played => return true,
+            Stage::Resting(since) => Some(since),
+            _ => None,
+        };
+        // Without drives nothing moves, and axes that drives has stopped rest by themselves.
+        let gone = !self.pipeline.has(Role::Drives);
+        let at_rest =
+            is_dark_and_at_rest(heard) && (since.is_some() || heard.drives.fault.is_some());
+        self.quiet =
+            if gone || at_rest { self.quiet.or_else(|| Some(Instant::now())) } else { None };
+        let silent = self.quiet.is_some_and(|quiet| quiet.elapsed() > WORD_PATIENCE);
+        if silent && since.is_none() {
+            self.fail(heard.drives.fault);
+        }
+        silent || since.is_some_and(|since| since.elapsed() > REST_PATIENCE)
+    }
+
+    /// The fault that the controller or drives holds.
+    fn latched(&self) -> Fault {
+        let heard = &self.pipeline.heard;
+        if heard.progress.fault.is_some() { heard.progress.fault } else { heard.drives.fault }
     }
 
     fn progress(&self) -> (f64, String) {
         let heard = &self.pipeline.heard;
         let what = match self.stage {
+            Stage::Starting(_) => "starting".to_owned(),
             Stage::Planning => "planning".to_owned(),
+            Stage::Ready(_) if self.control.is_held() => "held".to_owned(),
             Stage::Ready(_) => "starting".to_owned(),
             Stage::Playing => format!(
                 "stroke {} of {}, rate {:.0} %",
@@ -166,39 +269,47 @@ impl<'a> JobRun<'a> {
                 heard.planner.strokes,
                 heard.progress.rate * 100.0
             ),
-            Stage::Ending(_) => "coming to rest".to_owned(),
+            Stage::Resting(_) => "coming to rest".to_owned(),
         };
-        let played = if heard.progress.stream == self.stream { heard.progress.played } else { 0 };
+        let is_ours = Some(heard.progress.stream) == self.stream;
+        let played = if is_ours { heard.progress.played } else { 0 };
         let share = played as f64 / heard.planner.samples.max(1) as f64;
         (share, format!("{}: {what}", self.name))
     }
 
-    /// Ctrl-C: laser, then axes; a job that is still being planned is withdrawn.
-    fn heed_termination(&mut self) -> Result<(), Failure> {
-        if signal::termination().is_none() || matches!(self.stage, Stage::Ending(_)) {
-            return Ok(());
+    /// A signal or a person's `stop`: laser, then axes; a job that is not played yet is withdrawn.
+    /// A second signal says that the person is in a hurry: whether to wait for nothing more.
+    fn heed_people(&mut self) -> bool {
+        if signal::termination().is_none() && !self.control.is_stopped() {
+            return false;
         }
-        self.ending.outcome = Some(Outcome::Stopped);
-        self.pipeline.withdraw()?;
-        self.pipeline.ask(OperatorVerb::Stop, 0.0);
-        self.stage = Stage::Ending(Instant::now());
-        Ok(())
+        if !matches!(self.stage, Stage::Resting(_)) {
+            self.ending.outcome = Some(Outcome::Stopped);
+            self.rest();
+            if self.played {
+                self.pipeline.ask(OperatorVerb::Stop, 0.0);
+            }
+        }
+        self.in_a_hurry()
     }
 
     /// A service has ended by itself: says so at once, and what is done about it.
     fn note_ended(&mut self, ended: &Ended) {
-        let consequence = match ended.role {
-            Role::Monitor => "the marks go on unharmed",
-            Role::Planner => "laser off, the controller brings the axes to rest along the path",
-            Role::Controller => "laser off, drives stops the axes",
-            Role::Drives => "the simulated plant is gone with it",
-            Role::Domain | Role::Observer => "",
+        let consequence = match (ended.role, self.stage) {
+            (Role::Monitor, _) => ": the marks go on unharmed",
+            (_, Stage::Starting(_)) => " while starting",
+            (Role::Planner, _) => {
+                ": laser off, the controller brings the axes to rest along the path"
+            }
+            (Role::Controller, _) => ": laser off, drives stops the axes",
+            (Role::Drives, _) => ": the simulated plant is gone with it",
+            (Role::Domain | Role::Observer, _) => "",
         };
-        let message = format!("{ended}: {consequence}");
-        eprintln!("graver: {message}");
+        let message = format!("{ended}{consequence}");
+        message::tell(&message);
         match ended.remedy {
-            Remedy::Restarted | Remedy::None => self.ending.warnings.push(message),
             Remedy::Stop => self.end_with(message),
+            _ => self.ending.warnings.push(message),
         }
     }
 
@@ -228,38 +339,83 @@ impl<'a> JobRun<'a> {
                 Some(ErrorSummary { file: None, line: None, column: None, message });
             self.ending.outcome = Some(Outcome::Aborted);
         }
-        if !matches!(self.stage, Stage::Ending(_)) {
-            self.stage = Stage::Ending(Instant::now());
+        self.rest();
+    }
+
+    /// A fault that the controller does not report with the stream.
+    fn fail(&mut self, fault: Fault) {
+        self.ending.fault = Some(fault);
+        self.ending.outcome = Some(Outcome::Faulted);
+        self.rest();
+    }
+
+    fn rest(&mut self) {
+        if !matches!(self.stage, Stage::Resting(_)) {
+            self.stage = Stage::Resting(Instant::now());
         }
     }
 
-    fn refuse(&mut self) -> Result<(), Failure> {
-        let text =
-            std::fs::read(self.folder.file(run_folder::REFUSAL)).map_err(Failure::service)?;
-        let refusal: Refusal = serde_json::from_slice(&text).map_err(Failure::service)?;
-        eprintln!("graver: {}", refusal.text.trim());
+    /// Takes over why the planner refused. Where the run folder could not be written, the planner
+    /// has left its reasons in the domain's directory.
+    fn refuse(&mut self) {
+        let places =
+            [self.folder.file(run_folder::REFUSAL), self.pipeline.root().join(run_folder::REFUSAL)];
+        let read = |path: &std::path::PathBuf| {
+            serde_json::from_slice::<Refusal>(&std::fs::read(path).ok()?).ok()
+        };
+        let refusal = places.iter().find_map(read).unwrap_or_else(|| {
+            Refusal::internal(format!(
+                "the planner refused the job, and {} cannot be read",
+                places[0].display()
+            ))
+        });
+        message::tell(refusal.text.trim());
         self.ending.outcome = Some(Outcome::Refused);
         self.ending.error = Some(error_summary(&refusal));
-        Ok(())
     }
 
-    fn conclude(mut self) -> Result<Summary, Failure> {
-        if self.ending.controller.is_none() {
-            self.pipeline.withdraw()?;
-        }
-        if self.folder.file(run_folder::SAMPLES).exists() {
+    fn conclude(mut self) -> Summary {
+        if self.stream.is_some() {
+            if self.ending.controller.is_none() {
+                // The planner rests, and the monitor ends its recording. Without channels neither
+                // can be told; they end with the domain.
+                let _ = self.pipeline.close();
+            }
             self.await_recording();
         }
         self.ending.drives = Some(self.drives_with_cause());
-        let machine = self.pipeline.configuration.source.machine()?;
-        let summary = conclusion::conclude(&self.folder, &machine, &self.ending, self.started)
-            .map_err(Failure::service)?;
+        let machine = &self.pipeline.machine;
+        let summary = conclusion::conclude(&self.folder, machine, &self.ending, self.started);
         self.pipeline.board.name_job(None);
+        self.control.end();
         if let Some(submission) = self.submission.take() {
-            let reply = serde_json::to_value(&summary).map_err(Failure::service)?;
-            let _ = submission.news.send(News::End(reply));
+            operators::tell_end(&submission.news, &summary);
         }
-        Ok(summary)
+        summary
+    }
+
+    /// Waits until the monitor has written all of it, as long as it can be expected to.
+    fn await_recording(&mut self) {
+        let stream = self.stream.unwrap_or_default();
+        let since = Instant::now();
+        let is_open = || self.folder.file(run_folder::SAMPLES).exists();
+        let is_told = || WatchNote::read(&self.folder).is_some_and(|note| note.stream == stream);
+        while is_open() && !is_told() && !self.in_a_hurry() {
+            let patience = match self.pipeline.peer(Role::Monitor) {
+                Some(monitor) if monitor.is_stopped() => STOPPED_PATIENCE,
+                Some(_) => WRITING_PATIENCE,
+                None => return,
+            };
+            if since.elapsed() > patience || self.pipeline.look().is_err() {
+                return;
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// Whether a person has asked twice for the end.
+    fn in_a_hurry(&self) -> bool {
+        signal::termination().is_some_and(|termination| termination.count > 1)
     }
 
     /// What drives reported, with the cause of a death that the dead cannot tell: a controller
@@ -276,20 +432,6 @@ impl<'a> JobRun<'a> {
             drives.fault = Fault::new(FaultCode::ControllerLost).at(drives.fault.at);
         }
         drives
-    }
-
-    /// Waits until the monitor has written all of it, as long as there is one.
-    fn await_recording(&mut self) {
-        let since = Instant::now();
-        while !self.folder.file(run_folder::WATCH).exists()
-            && since.elapsed() < WATCH_PATIENCE
-            && self.pipeline.has(Role::Monitor)
-        {
-            if self.pipeline.look().is_err() {
-                return;
-            }
-            std::thread::sleep(LOOK);
-        }
     }
 }
 

@@ -5,34 +5,45 @@
 //! real-time path: it watches, asks and writes down.
 
 pub mod configuration;
+pub mod control;
 pub mod job_run;
 pub mod operators;
+pub mod power_up;
 pub mod services;
 pub mod status;
 
 use crate::exit::Failure;
 use configuration::Configuration;
+use control::JobControl;
+use machine::Machine;
 use operators::{Operators, Submission};
+use power_up::PowerUp;
 use runtime::domain::Role;
-use runtime::operator::OperatorLink;
-use runtime::{Domain, Instance, Publisher, Reading, Subscriber};
+use runtime::operator::{OperatorError, OperatorLink};
+use runtime::peer::Peer;
+use runtime::{Domain, Instance, Publisher, Reading, Subscriber, message};
 use services::{Ended, Remedy, Services};
 use signals::{
-    ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorVerb, PlannerReport,
-    Progress,
+    ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorReply, OperatorVerb,
+    PlannerReport, Progress,
 };
 use status::Board;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// How often the supervisor looks.
 pub const LOOK: Duration = Duration::from_millis(10);
 
-/// How long services may take to come up.
-const START_PATIENCE: Duration = Duration::from_secs(30);
+/// The number of the job of a pipeline that has one only.
+const ONLY_JOB: u64 = 1;
 
 /// How long the axes may take to come to rest.
 const REST_PATIENCE: Duration = Duration::from_secs(10);
+
+/// How long the controller may take to answer when the pipeline ends: one that lives answers within
+/// a few cycles of its operators' thread.
+const LAST_ANSWER: Duration = Duration::from_millis(300);
 
 /// Who starts the services.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,14 +74,17 @@ struct Ears {
     planner: Subscriber<PlannerReport>,
 }
 
-/// A domain with its services.
+/// A domain with its services. Dropping it, in a panic too, is its ordered end: laser, axes,
+/// processes; nothing is left in shared memory afterwards.
 pub struct Pipeline {
-    /// What the services are built from.
-    pub configuration: Configuration,
-    /// The newest of what they say.
+    /// The machine that it drives.
+    pub machine: Machine,
+    /// The newest of what the services say.
     pub heard: Heard,
     /// What operators see.
     pub board: Arc<Board>,
+    /// What they ask of the job under way.
+    pub control: Arc<JobControl>,
     operators: Operators,
     link: Arc<OperatorLink>,
     offers: Publisher<JobOffer>,
@@ -82,17 +96,19 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// Creates the domain, starts the services if they are its own, and powers the motors.
+    /// Creates the domain, and starts the services if they are its own. They need time to come up:
+    /// see [`PowerUp`].
     ///
     /// # Errors
-    /// An instance in use, or a service that does not come up.
+    /// An instance in use, or a service that cannot be started.
     pub fn start(
         instance: &Instance,
-        configuration: Configuration,
+        configuration: &Configuration,
         starter: Starter,
     ) -> Result<Self, Failure> {
+        let machine = configuration.source.machine()?;
         let domain = Domain::create(instance).map_err(Failure::service)?;
-        configuration.write(instance).map_err(Failure::service)?;
+        configuration.write(instance)?;
         let ears = Ears {
             progress: domain.subscriber(Reading::Newest).map_err(Failure::service)?,
             controller: domain.subscriber(Reading::Newest).map_err(Failure::service)?,
@@ -102,15 +118,22 @@ impl Pipeline {
         let offers = domain.publisher().map_err(Failure::service)?;
         let link = Arc::new(OperatorLink::start(&domain).map_err(Failure::service)?);
         let board = Arc::new(Board::default());
-        let operators = Operators::bind(&domain, link.clone(), board.clone(), starter)?;
+        let control = Arc::new(JobControl::default());
+        if starter == Starter::Own {
+            // Its one job is under way from here on: an operator who says stop means it.
+            control.begin(ONLY_JOB);
+        }
+        let answers = operators::Answers::new(link.clone(), board.clone(), control.clone());
+        let operators = Operators::bind(&domain, answers, starter)?;
         let services = match starter {
             Starter::Own => Services::start(&domain)?,
             Starter::Others => Services::of_others(),
         };
-        let mut pipeline = Self {
-            configuration,
+        Ok(Self {
+            machine,
             heard: Heard::default(),
             board,
+            control,
             operators,
             link,
             offers,
@@ -119,11 +142,7 @@ impl Pipeline {
             starter,
             streams: 0,
             domain,
-        };
-        if starter == Starter::Own {
-            pipeline.enable()?;
-        }
-        Ok(pipeline)
+        })
     }
 
     /// Listens once; call it every [`LOOK`]. Services of its own that have ended are told.
@@ -144,8 +163,8 @@ impl Pipeline {
         if let Some(sample) = self.ears.planner.newest().map_err(Failure::service)? {
             heard.planner = sample;
         }
-        let ended = self.services.look(&self.domain)?;
-        self.board.post(&self.heard, &self.services.pids(&self.domain));
+        let ended = self.services.look(&self.domain);
+        self.board.post(&self.heard, self.control.is_held(), &self.services.pids(&self.domain));
         Ok(ended)
     }
 
@@ -156,7 +175,7 @@ impl Pipeline {
     pub fn offer(&mut self, folder: &str) -> Result<u64, Failure> {
         self.streams += 1;
         let offer = JobOffer::new(self.streams, folder).ok_or_else(|| {
-            Failure::service(format!(
+            Failure::bad_input(format!(
                 "the path of the run folder is longer than {} bytes: {folder}",
                 signals::job::MAX_PATH
             ))
@@ -165,12 +184,24 @@ impl Pipeline {
         Ok(self.streams)
     }
 
-    /// Withdraws the newest offer.
+    /// Withdraws the newest offer. What of it is being played goes on until the axes rest.
     ///
     /// # Errors
     /// A channel that fails.
     pub fn withdraw(&mut self) -> Result<(), Failure> {
-        let offer = JobOffer { stream: self.streams, ..JobOffer::default() };
+        self.take_back(JobOffer::default())
+    }
+
+    /// Withdraws the newest offer, of which nothing more will be played.
+    ///
+    /// # Errors
+    /// A channel that fails.
+    pub fn close(&mut self) -> Result<(), Failure> {
+        self.take_back(JobOffer { is_over: 1, ..JobOffer::default() })
+    }
+
+    fn take_back(&mut self, offer: JobOffer) -> Result<(), Failure> {
+        let offer = JobOffer { stream: self.streams, ..offer };
         self.offers.publish(&offer).map_err(Failure::service)?;
         Ok(())
     }
@@ -178,6 +209,19 @@ impl Pipeline {
     /// Asks the controller; whether it agreed.
     pub fn ask(&self, verb: OperatorVerb, value: f64) -> bool {
         self.link.request(verb, value).is_ok_and(|reply| reply.accepted == 1)
+    }
+
+    /// Asks the controller, and waits for its answer at most `patience`.
+    ///
+    /// # Errors
+    /// No controller, or no answer.
+    pub fn request(
+        &self,
+        verb: OperatorVerb,
+        value: f64,
+        patience: Duration,
+    ) -> Result<OperatorReply, OperatorError> {
+        self.link.request_within(verb, value, patience)
     }
 
     /// A job that an operator submitted and nobody has taken yet.
@@ -190,99 +234,64 @@ impl Pipeline {
         self.starter
     }
 
+    /// The living process with this role in the domain.
+    pub fn peer(&self, role: Role) -> Option<Peer> {
+        self.domain.peer(role)
+    }
+
     /// Whether a process with this role lives in the domain.
     pub fn has(&self, role: Role) -> bool {
-        self.domain.peer(role).is_some()
+        self.peer(role).is_some()
     }
 
-    /// Waits until every service has spoken. A controller that powers the motors sooner meets
-    /// drives that know nobody yet, and they stop for good.
-    fn await_services(&mut self) -> Result<(), Failure> {
-        let started = Instant::now();
-        while let Some(role) = self.silent() {
-            self.look_while_starting()?;
-            if started.elapsed() > START_PATIENCE {
-                return Err(Failure::service(format!(
-                    "the {role} did not come up within {} s",
-                    START_PATIENCE.as_secs()
-                )));
-            }
-            std::thread::sleep(LOOK);
-        }
-        Ok(())
+    /// The domain's own directory.
+    pub fn root(&self) -> PathBuf {
+        self.domain.instance().root()
     }
 
-    /// A service that is not there or has not spoken yet. A monitor that others start may stay
-    /// away: nobody waits for it.
-    fn silent(&self) -> Option<Role> {
-        let heard = &self.heard;
-        [
-            (Role::Planner, heard.planner.published.0 != 0),
-            (Role::Controller, heard.progress.published.0 != 0),
-            (Role::Drives, heard.drives.cycle.0 != 0),
-            (Role::Monitor, true),
-        ]
-        .into_iter()
-        .filter(|(role, _)| *role != Role::Monitor || self.starter == Starter::Own)
-        .find(|(role, spoke)| !spoke || !self.has(*role))
-        .map(|(role, _)| role)
-    }
-
-    /// Looks, and gives up when a service has ended that the machine cannot do without.
-    fn look_while_starting(&mut self) -> Result<(), Failure> {
-        for ended in self.look()? {
-            match ended.remedy {
-                Remedy::Restarted | Remedy::None => eprintln!("graver: {ended}"),
-                Remedy::Stop => return Err(Failure::service(format!("{ended} while starting"))),
-            }
-        }
-        Ok(())
+    /// Whether this process has started the service with this role, and it has not ended.
+    pub fn starts(&self, role: Role) -> bool {
+        self.services.runs(role)
     }
 
     /// Waits for the services, powers the motors and waits until the controller is ready for a
     /// stream.
     ///
     /// # Errors
-    /// A service that does not come up or ends, or a controller that does not become ready, with
-    /// its state and fault.
+    /// A service that does not come up or ends, or a controller that does not become ready.
     pub fn enable(&mut self) -> Result<(), Failure> {
-        self.await_services()?;
-        let started = Instant::now();
-        let mut asked = self.ask(OperatorVerb::Enable, 0.0);
+        let mut power_up = PowerUp::begin();
         loop {
-            self.look_while_starting()?;
-            let state = ControllerState::from_wire(self.heard.progress.state);
-            if state == ControllerState::Idle {
+            for ended in self.look()? {
+                match ended.remedy {
+                    Remedy::Stop => {
+                        return Err(Failure::service(format!("{ended} while starting")));
+                    }
+                    _ => message::tell(&ended.to_string()),
+                }
+            }
+            if power_up.advance(self).map_err(Failure::service)? {
                 return Ok(());
-            }
-            if started.elapsed() > REST_PATIENCE {
-                return Err(Failure::service(format!(
-                    "the controller did not become ready: it is {}, fault {}",
-                    state.name(),
-                    self.heard.progress.fault.code().name()
-                )));
-            }
-            if !asked && state == ControllerState::Disabled {
-                asked = self.ask(OperatorVerb::Enable, 0.0);
             }
             std::thread::sleep(LOOK);
         }
     }
 
-    /// Ends in order: laser, axes, processes. Nothing is left in shared memory afterwards.
-    pub fn shut_down(mut self) {
-        if self.has(Role::Controller) && self.has(Role::Drives) {
-            self.ask(OperatorVerb::Stop, 0.0);
-            self.wait(|heard| {
-                !matches!(
-                    ControllerState::from_wire(heard.progress.state),
-                    ControllerState::Running | ControllerState::Holding | ControllerState::Stopping
-                )
-            });
-            self.ask(OperatorVerb::Disable, 0.0);
-            self.wait(|heard| heard.drives.at_rest == 1 && heard.drives.lit == 0);
+    /// Ends in order: laser, axes, processes.
+    pub fn shut_down(self) {
+        drop(self);
+    }
+
+    /// Laser off and axes to rest, then unpowered; as far as somebody is there to do it.
+    fn bring_to_rest(&mut self) {
+        if !self.has(Role::Controller) || !self.has(Role::Drives) {
+            return;
         }
-        self.services.stop();
+        // Without an answer the controller hangs, and drives has stopped alone.
+        let _ = self.link.request_within(OperatorVerb::Stop, 0.0, LAST_ANSWER);
+        self.wait(|heard| !is_moving(heard) || stopped_alone(heard));
+        let _ = self.link.request_within(OperatorVerb::Disable, 0.0, LAST_ANSWER);
+        self.wait(is_dark_and_at_rest);
     }
 
     fn wait(&mut self, condition: impl Fn(&Heard) -> bool) {
@@ -295,4 +304,29 @@ impl Pipeline {
             std::thread::sleep(LOOK);
         }
     }
+}
+
+impl Drop for Pipeline {
+    fn drop(&mut self) {
+        self.bring_to_rest();
+        self.services.stop();
+    }
+}
+
+/// Whether the controller moves the axes, or may.
+fn is_moving(heard: &Heard) -> bool {
+    matches!(
+        ControllerState::from_wire(heard.progress.state),
+        ControllerState::Running | ControllerState::Holding | ControllerState::Stopping
+    )
+}
+
+/// Whether drives says that the laser is off and the axes rest, for good.
+fn is_dark_and_at_rest(heard: &Heard) -> bool {
+    heard.drives.at_rest == 1 && heard.drives.lit == 0
+}
+
+/// Whether drives has stopped the axes without the controller.
+fn stopped_alone(heard: &Heard) -> bool {
+    heard.drives.fault.is_some() && is_dark_and_at_rest(heard)
 }

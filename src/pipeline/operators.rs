@@ -1,28 +1,45 @@
 //! Requests of operators, taken from the domain's socket.
 //!
-//! Verbs go straight to the controller; a submitted job waits in a queue for the supervisor's
-//! loop, and its progress goes back to whoever submitted it.
+//! Verbs go to the controller, and to the supervisor while the job is not with the controller; a
+//! submitted job waits in a queue for the supervisor's loop, and its progress goes back to whoever
+//! submitted it.
 
 use super::Starter;
+use super::control::{JobControl, Phase};
 use super::status::Board;
 use crate::exit::Failure;
 use crossbeam::channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
+use monitor::summary::Summary;
 use planner::request::JobRequest;
 use runtime::Domain;
 use runtime::operator::OperatorLink;
 use runtime::socket::{Conversation, OperatorServer};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use signals::{ControllerState, OperatorVerb};
+use signals::{ControllerState, OperatorReply, OperatorVerb};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Jobs that can wait.
+const QUEUE: usize = 8;
+
+/// How long a job that was just started may take to be played, so that it can be held.
+const HOLD_PATIENCE: Duration = Duration::from_secs(1);
+
+/// How long the controller may take to answer a stop or a hold; one that lives takes some
+/// milliseconds.
+const STOP_PATIENCE: Duration = Duration::from_millis(500);
+
+/// Pause between two tries to hold it.
+const HOLD_RETRY: Duration = Duration::from_millis(5);
 
 /// What goes over the socket.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "request")]
 pub enum Request {
-    /// A verb for the controller.
+    /// A verb for the machine.
     Verb {
         /// Its name.
         verb: Verb,
@@ -31,13 +48,28 @@ pub enum Request {
     },
     /// What is going on?
     Status,
-    /// A job to run.
+    /// A job to run. The first part of the answer is [`Part::Accepted`].
     Submit {
         /// The job.
         job: JobRequest,
         /// The run folder.
         out: Option<PathBuf>,
     },
+    /// Takes a submitted job back: stopped if it is under way, or as soon as its turn comes.
+    Withdraw {
+        /// Its number.
+        job: u64,
+    },
+}
+
+/// A part of the answer to a submitted job.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// It waits for its turn, under this number.
+    Accepted(u64),
+    /// How far it has come, 0 to 1.
+    Share(f64),
 }
 
 /// A verb by name.
@@ -60,15 +92,32 @@ pub enum Verb {
     Override,
 }
 
-/// The controller's answer to a verb, as `graver hold --json` and its like print it.
+/// The machine's answer to a verb, as `graver hold --json` and its like print it.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct VerbReply {
     /// Whether it is carried out; otherwise the state does not allow it.
     pub accepted: bool,
-    /// The state that the request met.
+    /// The state that the request met; `preparing` for a job that is not played yet.
     pub state: String,
     /// The rate now wanted, 1 as planned.
     pub value: f64,
+}
+
+impl VerbReply {
+    /// A request that is carried out without the controller.
+    fn accepted(state: &str) -> Self {
+        Self { accepted: true, state: state.to_owned(), value: 1.0 }
+    }
+}
+
+impl From<OperatorReply> for VerbReply {
+    fn from(reply: OperatorReply) -> Self {
+        Self {
+            accepted: reply.accepted == 1,
+            state: ControllerState::from_wire(reply.state).name().to_owned(),
+            value: reply.value,
+        }
+    }
 }
 
 impl From<Verb> for OperatorVerb {
@@ -87,6 +136,8 @@ impl From<Verb> for OperatorVerb {
 
 /// A job that an operator submitted.
 pub struct Submission {
+    /// Its number in this pipeline, from 1.
+    pub number: u64,
     /// The job.
     pub job: JobRequest,
     /// The run folder.
@@ -95,11 +146,19 @@ pub struct Submission {
     pub news: Sender<News>,
 }
 
+/// Tells a submitter how its job ended.
+pub fn tell_end(submitter: &Sender<News>, summary: &Summary) {
+    let reply =
+        serde_json::to_value(summary).unwrap_or_else(|error| json!({ "error": error.to_string() }));
+    // A submitter that left hears nothing.
+    let _ = submitter.send(News::End(reply));
+}
+
 /// What a submitter hears.
 pub enum News {
     /// How far it has come, 0 to 1.
     Share(f64),
-    /// The end: the summary, or why there is none.
+    /// The end: the summary.
     End(Value),
 }
 
@@ -114,26 +173,38 @@ impl Operators {
     ///
     /// # Errors
     /// A socket that cannot be opened.
-    pub fn bind(
-        domain: &Domain,
-        link: Arc<OperatorLink>,
-        board: Arc<Board>,
-        starter: Starter,
-    ) -> Result<Self, Failure> {
-        let (queue, submissions) = bounded(8);
-        let server =
-            OperatorServer::bind(
-                domain,
-                move |request, conversation| match serde_json::from_value(request) {
-                    Ok(Request::Submit { .. }) if starter == Starter::Own => json!({
-                        "error": "this pipeline belongs to a `graver run` and takes no other job; \
-                                  submit to a `graver domain`"
-                    }),
-                    Ok(request) => answer(request, &link, &board, &queue, conversation),
-                    Err(error) => json!({ "error": format!("not a request: {error}") }),
-                },
-            )
-            .map_err(Failure::service)?;
+    pub fn bind(domain: &Domain, answers: Answers, starter: Starter) -> Result<Self, Failure> {
+        let (queue, submissions) = bounded(QUEUE);
+        let numbers = AtomicU64::new(1);
+        let answer = move |request: Value, conversation: &mut Conversation<'_>| {
+            let request = match serde_json::from_value(request) {
+                Ok(request) => request,
+                Err(error) => return json!({ "error": format!("not a request: {error}") }),
+            };
+            match request {
+                Request::Submit { .. } if starter == Starter::Own => json!({
+                    "error": "this pipeline belongs to a `graver run` and takes no other job; \
+                              submit to a `graver domain`"
+                }),
+                Request::Submit { job, out } => {
+                    let number = numbers.fetch_add(1, Ordering::Relaxed);
+                    let (news, heard) = unbounded();
+                    if queue.try_send(Submission { number, job, out, news }).is_err() {
+                        return json!({
+                            "error": format!("{QUEUE} jobs wait already; submit again later")
+                        });
+                    }
+                    follow(number, &heard, conversation)
+                }
+                Request::Status => json!(answers.board.read()),
+                Request::Withdraw { job } => {
+                    answers.control.withdraw(job);
+                    json!(VerbReply::accepted("preparing"))
+                }
+                Request::Verb { verb, value } => answers.carry_out(verb, value),
+            }
+        };
+        let server = OperatorServer::bind(domain, answer).map_err(Failure::service)?;
         Ok(Self { submissions, _server: server })
     }
 
@@ -143,40 +214,16 @@ impl Operators {
     }
 }
 
-fn answer(
-    request: Request,
-    link: &OperatorLink,
-    board: &Board,
-    queue: &Sender<Submission>,
-    conversation: &mut Conversation<'_>,
-) -> Value {
-    match request {
-        Request::Status => json!(board.read()),
-        Request::Verb { verb, value } => match link.request(verb.into(), value) {
-            Ok(reply) => json!(VerbReply {
-                accepted: reply.accepted == 1,
-                state: ControllerState::from_wire(reply.state).name().to_owned(),
-                value: reply.value,
-            }),
-            Err(error) => json!({ "error": error.to_string() }),
-        },
-        Request::Submit { job, out } => {
-            let (news, heard) = unbounded();
-            if queue.try_send(Submission { job, out, news }).is_err() {
-                return json!({ "error": "eight jobs wait already; submit again later" });
-            }
-            follow(&heard, conversation)
-        }
-    }
-}
-
 /// Passes on what is heard of a job until it ends or the submitter leaves; the job goes on either
 /// way.
-fn follow(heard: &Receiver<News>, conversation: &mut Conversation<'_>) -> Value {
+fn follow(number: u64, heard: &Receiver<News>, conversation: &mut Conversation<'_>) -> Value {
+    if conversation.tell(&json!(Part::Accepted(number))).is_err() {
+        return Value::Null;
+    }
     loop {
         match heard.try_recv() {
             Ok(News::Share(share)) => {
-                if conversation.tell(&json!({ "share": share })).is_err() {
+                if conversation.tell(&json!(Part::Share(share))).is_err() {
                     return Value::Null;
                 }
             }
@@ -190,6 +237,69 @@ fn follow(heard: &Receiver<News>, conversation: &mut Conversation<'_>) -> Value 
                 }
                 std::thread::sleep(Duration::from_millis(20));
             }
+        }
+    }
+}
+
+/// What operators' requests are answered from.
+pub struct Answers {
+    link: Arc<OperatorLink>,
+    board: Arc<Board>,
+    control: Arc<JobControl>,
+}
+
+impl Answers {
+    /// Answers for one pipeline.
+    pub fn new(link: Arc<OperatorLink>, board: Arc<Board>, control: Arc<JobControl>) -> Self {
+        Self { link, board, control }
+    }
+
+    fn carry_out(&self, verb: Verb, value: f64) -> Value {
+        match verb {
+            Verb::Stop => self.stop(),
+            Verb::Hold if self.control.hold() => json!(VerbReply::accepted("preparing")),
+            Verb::Hold => self.hold(),
+            Verb::Resume if self.control.resume() => json!(VerbReply::accepted("holding")),
+            verb => self.ask(verb, value),
+        }
+    }
+
+    fn ask(&self, verb: Verb, value: f64) -> Value {
+        match self.link.request(verb.into(), value) {
+            Ok(reply) => json!(VerbReply::from(reply)),
+            Err(error) => json!({ "error": error.to_string() }),
+        }
+    }
+
+    /// A stop is never refused: where there is nothing to stop, it has been obeyed already, and
+    /// where the controller does not answer, the supervisor ends the job without it.
+    fn stop(&self) -> Value {
+        let met = self.control.stop();
+        let reply =
+            self.link.request_within(OperatorVerb::Stop, 0.0, STOP_PATIENCE).map(VerbReply::from);
+        match (met, reply) {
+            (Phase::Preparing, _) => json!(VerbReply::accepted("preparing")),
+            (_, Ok(reply)) => json!(VerbReply { accepted: true, ..reply }),
+            (Phase::Playing, Err(_)) => json!(VerbReply::accepted("running")),
+            (Phase::None, Err(error)) => json!({ "error": error.to_string() }),
+        }
+    }
+
+    /// A job that was started this instant is held as soon as the controller plays it.
+    fn hold(&self) -> Value {
+        let asked = Instant::now();
+        loop {
+            let reply = match self.link.request_within(OperatorVerb::Hold, 0.0, STOP_PATIENCE) {
+                Ok(reply) => VerbReply::from(reply),
+                Err(error) => return json!({ "error": error.to_string() }),
+            };
+            let starting = !reply.accepted
+                && reply.state == ControllerState::Idle.name()
+                && self.control.phase() == Phase::Playing;
+            if !starting || asked.elapsed() > HOLD_PATIENCE {
+                return json!(reply);
+            }
+            std::thread::sleep(HOLD_RETRY);
         }
     }
 }

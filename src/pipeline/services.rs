@@ -4,15 +4,23 @@ use crate::exit::Failure;
 use runtime::Domain;
 use runtime::child::ChildProcess;
 use runtime::domain::Role;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-/// The order in which services start; they stop in the reverse order of danger, see
-/// [`Services::stop`].
+/// The order in which services start.
 const ROLES: [Role; 4] = [Role::Monitor, Role::Planner, Role::Controller, Role::Drives];
+
+/// The order in which they stop: the controller before drives, so that the axes are brought to
+/// rest by whoever can do it best; the monitor last.
+const STOPPING: [Role; 4] = [Role::Planner, Role::Controller, Role::Drives, Role::Monitor];
 
 /// How long a service may take to end after it was told to.
 const END_PATIENCE: Duration = Duration::from_secs(5);
+
+/// This program as the kernel has it open. Its path may lead to another build by now, or nowhere.
+const THIS_PROGRAM: &str = "/proc/self/exe";
 
 /// A service that has ended by itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,12 +36,14 @@ pub struct Ended {
 }
 
 /// What was done about a service that ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Remedy {
     /// Started again: nothing depends on it.
     Restarted,
     /// Nothing: it has been started again before.
     None,
+    /// It could not be started again, for this reason; nothing depends on it.
+    Impossible(String),
     /// The machine is stopped.
     Stop,
 }
@@ -41,9 +51,10 @@ pub enum Remedy {
 impl std::fmt::Display for Ended {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(formatter, "{} (pid {}) {}", self.role, self.pid, self.how)?;
-        match self.remedy {
+        match &self.remedy {
             Remedy::Restarted => write!(formatter, "; started again"),
             Remedy::None => write!(formatter, " once more; not started again"),
+            Remedy::Impossible(reason) => write!(formatter, "; not started again: {reason}"),
             Remedy::Stop => Ok(()),
         }
     }
@@ -55,7 +66,7 @@ struct Service {
     restarts: u32,
 }
 
-/// The services that this process has started.
+/// The services that this process has started; dropping them asks those that still run to end.
 pub struct Services {
     services: Vec<Service>,
 }
@@ -66,11 +77,12 @@ impl Services {
     /// # Errors
     /// A process that cannot be started.
     pub fn start(domain: &Domain) -> Result<Self, Failure> {
-        let mut services = Vec::with_capacity(ROLES.len());
+        let mut services = Self::of_others();
         for role in ROLES {
-            services.push(Service { role, child: Some(spawn(domain, role)?), restarts: 0 });
+            let child = spawn(domain, role).map_err(Failure::service)?;
+            services.services.push(Service { role, child: Some(child), restarts: 0 });
         }
-        Ok(Self { services })
+        Ok(services)
     }
 
     /// None of our own.
@@ -78,11 +90,9 @@ impl Services {
         Self { services: Vec::new() }
     }
 
-    /// The services that have ended since the last look. A monitor is started again once.
-    ///
-    /// # Errors
-    /// A process that cannot be started again.
-    pub fn look(&mut self, domain: &Domain) -> Result<Vec<Ended>, Failure> {
+    /// The services that have ended since the last look. A monitor is started again once, if that
+    /// can be done.
+    pub fn look(&mut self, domain: &Domain) -> Vec<Ended> {
         let mut ended = Vec::new();
         for service in &mut self.services {
             let Some(child) = &mut service.child else { continue };
@@ -91,17 +101,18 @@ impl Services {
             service.child = None;
             domain.clean();
             let remedy = match (service.role, service.restarts) {
-                (Role::Monitor, 0) => Remedy::Restarted,
+                (Role::Monitor, 0) => service.restart(domain),
                 (Role::Monitor, _) => Remedy::None,
                 _ => Remedy::Stop,
             };
-            if remedy == Remedy::Restarted {
-                service.restarts = 1;
-                service.child = Some(spawn(domain, service.role)?);
-            }
             ended.push(Ended { role: service.role, pid, how: describe(status), remedy });
         }
-        Ok(ended)
+        ended
+    }
+
+    /// Whether a service with this role was started here and has not ended.
+    pub fn runs(&self, role: Role) -> bool {
+        self.services.iter().any(|service| service.role == role && service.child.is_some())
     }
 
     /// The process ids of the living services, by name.
@@ -119,28 +130,49 @@ impl Services {
             .collect()
     }
 
-    /// Tells all to end, and makes sure that they do: the controller before drives, so that the
-    /// axes are brought to rest by whoever can do it best; the monitor last.
+    /// Tells all to end, one after the other, and makes sure that they do: a service that does not
+    /// even then, because it is stopped or hangs, is killed. The axes must be at rest.
     pub fn stop(&mut self) {
-        for role in [Role::Planner, Role::Controller, Role::Drives, Role::Monitor] {
+        for role in STOPPING {
             let Some(service) = self.services.iter_mut().find(|service| service.role == role)
             else {
                 continue;
             };
             let Some(mut child) = service.child.take() else { continue };
-            // A child that is gone cannot be told; dropping one that stays kills it.
+            // A child that is gone can be told nothing, and that is no harm.
             let _ = child.terminate();
-            let _ = child.wait_within(END_PATIENCE);
+            if !matches!(child.wait_within(END_PATIENCE), Ok(Some(_))) {
+                let _ = child.kill();
+                let _ = child.wait_within(END_PATIENCE);
+            }
         }
     }
 }
 
-fn spawn(domain: &Domain, role: Role) -> Result<ChildProcess, Failure> {
-    let program = std::env::current_exe().map_err(Failure::service)?;
-    let mut command = Command::new(program);
+impl Service {
+    fn restart(&mut self, domain: &Domain) -> Remedy {
+        self.restarts += 1;
+        match spawn(domain, self.role) {
+            Ok(child) => {
+                self.child = Some(child);
+                Remedy::Restarted
+            }
+            Err(reason) => Remedy::Impossible(reason),
+        }
+    }
+}
+
+fn spawn(domain: &Domain, role: Role) -> Result<ChildProcess, String> {
+    let mut command = Command::new(THIS_PROGRAM);
+    // By its own name in the list of processes.
+    command.arg0(std::env::args_os().next().unwrap_or_else(|| "graver".into()));
+    if !Path::new(THIS_PROGRAM).exists() {
+        let program = std::env::current_exe();
+        command = Command::new(program.map_err(|error| format!("{THIS_PROGRAM}: {error}"))?);
+    }
     command.arg(role.name()).arg("--instance").arg(domain.instance().name());
     command.stdin(std::process::Stdio::null()).stdout(std::process::Stdio::null());
-    ChildProcess::spawn(domain, command).map_err(Failure::service)
+    ChildProcess::spawn(domain, command).map_err(|error| format!("the {role}: {error}"))
 }
 
 fn describe(status: std::process::ExitStatus) -> String {

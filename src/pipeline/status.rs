@@ -44,11 +44,13 @@ pub struct Status {
 }
 
 impl Board {
-    /// Writes what was heard.
-    pub fn post(&self, heard: &Heard, pids: &[(&'static str, Option<i32>)]) {
+    /// Writes what was heard; `held` when a person holds a job that is not played yet.
+    pub fn post(&self, heard: &Heard, held: bool, pids: &[(&'static str, Option<i32>)]) {
         let mut status = self.lock();
         let Heard { progress, drives, planner, .. } = heard;
-        status.state = ControllerState::from_wire(progress.state).name().to_owned();
+        let state = ControllerState::from_wire(progress.state);
+        let state = if held { ControllerState::Holding } else { state };
+        status.state = state.name().to_owned();
         status.planner = match PlannerPhase::from_wire(planner.phase) {
             PlannerPhase::Idle => "idle",
             PlannerPhase::Planning => "planning",

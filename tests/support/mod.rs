@@ -6,7 +6,7 @@
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
@@ -21,7 +21,10 @@ use tempfile::TempDir;
 /// Long beyond anything that a loaded computer needs; only a hang lasts so long.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(90);
 
-/// SIGINT, SIGKILL, SIGTERM; signal(7).
+/// Numbers of signals; signal(7).
+pub(crate) const HANGUP: i32 = 1;
+pub(crate) const CONTINUE: i32 = 18;
+pub(crate) const STOP: i32 = 19;
 pub(crate) const INTERRUPT: i32 = 2;
 pub(crate) const KILL: i32 = 9;
 pub(crate) const TERMINATE: i32 = 15;
@@ -94,7 +97,12 @@ impl Place {
 
     /// `graver` with these arguments, in this place.
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_graver"));
+        self.command_of(Path::new(env!("CARGO_BIN_EXE_graver")), arguments)
+    }
+
+    /// A copy of `graver` with these arguments, in this place.
+    pub(crate) fn command_of(&self, program: &Path, arguments: &[&str]) -> Command {
+        let mut command = Command::new(program);
         command
             .args(arguments)
             .env("XDG_RUNTIME_DIR", self.directory.path())
@@ -127,7 +135,7 @@ impl Place {
             .stderr(File::create(&error).unwrap())
             .spawn()
             .unwrap();
-        Running { child, output, error, ended: false }
+        Running { child: Some(child), output, error }
     }
 
     /// Starts `graver run` of a job into `out` here, with JSON.
@@ -237,16 +245,22 @@ pub(crate) fn services(status: &Value) -> Vec<Peer> {
 /// A `graver` that runs.
 #[derive(Debug)]
 pub(crate) struct Running {
-    child: Child,
+    /// `None` once it has ended.
+    child: Option<Child>,
     output: PathBuf,
     error: PathBuf,
-    ended: bool,
 }
 
 impl Running {
+    /// One whose output goes elsewhere than into files.
+    pub(crate) fn of(child: Child) -> Self {
+        Self { child: Some(child), output: "/dev/null".into(), error: "/dev/null".into() }
+    }
+
     /// Its process.
     pub(crate) fn peer(&self) -> Peer {
-        Peer::open(i32::try_from(self.child.id()).unwrap()).unwrap()
+        let child = self.child.as_ref().expect("it has ended");
+        Peer::open(i32::try_from(child.id()).unwrap()).unwrap()
     }
 
     /// Sends it a signal.
@@ -256,9 +270,15 @@ impl Running {
 
     /// Its exit code if it has ended; `Some(None)` after a signal.
     pub(crate) fn try_code(&mut self) -> Option<Option<i32>> {
-        let status = self.child.try_wait().unwrap()?;
-        self.ended = true;
+        let status = self.child.as_mut().expect("it has ended").try_wait().unwrap()?;
+        self.child = None;
         Some(status.code())
+    }
+
+    /// Waits for its end, and gives what came through its pipes.
+    pub(crate) fn output(mut self) -> Output {
+        let child = self.child.take().expect("it has ended");
+        child.wait_with_output().unwrap()
     }
 
     /// What it has said so far.
@@ -286,9 +306,9 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        if !self.ended {
-            let _ = self.child.kill();
-            let _ = self.child.wait();
+        if let Some(child) = &mut self.child {
+            let _ = child.kill();
+            let _ = child.wait();
         }
     }
 }

@@ -40,7 +40,9 @@ impl Controller {
                 self.player.hold();
                 self.state = State::Stopping;
             }
-            (OperatorVerb::Stop, State::Idle | State::Disabled) if self.intake.started() != 0 => {
+            (OperatorVerb::Stop, State::Idle | State::Disabled | State::Enabling { .. })
+                if self.intake.started() != 0 =>
+            {
                 self.give_up(cycle);
             }
             (OperatorVerb::Reset, State::Faulted) => {

@@ -4,15 +4,16 @@ use super::axes::{AxisReport, Unit};
 use super::job::{JobReport, MotorUse};
 use super::reach::{Obstacle, ReachReport};
 use super::{CheckReport, CheckWarning};
+use crate::output::say;
 use monitor::summary::MachineSummary;
 
 /// Prints it on standard error.
 pub(super) fn print(report: &CheckReport) {
     let MachineSummary { name, mechanism, .. } = &report.machine;
-    eprintln!("machine   {name} ({mechanism})");
+    say!("machine   {name} ({mechanism})");
     for axis in &report.axes {
-        eprintln!("{}", axis_line(axis));
-        eprintln!("{}", transmission_line(axis));
+        say!("{}", axis_line(axis));
+        say!("{}", transmission_line(axis));
     }
     reach(&report.reach);
     report.warnings.iter().for_each(warning);
@@ -20,9 +21,9 @@ pub(super) fn print(report: &CheckReport) {
         Some(found) => job(found),
         None => {
             if let Some(sample) = &report.sample_job {
-                eprintln!("sample    {sample}, not checked: name it to check it too");
+                say!("sample    {sample}, not checked: name it to check it too");
             }
-            eprintln!("the machine file is sound");
+            say!("the machine file is sound");
         }
     }
 }
@@ -82,7 +83,7 @@ fn range(axis: &AxisReport) -> String {
 
 fn reach(reach: &ReachReport) {
     let percent = |share: f64| share * 100.0;
-    eprintln!(
+    say!(
         "reach     {:.1} % of the area at z {:.1} mm and home's attitude, {:.1} % singular",
         percent(reach.reached),
         reach.height * 1e3,
@@ -90,37 +91,39 @@ fn reach(reach: &ReachReport) {
     );
     if let Some(bounds) = &reach.bounds {
         let [x, y] = [bounds.x, bounds.y].map(|range| range.map(|at| at * 1e3));
-        eprintln!("reached   x {:.1} to {:.1} mm, y {:.1} to {:.1} mm", x[0], x[1], y[0], y[1]);
+        say!("reached   x {:.1} to {:.1} mm, y {:.1} to {:.1} mm", x[0], x[1], y[0], y[1]);
     }
     if let Some(error) = reach.count_error {
         let error = error * 1e6;
-        eprintln!("counts    half a count on each axis puts the tool off by up to {error:.1} µm");
+        say!("counts    half a count on each axis puts the tool off by up to {error:.1} µm");
     }
     for margin in &reach.margins {
         let [x, y, _] = margin.position.map(|at| at * 1e3);
-        eprintln!(
+        say!(
             "margin    {} {:.4} of at least {:.4}, at x {x:.1} mm, y {y:.1} mm",
-            margin.name, margin.value, margin.limit
+            margin.name,
+            margin.value,
+            margin.limit
         );
     }
     for Obstacle { code, axis, share } in &reach.refusals {
         let axis = axis.as_ref().map(|axis| format!(" of axis {axis}")).unwrap_or_default();
-        eprintln!("refused   {:.1} % of the area: {code}{axis}", percent(*share));
+        say!("refused   {:.1} % of the area: {code}{axis}", percent(*share));
     }
 }
 
 fn warning(warning: &CheckWarning) {
     match warning.line {
-        0 => eprintln!("warning   {}", warning.message),
-        line => eprintln!("warning   line {line}, column {}: {}", warning.column, warning.message),
+        0 => say!("warning   {}", warning.message),
+        line => say!("warning   line {line}, column {}: {}", warning.column, warning.message),
     }
 }
 
 fn job(job: &JobReport) {
     let facts = &job.facts;
-    eprintln!("job       {}: {} strokes, {:.3} s", facts.name, facts.strokes, facts.duration);
-    job.motors.iter().for_each(|motor| eprintln!("{}", motor_line(motor)));
-    eprintln!(
+    say!("job       {}: {} strokes, {:.3} s", facts.name, facts.strokes, facts.duration);
+    job.motors.iter().for_each(|motor| say!("{}", motor_line(motor)));
+    say!(
         "path      acceleration {:.0} %, jerk {:.0} %",
         facts.uses.path_acceleration * 100.0,
         facts.uses.path_jerk * 100.0
@@ -130,15 +133,18 @@ fn job(job: &JobReport) {
             0 => String::new(),
             stroke => format!(", stroke {stroke}"),
         };
-        eprintln!(
+        say!(
             "nearest   {} {:.4} against a limit of {:.4}, at {:.3} s{place}",
-            margin.name, margin.value, margin.limit, margin.time
+            margin.name,
+            margin.value,
+            margin.limit,
+            margin.time
         );
     }
     for note in &facts.notes {
-        eprintln!("note      line {}: {}", note.line, note.text);
+        say!("note      line {}: {}", note.line, note.text);
     }
-    eprintln!("the machine file is sound, and the machine can do the job");
+    say!("the machine file is sound, and the machine can do the job");
 }
 
 fn motor_line(motor: &MotorUse) -> String {

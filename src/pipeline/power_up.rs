@@ -1,0 +1,106 @@
+//! From processes that were just started to motors that are powered and wait for a job.
+
+use super::Pipeline;
+use runtime::domain::Role;
+use signals::{ControllerState, Fault, OperatorVerb};
+use std::time::{Duration, Instant};
+
+/// How long services may take to come up.
+const START_PATIENCE: Duration = Duration::from_secs(30);
+
+/// How long the controller may take to power the motors, or to end what it does.
+const POWER_PATIENCE: Duration = Duration::from_secs(10);
+
+/// Why the motors are not powered.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NotReady {
+    /// A service does not say anything.
+    #[error("the {0} did not come up within {seconds} s", seconds = START_PATIENCE.as_secs())]
+    Silent(Role),
+    /// A fault is latched.
+    #[error(
+        "the machine is faulted: {}; clear it with `graver reset`",
+        .0.code().name()
+    )]
+    Faulted(Fault),
+    /// The controller does something else.
+    #[error(
+        "the controller did not become ready within {seconds} s: it is {name}",
+        seconds = POWER_PATIENCE.as_secs(), name = .0.name()
+    )]
+    Busy(ControllerState),
+}
+
+/// How far it has come.
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    /// Waiting until every service has spoken.
+    Services,
+    /// Waiting for the motors; whether they were asked for.
+    Motors { asked: bool },
+}
+
+/// The way to powered motors, one look after the other.
+#[derive(Debug, Clone, Copy)]
+pub struct PowerUp {
+    since: Instant,
+    step: Step,
+}
+
+impl PowerUp {
+    /// From now on.
+    pub fn begin() -> Self {
+        Self { since: Instant::now(), step: Step::Services }
+    }
+
+    /// Goes on after a look at the pipeline; whether the motors are powered.
+    ///
+    /// # Errors
+    /// A service that stays silent, a fault, or a controller that does not become ready.
+    pub fn advance(&mut self, pipeline: &Pipeline) -> Result<bool, NotReady> {
+        match self.step {
+            // A controller that powers the motors sooner meets drives that know nobody yet, and
+            // they stop for good.
+            Step::Services => match silent(pipeline) {
+                None => *self = Self { since: Instant::now(), step: Step::Motors { asked: false } },
+                Some(role) if self.since.elapsed() > START_PATIENCE => {
+                    return Err(NotReady::Silent(role));
+                }
+                Some(_) => {}
+            },
+            Step::Motors { asked } => {
+                let progress = &pipeline.heard.progress;
+                let state = ControllerState::from_wire(progress.state);
+                match state {
+                    ControllerState::Idle => return Ok(true),
+                    ControllerState::Faulted => return Err(NotReady::Faulted(progress.fault)),
+                    ControllerState::Disabled if !asked => {
+                        let asked = pipeline.ask(OperatorVerb::Enable, 0.0);
+                        self.step = Step::Motors { asked };
+                    }
+                    _ if self.since.elapsed() > POWER_PATIENCE => {
+                        return Err(NotReady::Busy(state));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Ok(false)
+    }
+}
+
+/// A service that is not there or has not spoken yet. Nobody waits for a monitor that others start,
+/// or that has died.
+fn silent(pipeline: &Pipeline) -> Option<Role> {
+    let heard = &pipeline.heard;
+    [
+        (Role::Planner, heard.planner.published.0 != 0),
+        (Role::Controller, heard.progress.published.0 != 0),
+        (Role::Drives, heard.drives.cycle.0 != 0),
+        (Role::Monitor, true),
+    ]
+    .into_iter()
+    .filter(|(role, _)| *role != Role::Monitor || pipeline.starts(*role))
+    .find(|(role, spoke)| !spoke || !pipeline.has(*role))
+    .map(|(role, _)| role)
+}
