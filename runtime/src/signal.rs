@@ -1,4 +1,8 @@
-//! Ctrl-C and SIGTERM as a flag that loops look at.
+//! Requests to end as a flag that loops look at: Ctrl-C, SIGTERM, and SIGHUP, which a closed
+//! terminal sends.
+//!
+//! SIGPIPE stays ignored, as Rust's runtime leaves it: a reader that goes away is an error of the
+//! write.
 
 use std::io;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
@@ -9,7 +13,7 @@ static LAST: AtomicI32 = AtomicI32::new(0);
 /// A request to end that came as a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Termination {
-    /// The newest signal, `SIGINT` or `SIGTERM`.
+    /// The newest signal: `SIGINT`, `SIGTERM` or `SIGHUP`.
     pub signal: i32,
     /// How many came so far; a second Ctrl-C means that the person is in a hurry.
     pub count: u32,
@@ -20,23 +24,48 @@ extern "C" fn note(signal: libc::c_int) {
     COUNT.fetch_add(1, Ordering::Release);
 }
 
-/// Makes SIGINT and SIGTERM set the flag instead of ending the process. System calls that wait
-/// come back with `EINTR`, so that loops look at the flag at once.
+/// Makes SIGINT, SIGTERM and SIGHUP set the flag instead of ending the process. System calls that
+/// wait come back with `EINTR`, so that loops look at the flag at once. A SIGHUP that is ignored
+/// already, as under `nohup`, stays ignored.
+///
+/// # Errors
+/// Names the signal whose handler the operating system refused.
 pub fn install() -> io::Result<()> {
-    for signal in [libc::SIGINT, libc::SIGTERM] {
+    let handler: extern "C" fn(libc::c_int) = note;
+    for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP] {
+        let before = exchange(signal, None).map_err(|source| refused(signal, &source))?;
+        if signal == libc::SIGHUP && before.sa_sigaction == libc::SIG_IGN {
+            continue;
+        }
         // SAFETY: all zeros is a valid sigaction (no flags, empty mask), completed below.
         #[allow(unsafe_code)]
         let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
-        let handler: extern "C" fn(libc::c_int) = note;
         action.sa_sigaction = handler as libc::sighandler_t;
-        // SAFETY: the handler only stores to atomics, which is async-signal-safe; the old action
-        // is not asked for.
-        #[allow(unsafe_code)]
-        if unsafe { libc::sigaction(signal, &action, std::ptr::null_mut()) } != 0 {
-            return Err(io::Error::last_os_error());
-        }
+        exchange(signal, Some(&action)).map_err(|source| refused(signal, &source))?;
     }
     Ok(())
+}
+
+/// Sets the action of a signal, if one is given, and tells the one before. Handlers given here
+/// must be async-signal-safe.
+fn exchange(
+    signal: libc::c_int,
+    action: Option<&libc::sigaction>,
+) -> io::Result<libc::sigaction> {
+    let new = action.map_or(std::ptr::null(), std::ptr::from_ref);
+    // SAFETY: all zeros is a valid sigaction, which the kernel overwrites.
+    #[allow(unsafe_code)]
+    let mut before: libc::sigaction = unsafe { std::mem::zeroed() };
+    // SAFETY: both actions are valid or null; a new handler is async-signal-safe, see above.
+    #[allow(unsafe_code)]
+    match unsafe { libc::sigaction(signal, new, &mut before) } {
+        0 => Ok(before),
+        _ => Err(io::Error::last_os_error()),
+    }
+}
+
+fn refused(signal: libc::c_int, source: &io::Error) -> io::Error {
+    io::Error::new(source.kind(), format!("signal {signal} cannot be handled: {source}"))
 }
 
 /// The request to end, if one came.

@@ -1,21 +1,88 @@
-//! Ctrl-C as a flag, in a process of its own because the handler is the process's.
+//! Requests to end as a flag. Handlers belong to the process, so each test has one of its own: this
+//! binary again, running [`signalled_process`] with a script in the environment.
 
 #![allow(clippy::unwrap_used)]
+
+use std::process::Command;
 
 use runtime::peer::Peer;
 use runtime::signal::{self, Termination};
 
+const SCRIPT: &str = "GRAVER_TEST_SIGNALS";
+
+/// Runs the script in a process of its own, started by a shell that has set `trap`.
+fn check(script: &str, trap: &str) {
+    let status = Command::new("sh")
+        .args(["-c", &format!("{trap}\nexec \"$0\" \"$@\"")])
+        .arg(std::env::current_exe().unwrap())
+        .args(["--exact", "signalled_process", "--nocapture", "--test-threads=1"])
+        .env(SCRIPT, script)
+        .status()
+        .unwrap();
+    assert!(status.success(), "{script}: {status}");
+}
+
+/// In a child: plays its script. Without the environment it is an empty test.
 #[test]
-fn a_signal_sets_the_flag_and_a_second_one_counts() {
-    signal::install().unwrap();
-    assert_eq!(signal::termination(), None);
+fn signalled_process() {
+    let Ok(script) = std::env::var(SCRIPT) else { return };
     let own = Peer::open(std::process::id() as i32).unwrap();
-    for (count, number) in [(1, libc::SIGTERM), (2, libc::SIGINT)] {
-        own.signal(number).unwrap();
-        // Sent to the process: any of its threads may take it.
-        while signal::termination().is_none_or(|termination| termination.count < count) {
-            std::thread::yield_now();
+    match script.as_str() {
+        "ends" => {
+            default_hang_up();
+            signal::install().unwrap();
+            assert_eq!(signal::termination(), None);
+            for (count, number) in [(1, libc::SIGTERM), (2, libc::SIGINT), (3, libc::SIGHUP)] {
+                own.signal(number).unwrap();
+                assert_eq!(told(count), Termination { signal: number, count });
+            }
         }
-        assert_eq!(signal::termination(), Some(Termination { signal: number, count }));
+        "nohup" => {
+            signal::install().unwrap();
+            own.signal(libc::SIGHUP).unwrap();
+            own.signal(libc::SIGTERM).unwrap();
+            assert_eq!(told(1), Termination { signal: libc::SIGTERM, count: 1 });
+        }
+        "pipe" => {
+            signal::install().unwrap();
+            own.signal(libc::SIGPIPE).unwrap();
+            own.signal(libc::SIGTERM).unwrap();
+            assert_eq!(told(1).signal, libc::SIGTERM);
+        }
+        other => panic!("{other}"),
     }
+}
+
+/// Sent to the process, a signal may be taken by any of its threads: waits for the count.
+fn told(count: u32) -> Termination {
+    loop {
+        match signal::termination() {
+            Some(termination) if termination.count >= count => return termination,
+            _ => std::thread::yield_now(),
+        }
+    }
+}
+
+/// A shell cannot undo that a signal was ignored when it was started.
+fn default_hang_up() {
+    // SAFETY: the default action replaces whatever this test was started with.
+    #[allow(unsafe_code)]
+    unsafe {
+        libc::signal(libc::SIGHUP, libc::SIG_DFL)
+    };
+}
+
+#[test]
+fn each_request_to_end_sets_the_flag_and_counts() {
+    check("ends", "");
+}
+
+#[test]
+fn a_hang_up_that_is_ignored_stays_ignored() {
+    check("nohup", "trap '' HUP");
+}
+
+#[test]
+fn a_reader_that_went_away_is_no_request_to_end() {
+    check("pipe", "");
 }
