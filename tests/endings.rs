@@ -5,8 +5,15 @@
 
 mod support;
 
+use graver::arguments::{DrivesArguments, DrivesKind, MachineArguments};
+use graver::inputs::MachineSource;
+use graver::pipeline::configuration::Configuration;
+use graver::pipeline::{Pipeline, Starter};
+use runtime::{Domain, Reading, Role, Subscriber};
 use serde_json::Value;
+use signals::DrivesReport;
 use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::Stdio;
 use std::time::Duration;
 use support::{
@@ -424,4 +431,41 @@ fn output_never_goes_over_an_input() {
         assert!(ended.error.contains("would be lost"), "{}", ended.error);
         assert_eq!([job, machine].map(|path| std::fs::read(path).unwrap()), before);
     }
+}
+
+#[test]
+fn a_panic_of_the_supervisor_unpowers_the_motors() {
+    let place = Place::new();
+    let machine = MachineArguments { machine: None, set: Vec::new() };
+    let drives =
+        DrivesArguments { drives: DrivesKind::Sim, strict: false, core: None, no_realtime: true };
+    let source = MachineSource::read(&machine).unwrap();
+    let configuration = Configuration::new(source, &drives).unwrap();
+    let mut services = Vec::new();
+    let mut observer = None;
+    let panicked = catch_unwind(AssertUnwindSafe(|| {
+        let mut pipeline =
+            Pipeline::start(place.instance(), &configuration, Starter::Others).unwrap();
+        for role in ["planner", "controller", "drives"] {
+            services.push(place.start(&[role, "--instance", place.instance().name()]));
+        }
+        let domain = Domain::join(place.instance(), Role::Observer).unwrap();
+        let reports: Subscriber<DrivesReport> = domain.subscriber(Reading::Newest).unwrap();
+        observer = Some((reports, domain));
+        pipeline.enable().unwrap();
+        panic!("as a fault in the supervisor would");
+    }));
+    assert!(panicked.is_err());
+    let (mut reports, domain) = observer.unwrap();
+    let started = std::time::Instant::now();
+    while reports.newest().unwrap().is_none_or(|report| report.at_rest != 1) {
+        assert!(started.elapsed() < support::PATIENCE, "the motors stay powered");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    drop((reports, domain));
+    for service in services {
+        service.signal(TERMINATE);
+        service.wait();
+    }
+    place.assert_nothing_left(&[]);
 }

@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release -p controller --example step_time`
 
+#![allow(clippy::print_stdout, reason = "an example for people")]
+
 use std::time::Instant;
 
 use controller::{Controller, Inputs, Outputs, Peers};

@@ -1,6 +1,8 @@
 //! Prints how long one cycle of the plant takes: `cargo run --release -p drives --example
 //! cycle_time`.
 
+#![allow(clippy::print_stdout, reason = "an example for people")]
+
 use std::time::Instant;
 
 use drives::plant::PlantError;
