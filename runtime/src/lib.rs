@@ -20,6 +20,7 @@ pub mod domain;
 pub mod instance;
 mod lock;
 mod membership;
+pub mod message;
 pub mod operator;
 pub mod peer;
 pub mod service;
