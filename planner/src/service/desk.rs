@@ -41,15 +41,13 @@ impl Drop for Abandoned {
 pub(super) fn plan_request(
     folder: &Path,
     machine: &Machine,
-    standing: Option<&AxisArray>,
+    standing: &AxisArray,
     abandoned: &AtomicBool,
 ) -> Result<Plan, Refusal> {
     let text = std::fs::read(folder.join(run_folder::REQUEST)).map_err(Refusal::internal)?;
     let request: JobRequest = serde_json::from_slice(&text).map_err(Refusal::internal)?;
     let mut job = request.read(machine)?;
-    if let Some(standing) = standing {
-        approach(&mut job, machine, standing).map_err(Refusal::internal)?;
-    }
+    approach(&mut job, machine, standing).map_err(Refusal::internal)?;
     let plan = plan_unless(machine, &job, &|| abandoned.load(Ordering::Relaxed))
         .map_err(|error| request.refuse(&error))?;
     write_plan(folder, &plan).map_err(Refusal::internal)?;
