@@ -5,7 +5,7 @@ use super::services::{Ended, Remedy};
 use super::{LOOK, Pipeline, Starter};
 use crate::exit::{Failure, error_summary};
 use crate::output::ProgressLine;
-use monitor::conclusion::{self, Ending};
+use monitor::conclusion::{self, Ending, RecordingState};
 use monitor::run_folder::RunFolder;
 use monitor::summary::{ErrorSummary, Outcome, Summary};
 use planner::request::{JobRequest, Refusal};
@@ -251,9 +251,9 @@ impl<'a> JobRun<'a> {
             self.await_recording();
         }
         self.ending.drives = Some(self.drives_with_cause());
+        self.ending.latched = self.pipeline.heard.progress.fault;
         let machine = self.pipeline.configuration.source.machine()?;
-        let summary = conclusion::conclude(&self.folder, &machine, &self.ending, self.started)
-            .map_err(Failure::service)?;
+        let summary = conclusion::conclude(&self.folder, &machine, &self.ending, self.started);
         self.pipeline.board.name_job(None);
         if let Some(submission) = self.submission.take() {
             let reply = serde_json::to_value(&summary).map_err(Failure::service)?;
@@ -281,7 +281,7 @@ impl<'a> JobRun<'a> {
     /// Waits until the monitor has written all of it, as long as there is one.
     fn await_recording(&mut self) {
         let since = Instant::now();
-        while !self.folder.file(run_folder::WATCH).exists()
+        while RecordingState::of(&self.folder, self.stream) == RecordingState::Open
             && since.elapsed() < WATCH_PATIENCE
             && self.pipeline.has(Role::Monitor)
         {
