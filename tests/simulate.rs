@@ -67,7 +67,7 @@ fn run(machine: &Machine, plant: &Machine, job: &Path, changes: &[String], seed:
     assert_eq!(report.cycles, plan.facts.samples + 1);
     assert!(plan.facts.duration <= plan.facts.samples as f64 * CYCLE_TIME);
     Outcome {
-        marks: examination.finish().marks.unwrap(),
+        marks: examination.finish(Some(&report)).marks.unwrap().marks,
         report,
         time: plan.facts.duration,
         axes: machine.axes.len(),

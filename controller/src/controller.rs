@@ -178,9 +178,9 @@ impl Controller {
             self.statistics.cycle(&outputs.command, feedback, now);
         }
         outputs.report = self.ended.take();
-        let due = self.playing != 0 && self.cycles.is_multiple_of(REPORT_INTERVAL);
-        if outputs.report.is_none() && due {
-            outputs.report = Some(self.statistics.report());
+        if outputs.report.is_none() && self.cycles.is_multiple_of(REPORT_INTERVAL) {
+            // The final one too, again and again: who joins late must learn how the stream ended.
+            outputs.report = Some(self.statistics.report()).filter(|report| report.stream != 0);
         }
         let changed = self.state.to_wire() != state_before;
         if changed || outputs.report.is_some() || self.cycles.is_multiple_of(PROGRESS_INTERVAL) {

@@ -50,7 +50,8 @@ pub struct Outputs {
     pub command: Command,
     /// How far the stream has come: every few cycles, and when the state changes.
     pub progress: Option<Progress>,
-    /// What was counted over the stream: once a second, and when it ends.
+    /// What was counted over the stream: when it ends, and once a second, the final one repeated
+    /// until the next stream begins.
     pub report: Option<ControllerReport>,
     /// The answer to the request.
     pub reply: Option<OperatorReply>,

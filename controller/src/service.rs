@@ -43,6 +43,7 @@ pub fn run(
             cycle.answer(&feedback, clock::now())?;
         }
         if !woken {
+            cycle.greet()?;
             cycle.look_after_drives()?;
         }
         if cycle.shall_end() {
@@ -116,6 +117,14 @@ impl ServiceCycle {
         }
         self.controller.abandon(clock::now(), &mut self.outputs);
         self.report()
+    }
+
+    /// Without feedback there is no cycle, and nothing is published: who joins now hears here what
+    /// was said last.
+    fn greet(&mut self) -> Result<(), ServiceError> {
+        self.progress.greet()?;
+        self.reports.greet()?;
+        Ok(())
     }
 
     fn report(&mut self) -> Result<(), ServiceError> {

@@ -107,13 +107,16 @@ impl Statistics {
         }
     }
 
-    /// The report so far.
+    /// The report so far, or the final one of the stream that ended last; its stream is 0 before
+    /// the first.
     pub fn report(&self) -> ControllerReport {
         ControllerReport { digest: self.digest.value(), ..self.report }
     }
 
-    /// The final report.
-    pub fn finish(&self, completed: bool, fault: Fault) -> ControllerReport {
-        ControllerReport { is_final: 1, completed: u32::from(completed), fault, ..self.report() }
+    /// The final report; [`Self::report`] repeats it until the next stream begins.
+    pub fn finish(&mut self, completed: bool, fault: Fault) -> ControllerReport {
+        let report = &mut self.report;
+        (report.is_final, report.completed, report.fault) = (1, u32::from(completed), fault);
+        self.report()
     }
 }

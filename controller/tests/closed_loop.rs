@@ -35,3 +35,20 @@ fn a_nominal_machine_marks_within_ten_micrometres() {
     let planned: f64 = job.lit.iter().map(|(on, off)| (off - on) * 0.5).sum();
     assert!((exposure - planned).abs() < 1e-8, "{exposure} against {planned}");
 }
+
+#[test]
+fn the_final_report_is_repeated_for_who_joins_late_until_the_next_stream_begins() {
+    let machine = Machine::builtin();
+    let job = two_marks(&machine, 0.25, 0.5);
+    let mut bench = Bench::enabled(&machine);
+    bench.run(None, 1500);
+    assert_eq!(bench.reports.len(), 0, "nothing to say before the first stream");
+    assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+    bench.until(Some(&job), ControllerState::Running, 20);
+    bench.until(Some(&job), ControllerState::Idle, 2000);
+    let told = bench.reports.len();
+    let last = bench.reports[told - 1];
+    bench.run(None, 2500);
+    assert!(bench.reports.len() >= told + 2, "{} more", bench.reports.len() - told);
+    assert!(bench.reports[told..].iter().all(|report| *report == last));
+}

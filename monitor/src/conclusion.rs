@@ -1,19 +1,25 @@
 //! From what is known at the end of a run to its summary and its report.
 //!
 //! What cannot be read or judged leaves a gap in the summary and a warning that says why; a figure
-//! that might be wrong is never given.
+//! that might be wrong is never given. Nor is a run without a summary: what cannot be written is a
+//! warning in it too.
+
+pub mod verdict;
+
+pub use crate::recording::note::{RecordingState, WatchNote};
 
 use crate::examination::{Clock, Examination, Findings};
-use crate::marks::Marks;
+use crate::marks::{Judgement, Marks};
 use crate::recording::file::{RecordingError, RecordingReader};
 use crate::report::Report;
 use crate::run_folder::RunFolder;
+use crate::summary::text::length;
 use crate::summary::{
     ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, Summary,
 };
 use machine::{Axis, Machine};
 use runtime::thread;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use signals::artwork::Artwork;
 use signals::plan::PlanFacts;
 use signals::time::CYCLE_TIME;
@@ -29,45 +35,20 @@ pub const LIGHT_LAG: u64 = 2;
 /// Cycles that the controller counts beyond a stream's setpoints: the one that finds it at rest.
 const END_CYCLES: u64 = 1;
 
-/// What the monitor service notes when a recording is complete.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct WatchNote {
-    /// The stream it recorded.
-    pub stream: u64,
-    /// Records in the recording.
-    pub records: u64,
-    /// Samples known to be lost.
-    pub lost: u64,
-}
-
-impl WatchNote {
-    /// The note in a run folder; `None` while there is none that can be read.
-    pub fn read(folder: &RunFolder) -> Option<Self> {
-        serde_json::from_slice(&fs::read(folder.file(run_folder::WATCH)).ok()?).ok()
-    }
-
-    /// Writes it into the run folder.
-    ///
-    /// # Errors
-    /// Whatever the operating system reports.
-    pub fn write(&self, folder: &RunFolder) -> io::Result<()> {
-        folder.write(run_folder::WATCH, serde_json::to_vec_pretty(self)?)
-    }
-}
-
 /// How a run ended, as whoever watched it knows.
 #[derive(Debug, Clone, Default)]
 pub struct Ending {
-    /// How; `None` takes it from the reports.
+    /// How whoever watched ended it; `None` where it ended by itself. What the reports say of the
+    /// machine goes before it: see [`verdict`](verdict::verdict).
     pub outcome: Option<Outcome>,
     /// Why, in words.
     pub error: Option<ErrorSummary>,
     /// The controller's final report of this stream, if it came.
     pub controller: Option<ControllerReport>,
+    /// The fault that the controller has latched at the end, if any.
+    pub latched: Fault,
     /// The newest report of drives, if any came.
     pub drives: Option<DrivesReport>,
-    /// A fault that no report of the stream tells: one before it was played.
-    pub fault: Option<Fault>,
     /// Overruns counted before the run began.
     pub overruns_before: u64,
     /// Name of the job, for a run that was never planned.
@@ -119,19 +100,16 @@ pub fn summarise(
     if let Some(report) = &ending.drives {
         summary.overruns = report.overruns.saturating_sub(ending.overruns_before);
     }
-    let faults = [
-        ending.controller.map(|report| report.fault),
-        ending.fault,
-        ending.drives.map(|report| report.fault),
-    ];
-    summary.fault =
-        faults.iter().flatten().find_map(|fault| FaultSummary::of(fault, &machine.axes));
-    summary.outcome = outcome(ending, summary.fault.is_some());
+    end(&mut summary, machine, ending);
     if let Some(findings) = findings {
         summary.latency = findings.histograms.summary();
-        match judged(ending.controller.as_ref(), findings) {
-            Ok(marks) => summary.marks = Some(marks),
-            Err(reason) => summary.warnings.push(reason),
+        summary.recording = Some(findings.continuity.summary());
+        match &findings.marks {
+            Ok(judgement) => {
+                summary.warnings.extend(doubts(judgement));
+                summary.marks = Some(judgement.marks.clone());
+            }
+            Err(reason) => summary.warnings.push(reason.to_string()),
         }
     }
     summary.realtime = match clock {
@@ -141,14 +119,48 @@ pub fn summarise(
     summary
 }
 
-fn outcome(ending: &Ending, fault: bool) -> Outcome {
-    ending.outcome.unwrap_or(match &ending.controller {
-        Some(report) if report.fault.is_some() => Outcome::Faulted,
-        Some(report) if report.completed == 1 => Outcome::Completed,
-        Some(_) if fault => Outcome::Faulted,
-        Some(_) => Outcome::Stopped,
-        None => Outcome::Aborted,
-    })
+/// How it ended. What came after a completed job is a warning, and none of its faults.
+fn end(summary: &mut Summary, machine: &Machine, ending: &Ending) {
+    let verdict = verdict::verdict(&verdict::Evidence {
+        controller: ending.controller,
+        latched: ending.latched,
+        drives: ending.drives.map(|report| report.fault).unwrap_or_default(),
+        own: ending.outcome,
+    });
+    let told = |fault: Fault| FaultSummary::of(&fault, &machine.axes);
+    summary.outcome = verdict.outcome;
+    summary.fault = verdict.fault.and_then(told);
+    if let Some(later) = verdict.later.and_then(told) {
+        summary.warnings.push(format!("after the job: {later}"));
+    }
+    if verdict.outcome == Outcome::Completed {
+        let error = summary.error.take();
+        summary.warnings.extend(error.map(|error| format!("after the job: {}", error.message)));
+    }
+}
+
+/// What a person should know of marks that are not judged whole.
+fn doubts(judgement: &Judgement) -> Vec<String> {
+    let Judgement { marks, unrecorded_strokes, unknown, open_end } = judgement;
+    let Some((first, last)) = unrecorded_strokes else { return Vec::new() };
+    let Marks { unrecorded, .. } = marks;
+    let strokes = if first == last {
+        format!("of stroke {first}")
+    } else {
+        format!("between stroke {first} and stroke {last}")
+    };
+    let mut doubts = vec![format!(
+        "not all was recorded: {} {strokes} may be marked or missing and are not judged",
+        length(*unrecorded)
+    )];
+    if *open_end {
+        let nobody = "the recording ends before the job, and nobody can tell how far it went on";
+        doubts.push(nobody.to_owned());
+    }
+    if *unknown > 0 {
+        doubts.push(format!("the tool position was unknown in {unknown} lit cycles"));
+    }
+    doubts
 }
 
 /// The machine as summaries name it.
@@ -157,21 +169,6 @@ pub fn machine_summary(machine: &Machine) -> MachineSummary {
         name: machine.name.clone(),
         mechanism: machine.mechanism.name().to_owned(),
         axes: machine.axes.iter().map(|axis| axis.name.clone()).collect(),
-    }
-}
-
-/// The marks, unless the judge found none to stand on or the recording lacks its head or tail: it
-/// would miss marks that were made.
-fn judged(report: Option<&ControllerReport>, findings: &Findings) -> Result<Marks, String> {
-    let Some(report) = report else {
-        return Err("the marks are not judged: the controller did not say where they end".into());
-    };
-    let needed = (report.first_cycle.0, report.last_cycle.0.saturating_add(LIGHT_LAG));
-    match findings.cycles {
-        Some((first, last)) if first <= needed.0 && last >= needed.1 => {
-            findings.marks.clone().map_err(|reason| reason.to_string())
-        }
-        _ => Err("the marks are not judged: the recording lacks its beginning or its end".into()),
     }
 }
 
@@ -190,10 +187,8 @@ fn realtime(ending: &Ending) -> Realtime {
 }
 
 /// Concludes a run from its folder: examines the recording, writes summary and report, and
-/// returns the summary. `started` is when the command began.
-///
-/// # Errors
-/// Whatever the operating system reports while writing the summary; all else is a warning in it.
+/// returns the summary, with a warning for each file that could not be read or written. `started`
+/// is when the command began.
 pub fn conclude(
     folder: &RunFolder,
     machine: &Machine,
@@ -207,10 +202,13 @@ pub fn conclude(
     if ending.outcome != Some(Outcome::Refused) {
         let warnings = &mut ending.warnings;
         plan = read_json(folder, run_folder::PLAN, warnings).unwrap_or_default();
+        if let Some(note) = WatchNote::read(folder).filter(|note| !note.message.is_empty()) {
+            warnings.push(format!("the recording was broken off: {}", note.message));
+        }
         // Nor was anything marked before there was an artwork.
         if let Some(planned) = read_json(folder, run_folder::ARTWORK, warnings) {
             artwork = planned;
-            findings = examine(folder, &artwork)
+            findings = examine(folder, &artwork, plan.speed, ending.controller.as_ref())
                 .map_err(|reason| warnings.push(format!("there is no recording: {reason}")))
                 .ok();
         }
@@ -218,26 +216,20 @@ pub fn conclude(
     let mut summary = summarise(machine, &plan, &ending, findings.as_ref(), Clock::Real);
     summary.report_time = began.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
-    if let Err(error) = write(folder, machine, &artwork, &mut summary, findings.as_ref()) {
-        let path = folder.file(run_folder::SUMMARY);
-        summary.warnings.push(format!("{} could not be written: {error}", path.display()));
-    }
+    write(folder, machine, &artwork, &mut summary, findings.as_ref());
     summary
 }
 
 /// Writes report and summary into the run folder, tells the summary where that is, and adds what
-/// the report took to its times. Without findings there is no report.
-///
-/// # Errors
-/// Whatever the operating system reports while writing the summary; a report that cannot be
-/// written is a warning in it.
+/// the report took to its times. Without findings there is no report. What cannot be written is a
+/// warning in the summary, which names the file and the reason.
 pub fn write(
     folder: &RunFolder,
     machine: &Machine,
     artwork: &Artwork,
     summary: &mut Summary,
     findings: Option<&Findings>,
-) -> io::Result<()> {
+) {
     summary.out = Some(folder.path().to_string_lossy().into_owned());
     if let Some(findings) = findings {
         // A stepper's current says nothing of its torque.
@@ -258,22 +250,33 @@ pub fn write(
         summary.report_time += took;
         summary.wall += took;
     }
-    folder.write(run_folder::SUMMARY, serde_json::to_vec_pretty(summary)?)
+    if let Err(error) = folder.write_json(run_folder::SUMMARY, summary) {
+        summary.warnings.push(format!("cannot write {error}"));
+    }
 }
 
-fn examine(folder: &RunFolder, artwork: &Artwork) -> Result<Findings, String> {
-    let file = File::open(folder.file(run_folder::SAMPLES)).map_err(|error| error.to_string())?;
-    let reader = RecordingReader::new(BufReader::new(file)).map_err(|error| error.to_string())?;
-    let mut examination = Examination::new(artwork, Clock::Real);
+/// Examines the recording in a folder, against marks that the plan makes at most with `speed`
+/// [m/s].
+fn examine(
+    folder: &RunFolder,
+    artwork: &Artwork,
+    speed: f64,
+    report: Option<&ControllerReport>,
+) -> Result<Findings, String> {
+    let path = folder.file(run_folder::SAMPLES);
+    let at = |error: RecordingError| format!("{}: {error}", path.display());
+    let file = File::open(&path).map_err(|error| at(error.into()))?;
+    let reader = RecordingReader::new(BufReader::new(file)).map_err(at)?;
+    let mut examination = Examination::new(artwork, Clock::Real).with_fastest(speed);
     for record in reader {
         match record {
             Ok(record) => examination.push(&record),
             // A writer that was killed leaves a torn last record; all before it are whole.
             Err(RecordingError::Truncated { .. }) => break,
-            Err(error) => return Err(error.to_string()),
+            Err(error) => return Err(at(error)),
         }
     }
-    Ok(examination.finish())
+    Ok(examination.finish(report))
 }
 
 /// A file of the planner; `None` when it was never written, or cannot be read: then with a warning.
@@ -282,11 +285,12 @@ fn read_json<T: for<'a> Deserialize<'a>>(
     name: &str,
     warnings: &mut Vec<String>,
 ) -> Option<T> {
-    let content = match fs::read(folder.file(name)) {
+    let content: io::Result<T> = match fs::read(folder.file(name)) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
         content => content.and_then(|content| Ok(serde_json::from_slice(&content)?)),
     };
-    content.map_err(|error| warnings.push(format!("cannot read {name}: {error}"))).ok()
+    let path = folder.file(name);
+    content.map_err(|error| warnings.push(format!("cannot read {}: {error}", path.display()))).ok()
 }
 
 #[cfg(test)]

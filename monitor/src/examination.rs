@@ -1,10 +1,13 @@
 //! What a whole recording tells: the marks, the latencies, the curves of the report. Record by
 //! record, in bounded memory, whether they come from a simulation or from a file.
 
+use crate::conclusion::LIGHT_LAG;
 use crate::latency::HopHistograms;
-use crate::marks::{Judge, Marks, Unjudged};
+use crate::marks::{Judge, Judgement, Unjudged};
 use crate::recording::CycleRecord;
+use crate::recording::continuity::{Continuity, Gap, Stamp, Succession};
 use crate::trace::Trace;
+use signals::ControllerReport;
 use signals::artwork::Artwork;
 
 /// Whether the stamps in the samples are those of a real clock.
@@ -24,20 +27,21 @@ pub struct Examination<'a> {
     histograms: HopHistograms,
     trace: Trace,
     first: Option<u64>,
-    last: u64,
+    newest: Option<Stamp>,
+    continuity: Continuity,
 }
 
 /// What it found.
 #[derive(Debug)]
 pub struct Findings {
     /// The marks, or why they are not judged.
-    pub marks: Result<Marks, Unjudged>,
+    pub marks: Result<Judgement, Unjudged>,
     /// The latencies; empty in virtual time.
     pub histograms: HopHistograms,
     /// What the report draws.
     pub trace: Trace,
-    /// First and last feedback cycle seen.
-    pub cycles: Option<(u64, u64)>,
+    /// How complete the recording is.
+    pub continuity: Continuity,
 }
 
 impl<'a> Examination<'a> {
@@ -50,14 +54,24 @@ impl<'a> Examination<'a> {
             histograms: HopHistograms::new(),
             trace: Trace::new(clock == Clock::Real),
             first: None,
-            last: 0,
+            newest: None,
+            continuity: Continuity::default(),
         }
+    }
+
+    /// The same, knowing that the plan never marks faster than `speed` [m/s]; 0 says nothing.
+    #[must_use]
+    pub fn with_fastest(self, speed: f64) -> Self {
+        Self { judge: self.judge.with_fastest(speed), ..self }
     }
 
     /// Takes the next record.
     pub fn push(&mut self, record: &CycleRecord) {
-        self.first.get_or_insert(record.feedback.cycle.0);
-        self.last = record.feedback.cycle.0;
+        let stamp = Stamp::of(&record.feedback);
+        let succession = |newest| Succession::between(newest, stamp);
+        self.continuity.push(self.newest.map_or(Succession::Next, succession));
+        self.first.get_or_insert(stamp.cycle);
+        self.newest = Some(stamp);
         self.judge.push(record);
         self.trace.push(record);
         if self.clock == Clock::Real {
@@ -65,14 +79,70 @@ impl<'a> Examination<'a> {
         }
     }
 
-    /// Ends it.
-    pub fn finish(mut self) -> Findings {
+    /// Ends it. `report` is the controller's final one of the stream, if it came: it says where the
+    /// records of the stream should begin and end.
+    pub fn finish(mut self, report: Option<&ControllerReport>) -> Findings {
         self.trace.finish();
+        if let Some(report) = report {
+            self.count_ends(report);
+        }
         Findings {
-            marks: self.judge.finish(),
+            marks: self.judge.finish(report),
             histograms: self.histograms,
             trace: self.trace,
-            cycles: self.first.map(|first| (first, self.last)),
+            continuity: self.continuity,
         }
+    }
+
+    /// Counts what the recording lacks of the stream before its first record and after its last.
+    fn count_ends(&mut self, report: &ControllerReport) {
+        let (begin, end) = (report.first_cycle.0, report.last_cycle.0.saturating_add(LIGHT_LAG));
+        let (first, last) = match (self.first, self.newest) {
+            (Some(first), Some(newest)) => (first, newest.cycle),
+            // Nothing at all was recorded: all of it is one gap.
+            _ => (end + 1, end),
+        };
+        let before = Gap { first: begin, last: first.saturating_sub(1).min(end) };
+        let after = Gap { first: (last + 1).max(begin), last: end };
+        for gap in [before, after] {
+            if gap.cycles() > 0 {
+                self.continuity.lack(gap);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use signals::{Cycle, Feedback};
+
+    #[test]
+    fn what_the_stream_has_before_and_after_the_records_is_missing() {
+        let artwork = Artwork::default();
+        let check = |cycles: &[u64], expect: (u64, u64, u64)| {
+            let mut examination = Examination::new(&artwork, Clock::Virtual);
+            for &cycle in cycles {
+                let feedback = Feedback { cycle: Cycle(cycle), ..Feedback::default() };
+                examination.push(&CycleRecord::unanswered(feedback));
+            }
+            let report = ControllerReport {
+                first_cycle: Cycle(100),
+                last_cycle: Cycle(200 - LIGHT_LAG),
+                ..ControllerReport::default()
+            };
+            let continuity = examination.finish(Some(&report)).continuity;
+            let found = (continuity.gaps, continuity.missing, continuity.longest);
+            assert_eq!(found, expect, "{cycles:?}");
+        };
+        let all: Vec<u64> = (90..=210).collect();
+        check(&all, (0, 0, 0));
+        check(&all[10..=110], (0, 0, 0));
+        check(&all[11..=110], (1, 1, 1));
+        check(&all[10..=109], (1, 1, 1));
+        check(&all[20..=100], (2, 20, 10));
+        check(&[99, 100, 150, 199], (3, 49 + 48 + 1, 49));
+        check(&[], (1, 101, 101));
     }
 }

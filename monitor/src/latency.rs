@@ -4,14 +4,16 @@ use crate::recording::CycleRecord;
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{
-    IntervalLogWriterBuilder, IntervalLogWriterError, Tag,
+    IntervalLogIterator, IntervalLogWriterBuilder, IntervalLogWriterError, LogEntry, Tag,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use signals::Nanoseconds;
 use signals::hop::{Hop, latencies};
 use std::collections::BTreeMap;
-use std::io::{self, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 /// The longest latency told apart from longer ones [ns]: 100 s.
@@ -188,6 +190,14 @@ impl<W: Write> IntervalLog<W> {
         })
     }
 
+    /// Hands on what is buffered.
+    ///
+    /// # Errors
+    /// Whatever the writer reports.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+
     /// Flushes, and gives the writer back.
     ///
     /// # Errors
@@ -198,12 +208,61 @@ impl<W: Write> IntervalLog<W> {
     }
 }
 
+/// Bytes at the beginning of a log that hold its start time, and more than a line of it has at its
+/// end.
+const HEAD: u64 = 512;
+const LONGEST_LINE: u64 = 1 << 16;
+
+impl IntervalLog<BufWriter<File>> {
+    /// Begins a log in a file, in place of what may be there.
+    ///
+    /// # Errors
+    /// Whatever the operating system reports.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        Self::new(BufWriter::new(File::create(path)?), SystemTime::now())
+    }
+
+    /// Goes on with a log that another process left, a line that it did not complete cut off; gives
+    /// the time since that log began. One without a beginning is begun anew.
+    ///
+    /// # Errors
+    /// Whatever the operating system reports.
+    pub fn resume(path: &Path) -> io::Result<(Self, Duration)> {
+        let mut file =
+            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
+        let Some(begin) = begin_of(&mut file)? else {
+            return Ok((Self::create(path)?, Duration::ZERO));
+        };
+        let length = file.seek(SeekFrom::End(0))?;
+        let tail = length.saturating_sub(LONGEST_LINE);
+        file.seek(SeekFrom::Start(tail))?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
+        file.set_len(tail + whole as u64)?;
+        file.seek(SeekFrom::End(0))?;
+        let log = Self { writer: BufWriter::new(file), serializer: V2DeflateSerializer::new() };
+        // A wall clock that was set back makes the log's times begin anew, no more.
+        Ok((log, SystemTime::now().duration_since(begin).unwrap_or_default()))
+    }
+}
+
+/// When the log in a file began, if it says so.
+fn begin_of(file: &mut File) -> io::Result<Option<SystemTime>> {
+    let mut head = Vec::new();
+    file.take(HEAD).read_to_end(&mut head)?;
+    let begin = IntervalLogIterator::new(&head).find_map(|entry| match entry {
+        Ok(LogEntry::StartTime(begin)) => Some(SystemTime::UNIX_EPOCH + begin),
+        _ => None,
+    });
+    Ok(begin)
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use hdrhistogram::serialization::Deserializer;
-    use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
     use signals::{Command, Cycle, Feedback};
 
     fn record(cycle: u64) -> CycleRecord {
@@ -299,5 +358,45 @@ mod tests {
         assert_eq!(counts.len(), Hop::ALL.len());
         // The record that ends one second also answers for the last of the second before.
         assert_eq!(counts["wake"], 100 + 101 + 101);
+    }
+
+    #[test]
+    fn a_successor_goes_on_with_the_log_of_its_predecessor() {
+        let below = tempfile::tempdir().unwrap();
+        let path = below.path().join("latency.hlog");
+        let second = Duration::from_secs(1);
+        let lines = |path: &Path| std::fs::read_to_string(path).unwrap().lines().count();
+        let write = |mut log: IntervalLog<BufWriter<File>>, start: Duration| {
+            let mut histograms = HopHistograms::new();
+            (0..=100).for_each(|cycle| histograms.push(&record(cycle)));
+            histograms.write_interval(&mut log, start, second).unwrap();
+            log.finish().unwrap();
+        };
+        // Nothing there, or no more than a torn beginning: begun anew.
+        for beginning in ["", "#[Histogram log"] {
+            std::fs::write(&path, beginning).unwrap();
+            let (log, since) = IntervalLog::resume(&path).unwrap();
+            assert_eq!(since, Duration::ZERO);
+            write(log, since);
+        }
+        let whole = lines(&path);
+        let mut torn = std::fs::read(&path).unwrap();
+        let kept = torn.len();
+        torn.extend(b"Tag=wake,12.0,1.0");
+        std::fs::write(&path, &torn).unwrap();
+        let (log, since) = IntervalLog::resume(&path).unwrap();
+        assert_eq!(std::fs::metadata(&path).unwrap().len(), kept as u64);
+        write(log, since + second);
+        assert_eq!(lines(&path), whole + Hop::ALL.len());
+        let bytes = std::fs::read(&path).unwrap();
+        let starts: Vec<_> = IntervalLogIterator::new(&bytes)
+            .filter_map(|entry| match entry.unwrap() {
+                LogEntry::Interval(interval) => Some(interval.start_timestamp()),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(starts.len(), 2 * Hop::ALL.len());
+        assert!(starts[..Hop::ALL.len()].iter().all(|start| *start == Duration::ZERO));
+        assert!(starts[Hop::ALL.len()..].iter().all(|start| *start >= second));
     }
 }

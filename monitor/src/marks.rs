@@ -6,18 +6,26 @@
 //! names, so that light which comes late is found where it falls. A hold that backs up and resumes
 //! adds a run of light to its stroke: a gap between the runs is missing, an overlap is double.
 //!
+//! What passed while nobody recorded is neither marked nor missing: it is *unrecorded*, from where
+//! the job had come before a gap to where light first fell or was due after it.
+//!
 //! The [`Judge`] takes records as they come; it remembers runs of light, not samples.
 
 pub mod coverage;
+mod frontier;
 pub mod line;
 pub mod tool_path;
 
+use crate::conclusion::LIGHT_LAG;
 use crate::recording::CycleRecord;
+use crate::recording::continuity::Succession;
 use coverage::Coverage;
-use line::{Foot, Line};
+use frontier::{FirstLight, Frontier, Place, Unseen, first_light, is_idle, last_light};
+use line::{Foot, Line, Passage};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use signals::ControllerReport;
 use signals::artwork::Artwork;
 use signals::time::CYCLE_TIME;
 use tool_path::{Interval, LitSpan, Moment, ToolPath};
@@ -37,6 +45,10 @@ pub struct Marks {
     pub length: f64,
     /// Length of the job that was never marked [m].
     pub missing: f64,
+    /// Length of the job that passed while nobody recorded [m]: whether it was marked is not known.
+    /// It counts neither as marked nor as missing nor as double.
+    #[serde(default)]
+    pub unrecorded: f64,
     /// Length marked more than once, beyond the end of a stroke, or without a stroke [m].
     pub double: f64,
     /// Largest distance of a marked point from its stroke's line [m].
@@ -57,27 +69,34 @@ pub struct Marks {
     pub speed_max: f64,
     /// How the tool's position was known.
     pub source: Source,
-    /// Strokes, dots included, that got no light at all.
+    /// Strokes, dots included, that are known to have got no light at all.
     pub strokes_lost: u64,
     /// Length marked while no stroke was asked for [m]; counted in `length` and `double`.
     pub stray: f64,
 }
 
-/// Why there is no judgement: it would be wrong.
+/// The marks, and which of them passed while nobody recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judgement {
+    /// The marks.
+    pub marks: Marks,
+    /// The first and the last stroke, from 1, of which not all was recorded.
+    pub unrecorded_strokes: Option<(u64, u64)>,
+    /// Lit cycles in which nobody knew where the tool was; they count as unrecorded.
+    pub unknown: u64,
+    /// Whether nobody can tell what light the job still had after its last record.
+    pub open_end: bool,
+}
+
+/// Why there is no judgement at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Unjudged {
-    /// Samples were lost on the way to the monitor.
-    #[error("the marks are not judged: {count} samples were lost on the way to the monitor")]
-    SamplesLost {
-        /// How many, at least.
-        count: u64,
-    },
-    /// The laser was on while nobody knew where the tool was.
-    #[error("the marks are not judged: the tool position was unknown in lit cycle {cycle}")]
-    ToolUnknown {
-        /// The first such cycle.
-        cycle: u64,
-    },
+    /// There are no records of the job's stream.
+    #[error("the marks are not judged: nothing of the job was recorded")]
+    Unrecorded,
+    /// Nobody ever knew where the tool was.
+    #[error("the marks are not judged: the tool position was never known")]
+    ToolUnknown,
 }
 
 /// Judges marks record by record.
@@ -91,8 +110,14 @@ pub struct Judge<'a> {
     run: Option<Run>,
     whole_before: Option<u64>,
     sums: Sums,
-    lost: u64,
-    unknown: Option<u64>,
+    frontier: Frontier,
+    unseen: Option<Unseen>,
+    /// The fastest that the plan marks [m/s], if known.
+    fastest: Option<f64>,
+    /// Whether the job's stream has been seen.
+    played: bool,
+    /// Lit cycles without a tool position.
+    unknown: u64,
 }
 
 /// How far a stroke has come.
@@ -100,6 +125,8 @@ pub struct Judge<'a> {
 struct StrokeState {
     coverage: Coverage,
     followed: Option<Followed>,
+    /// Whether a gap has left it unknown where along the stroke the tool is.
+    blind: bool,
 }
 
 /// Where along its stroke the tool was seen last.
@@ -107,6 +134,8 @@ struct StrokeState {
 struct Followed {
     at: f64,
     tool: Vector3<f64>,
+    /// Stream time then [s], if known.
+    time: Option<f64>,
 }
 
 /// One run of light on one stroke, from edge to edge.
@@ -114,10 +143,12 @@ struct Followed {
 struct Run {
     stroke: u64,
     tool: Vector3<f64>,
-    error: f64,
+    error: Option<f64>,
     deviation: Option<f64>,
     length: f64,
     time: f64,
+    /// Whether a gap cut off its beginning or its end.
+    cut: bool,
 }
 
 #[derive(Debug, Default)]
@@ -128,6 +159,8 @@ struct Sums {
     tracking: MeanSquare,
     speed: Option<(f64, f64)>,
     run_speed: Option<(f64, f64)>,
+    /// Length [m] and stream time [s] of cycles wholly lit.
+    pace: (f64, f64),
 }
 
 /// The largest of a quantity, and its mean square over time by the trapezoidal rule.
@@ -139,7 +172,10 @@ struct MeanSquare {
 }
 
 impl MeanSquare {
-    fn add(&mut self, from: f64, to: f64, time: f64) {
+    /// Takes a stretch of time, from one value to another; one that is not known is taken to be as
+    /// the other.
+    fn add(&mut self, from: Option<f64>, to: Option<f64>, time: f64) {
+        let (Some(from), Some(to)) = (from.or(to), to.or(from)) else { return };
         self.largest = self.largest.max(from).max(to);
         self.sum += 0.5 * (from * from + to * to) * time;
         self.time += time;
@@ -162,6 +198,19 @@ const REACH: f64 = 1e-4;
 /// A run of light that begins farther from its stroke than this is looked for all along it [m].
 const LOST_TRACK: f64 = 2e-4;
 
+/// How far from the line of a stroke a point that the plan has on it may be found, after a gap [m].
+const ON_PLAN: f64 = 5e-6;
+
+/// The same of a point where the tool truly was [m].
+const ON_TOOL: f64 = 5e-5;
+
+/// How many times nearer to where the tool is expected after a gap than the next one a place must
+/// be to be believed.
+const BELIEVED: f64 = 4.0;
+
+/// The fastest that a stream is played, against its plan.
+const FASTEST_RATE: f64 = 2.0;
+
 impl<'a> Judge<'a> {
     /// A judge of the marks of `artwork`, before the first record.
     pub fn new(artwork: &'a Artwork) -> Self {
@@ -174,36 +223,53 @@ impl<'a> Judge<'a> {
             run: None,
             whole_before: None,
             sums: Sums::default(),
-            lost: 0,
-            unknown: None,
+            frontier: Frontier::new(),
+            unseen: None,
+            fastest: None,
+            played: false,
+            unknown: 0,
         }
     }
 
-    /// Takes the next record, with the tool where drives reported it.
-    pub fn push(&mut self, record: &CycleRecord) {
-        self.moment(Moment::of(record));
+    /// The same, knowing that the plan never marks faster than `speed` [m/s]: it bounds what can
+    /// have been marked while nobody recorded. 0 says nothing.
+    #[must_use]
+    pub fn with_fastest(self, speed: f64) -> Self {
+        Self { fastest: (speed > 0.0).then_some(speed), ..self }
     }
 
-    /// The judgement.
+    /// Takes the next record, with the tool where drives reported it. A record without a tool
+    /// position is as good as none.
+    pub fn push(&mut self, record: &CycleRecord) {
+        let moment = Moment::of(record);
+        self.played |= moment.asked.stream != 0 || moment.laser.is_lit();
+        if moment.tool_known {
+            self.moment(moment);
+        } else if moment.laser.is_lit() {
+            self.unknown += 1;
+        }
+    }
+
+    /// The judgement. `report` is the controller's final one of the stream: it says where the last
+    /// light is told, and whether the job was completed.
     ///
     /// # Errors
-    /// [`Unjudged`] where records were missing in between, or where the tool was not known while
-    /// lit.
-    pub fn finish(mut self) -> Result<Marks, Unjudged> {
+    /// [`Unjudged`] where there is nothing to judge.
+    pub fn finish(mut self, report: Option<&ControllerReport>) -> Result<Judgement, Unjudged> {
         if let Some(interval) = self.path.finish() {
             self.interval(&interval);
         }
         self.end_run();
-        if self.lost > 0 {
-            return Err(Unjudged::SamplesLost { count: self.lost });
+        if !self.played {
+            return Err(Unjudged::Unrecorded);
         }
-        if let Some(cycle) = self.unknown {
-            return Err(Unjudged::ToolUnknown { cycle });
-        }
+        let Some(newest) = self.newest else { return Err(Unjudged::ToolUnknown) };
+        let open_end = self.hide_the_end(&newest, report);
         let (speed_min, speed_max) = self.sums.speed.or(self.sums.run_speed).unwrap_or((0.0, 0.0));
         let mut marks = Marks {
             length: self.sums.length,
             missing: 0.0,
+            unrecorded: 0.0,
             double: self.sums.stray,
             error_max: self.sums.error.largest,
             error_rms: self.sums.error.root(),
@@ -217,12 +283,18 @@ impl<'a> Judge<'a> {
             strokes_lost: 0,
             stray: self.sums.stray,
         };
-        for (stroke, state) in self.artwork.strokes.iter().zip(&self.strokes) {
+        let mut unrecorded_strokes: Option<(u64, u64)> = None;
+        for (number, (stroke, state)) in (1..).zip(self.artwork.strokes.iter().zip(&self.strokes)) {
             let extent = state.coverage.extent(stroke.length());
-            if state.coverage.is_empty() {
+            if state.coverage.is_lost() {
                 marks.strokes_lost += 1;
             }
+            if state.coverage.is_hidden() {
+                let first = unrecorded_strokes.map_or(number, |(first, _)| first);
+                unrecorded_strokes = Some((first, number));
+            }
             marks.missing += extent.missing;
+            marks.unrecorded += extent.unrecorded;
             // A dot has no length to mark twice; straying from it is its error.
             if stroke.length() > 0.0 {
                 marks.double += extent.double;
@@ -234,38 +306,179 @@ impl<'a> Judge<'a> {
                 marks.missing_end_max = marks.missing_end_max.max(end);
             }
         }
-        Ok(marks)
+        Ok(Judgement { marks, unrecorded_strokes, unknown: self.unknown, open_end })
     }
 
     fn moment(&mut self, moment: Moment) {
-        if let Some(newest) = self.newest {
-            if moment.cycle != newest.cycle + 1 {
-                self.lost += moment.cycle.checked_sub(newest.cycle + 1).unwrap_or(1);
-            } else if newest.planned.is_none() && moment.in_force == Some(newest.cycle) {
-                // Drives had an answer to the cycle before that is not in the records.
-                self.lost += 1;
-            }
-        }
-        self.newest = Some(moment);
+        let succession = self.path.succession(&moment);
         if let Some(interval) = self.path.push(moment) {
             self.interval(&interval);
         }
+        match (self.newest, succession) {
+            (Some(_), Succession::Next) => {}
+            (Some(before), Succession::After(gap)) => {
+                self.lose_sight(Some(&before), &moment, Some(gap.cycles() + 1));
+            }
+            (Some(before), Succession::Apart) => self.lose_sight(Some(&before), &moment, None),
+            // Nothing is lit before the stream's time runs.
+            (None, _) if moment.asked.stream != 0 && moment.asked.stream_time > 0.0 => {
+                self.lose_sight(None, &moment, None);
+            }
+            (None, _) => {}
+        }
+        if moment.asked.stream != 0 {
+            // The stream begins only now: nothing of it passed before.
+            self.unseen = self.unseen.filter(|unseen| !unseen.idle);
+        }
+        self.newest = Some(moment);
+    }
+
+    /// Nobody recorded between the moment `before`, if there was one, and the moment `after`.
+    fn lose_sight(&mut self, before: Option<&Moment>, after: &Moment, cycles: Option<u64>) {
+        if let Some(run) = &mut self.run {
+            run.cut = true;
+        }
+        self.end_run();
+        self.whole_before = None;
+        let idle = before.is_some_and(is_idle) && is_idle(after);
+        let unseen = match self.unseen {
+            Some(unseen) => Unseen {
+                cycles: unseen.cycles.zip(cycles).map(|(one, other)| one + other),
+                idle: unseen.idle && idle,
+                ..unseen
+            },
+            None => Unseen {
+                after: before.map(|before| before.stamp.cycle),
+                from: self.frontier.place,
+                cycles,
+                idle,
+            },
+        };
+        self.unseen = Some(unseen);
+    }
+
+    /// The first light after a gap falls or is due: what lies before it and was not seen is hidden.
+    fn regain_sight(&mut self, unseen: &Unseen, interval: &Interval, light: FirstLight) {
+        let Some(shape) = self.stroke_index(light.stroke) else { return };
+        if light.stroke < unseen.from.stroke {
+            return;
+        }
+        let found = self.find(interval, light);
+        let place = Place { stroke: light.stroke, at: found.map_or(0.0, |foot| foot.at) };
+        let place = if found.is_some() { place } else { place.next_stroke() };
+        if let Some(state) = self.strokes.get_mut(shape) {
+            state.blind = found.is_none();
+        }
+        self.hide(unseen.from, place);
+        self.frontier.pass(place);
+        self.unseen = None;
+    }
+
+    /// Where along its stroke the first light after a gap is. `None` where the line comes by more
+    /// than once and nothing says which passage it is.
+    fn find(&mut self, interval: &Interval, light: FirstLight) -> Option<Foot> {
+        let index = self.stroke_index(light.stroke)?;
+        self.load_line(index);
+        let (_, line) = self.line.as_ref()?;
+        let tool = interval.tool(light.from);
+        // The plan goes along the line exactly, the tool nearly.
+        let (point, tolerance) = match interval.deviation(light.from) {
+            Some(deviation) => (tool - deviation, ON_PLAN),
+            None => (tool, ON_TOOL),
+        };
+        let onward = interval.planned_step();
+        let ahead = |passage: &Passage| passage.direction.dot(&onward) > 0.0;
+        let mut passages = line.passages(&point, tolerance);
+        if passages.len() > 1 && passages.iter().any(ahead) {
+            passages.retain(ahead);
+        }
+        let followed = self.strokes.get(index)?.followed;
+        // What begins in a recorded cycle, on a stroke not met before, begins at its start.
+        let begins = followed.is_none() && (light.from > 0.0 || !interval.is_first());
+        let expected = followed.and_then(|followed| {
+            let (length, lit) = self.sums.pace;
+            let played = interval.start.stream_time()? - followed.time?;
+            Some(followed.at + if lit > 0.0 { length / lit * played } else { 0.0 })
+        });
+        let at = match passages.as_slice() {
+            // A dot.
+            [] => 0.0,
+            [one] => one.foot.at,
+            [first, ..] if begins && first.foot.at < FIRST_REACH => first.foot.at,
+            several => nearest(several, expected?)?,
+        };
+        let foot = line.foot(&tool, at, at, REACH);
+        self.strokes.get_mut(index)?.followed = Some(Followed { at: foot.at, tool, time: None });
+        Some(foot)
+    }
+
+    /// What passed between two places of the job was not recorded.
+    fn hide(&mut self, from: Place, to: Place) {
+        let strokes = self.artwork.strokes.iter().zip(&mut self.strokes);
+        for (number, (stroke, state)) in (1..).zip(strokes) {
+            if number < from.stroke || number > to.stroke {
+                continue;
+            }
+            let length = stroke.length();
+            let low = if number == from.stroke { from.at } else { 0.0 };
+            let high = if number == to.stroke { to.at.min(length) } else { length };
+            let is_dot = length == 0.0 && number < to.stroke;
+            if low < high || is_dot {
+                state.coverage.hide(low, high);
+            }
+        }
+    }
+
+    /// Hides what the job may still have marked after its last record, and in a gap after which
+    /// nothing was lit; whether nobody can tell how far that was.
+    fn hide_the_end(&mut self, newest: &Moment, report: Option<&ControllerReport>) -> bool {
+        let last = newest.stamp.cycle;
+        let told = report.map(|report| report.last_cycle.0.saturating_add(LIGHT_LAG));
+        // Without a report nothing more is lit where drives has closed the gate by itself.
+        let lacking = match told {
+            Some(told) => told.saturating_sub(last),
+            None => u64::from(!newest.kept_dark),
+        };
+        let over = |unseen: &Unseen| told.zip(unseen.after).is_some_and(|(told, it)| told <= it);
+        let unseen = self.unseen.take().filter(|unseen| !over(unseen));
+        let (from, cycles) = match (unseen, lacking) {
+            (None, 0) => return false,
+            (None, lacking) => (self.frontier.place, told.map(|_| lacking)),
+            (Some(unseen), lacking) => {
+                let cycles = unseen.cycles.filter(|_| lacking == 0 || told.is_some());
+                (unseen.from, cycles.map(|cycles| cycles + lacking))
+            }
+        };
+        let completed = report.is_some_and(|report| report.completed == 1);
+        let bound = cycles.zip(self.fastest).filter(|_| !completed);
+        let to = match bound {
+            Some((cycles, speed)) => {
+                let time = cycles as f64 * CYCLE_TIME;
+                from.after(speed * FASTEST_RATE * time, self.artwork)
+            }
+            None => Place::end(self.artwork),
+        };
+        self.hide(from, to);
+        bound.is_none() && !completed && from.is_before(to)
     }
 
     fn interval(&mut self, interval: &Interval) {
+        if let (Some(unseen), Some(light)) = (self.unseen, first_light(interval)) {
+            self.regain_sight(&unseen, interval, light);
+        }
         let lit = interval.lit();
-        let commanded = interval.commanded_stroke();
+        let commanded = interval.commanded().map_or(0, |asked| asked.stroke);
         let whole = lit.is_whole();
         self.follow(commanded, interval.start.tool);
-        if !lit.as_slice().is_empty() && !interval.tool_known() {
-            self.unknown = self.unknown.or(Some(interval.end.cycle));
-        }
         let mut reached = 0.0;
         for &LitSpan { from, to, stroke } in lit.as_slice() {
             // Light that goes on across the deadline is the same run, unless the stroke changes.
             let goes_on = from == 0.0 && self.run.is_some_and(|run| run.stroke == stroke);
             if !goes_on {
                 self.end_run();
+            }
+            if self.state(stroke).is_some_and(|state| state.blind) {
+                continue;
             }
             self.light(interval, stroke, from, to);
             reached = to;
@@ -274,16 +487,30 @@ impl<'a> Judge<'a> {
             self.end_run();
         }
         self.follow(commanded, interval.end.tool);
+        let stroke = last_light(interval).map_or(0, |light| light.stroke);
+        let followed = self.state(stroke).and_then(|state| state.followed.as_mut());
+        let at = followed.map(|followed| {
+            followed.time = interval.end.stream_time();
+            followed.at
+        });
+        self.frontier.advance(interval, at);
         self.measure_speed(interval, whole);
     }
 
     fn measure_speed(&mut self, interval: &Interval, whole: bool) {
         let stroke = self.run.map(|run| run.stroke).filter(|_| whole);
         if let Some(stroke) = stroke
-            && self.whole_before == Some(stroke)
             && self.is_line(stroke)
         {
-            widen(&mut self.sums.speed, interval.speed_at_start());
+            let played = interval.end.stream_time().zip(interval.start.stream_time());
+            if let Some(played) = played.map(|(end, start)| end - start).filter(|time| *time > 0.0)
+            {
+                self.sums.pace.0 += interval.chord();
+                self.sums.pace.1 += played;
+            }
+            if self.whole_before == Some(stroke) && interval.is_wide() {
+                widen(&mut self.sums.speed, interval.speed_at_start());
+            }
         }
         self.whole_before = stroke;
     }
@@ -297,12 +524,16 @@ impl<'a> Judge<'a> {
             let tool = interval.tool(part);
             let deviation = interval.deviation(part).map(|deviation| deviation.norm());
             let time = if index == 0 { 0.0 } else { step * CYCLE_TIME };
-            self.point(stroke, tool, deviation, time);
+            // Beside a gap the path between the deadlines is not known well enough to be measured.
+            let exact = interval.is_surrounded() || part == 0.0 || part == 1.0;
+            let cut = interval.is_first();
+            self.point(stroke, &Point { tool, deviation, exact, time, cut });
         }
     }
 
-    /// One marked point, `time` [s] after the one before in the same run.
-    fn point(&mut self, stroke: u64, tool: Vector3<f64>, deviation: Option<f64>, time: f64) {
+    /// One marked point.
+    fn point(&mut self, stroke: u64, point: &Point) {
+        let &Point { tool, deviation, exact, time, cut } = point;
         let begins = self.run.is_none();
         let foot = self.locate(stroke, tool, true, begins);
         if let (Some(foot), Some(state)) = (&foot, self.state(stroke)) {
@@ -310,9 +541,10 @@ impl<'a> Judge<'a> {
         }
         // Light for a stroke that the job does not have has no line to be measured against.
         let stray = foot.is_none();
-        let error = foot.map_or(0.0, |foot| foot.distance);
-        let run =
-            self.run.get_or_insert(Run { stroke, tool, error, deviation, length: 0.0, time: 0.0 });
+        let error = foot.filter(|_| exact).map(|foot| foot.distance);
+        let deviation = deviation.filter(|_| exact);
+        let first = Run { stroke, tool, error, deviation, length: 0.0, time: 0.0, cut };
+        let run = self.run.get_or_insert(first);
         let step = (tool - run.tool).norm();
         run.length += step;
         run.time += time;
@@ -321,9 +553,7 @@ impl<'a> Judge<'a> {
             self.sums.stray += step;
         } else {
             self.sums.error.add(run.error, error, time);
-            if let Some(to) = deviation {
-                self.sums.tracking.add(run.deviation.unwrap_or(to), to, time);
-            }
+            self.sums.tracking.add(run.deviation, deviation, time);
         }
         (run.tool, run.error, run.deviation) = (tool, error, deviation);
     }
@@ -333,29 +563,27 @@ impl<'a> Judge<'a> {
         if let Some(state) = self.state(run.stroke) {
             state.coverage.end();
         }
-        if run.time > 0.0 && self.is_line(run.stroke) {
+        if run.time > 0.0 && !run.cut && self.is_line(run.stroke) {
             widen(&mut self.sums.run_speed, run.length / run.time);
         }
     }
 
-    /// Keeps track of the tool's place along the stroke in dark cycles.
+    /// Keeps track of the tool's place along the stroke in dark cycles; after a gap only once it is
+    /// found again.
     fn follow(&mut self, stroke: u64, tool: Vector3<f64>) {
-        if self.run.is_none() {
+        if self.run.is_none() && self.unseen.is_none() {
             self.locate(stroke, tool, false, false);
         }
     }
 
     /// Where along `stroke` the tool is, from where it was before; `None` for no such stroke.
     fn locate(&mut self, stroke: u64, tool: Vector3<f64>, lit: bool, begins: bool) -> Option<Foot> {
-        let index = usize::try_from(stroke).ok()?.checked_sub(1)?;
-        let shape = self.artwork.strokes.get(index)?;
-        if self.line.as_ref().is_none_or(|(number, _)| *number != stroke) {
-            self.line = Some((stroke, Line::new(shape)));
-        }
+        let index = self.stroke_index(stroke)?;
+        self.load_line(index);
         let (_, line) = self.line.as_ref()?;
         let state = self.strokes.get_mut(index)?;
         let mut foot = match state.followed {
-            Some(Followed { at, tool: before }) => {
+            Some(Followed { at, tool: before, .. }) => {
                 let moved = (tool - before).norm();
                 let expected = if lit { at + moved } else { at };
                 line.foot(&tool, at, expected, 1.5 * moved + REACH)
@@ -368,17 +596,61 @@ impl<'a> Judge<'a> {
                 foot = nearest;
             }
         }
-        state.followed = Some(Followed { at: foot.at, tool });
+        state.followed = Some(Followed { at: foot.at, tool, time: None });
         Some(foot)
     }
 
+    /// The index of a stroke that the job has.
+    fn stroke_index(&self, stroke: u64) -> Option<usize> {
+        let index = usize::try_from(stroke).ok()?.checked_sub(1)?;
+        (index < self.artwork.strokes.len()).then_some(index)
+    }
+
+    /// Lays the line of the stroke with this index.
+    fn load_line(&mut self, index: usize) {
+        let number = index as u64 + 1;
+        if self.line.as_ref().is_none_or(|(loaded, _)| *loaded != number)
+            && let Some(shape) = self.artwork.strokes.get(index)
+        {
+            self.line = Some((number, Line::new(shape)));
+        }
+    }
+
     fn state(&mut self, stroke: u64) -> Option<&mut StrokeState> {
-        self.strokes.get_mut(usize::try_from(stroke).ok()?.checked_sub(1)?)
+        let index = self.stroke_index(stroke)?;
+        self.strokes.get_mut(index)
     }
 
     /// Whether the stroke has a length; a dot has none.
     fn is_line(&self, stroke: u64) -> bool {
         self.line.as_ref().is_some_and(|(number, line)| *number == stroke && line.length() > 0.0)
+    }
+}
+
+/// A point that was marked.
+#[derive(Debug, Clone, Copy)]
+struct Point {
+    tool: Vector3<f64>,
+    /// How far the tool is from its plan [m]; `None` where the plan is not known.
+    deviation: Option<f64>,
+    /// Whether `tool` is known well enough to be measured.
+    exact: bool,
+    /// Time since the point before in the same run [s].
+    time: f64,
+    /// Whether nothing before it was recorded.
+    cut: bool,
+}
+
+/// The arc length of the passage nearest to where the tool is expected; `None` where another one is
+/// nearly as near.
+fn nearest(passages: &[Passage], expected: f64) -> Option<f64> {
+    let surprise = |passage: &Passage| (passage.foot.at - expected).abs();
+    let mut ordered: Vec<&Passage> = passages.iter().collect();
+    ordered.sort_by(|a, b| surprise(a).total_cmp(&surprise(b)));
+    match ordered.as_slice() {
+        [one] => Some(one.foot.at),
+        [best, next, ..] if surprise(best) * BELIEVED < surprise(next) => Some(best.foot.at),
+        _ => None,
     }
 }
 

@@ -1,11 +1,14 @@
 //! The recording of a run: each feedback with the command that answered it, in order.
 //!
-//! The monitor is best effort, so samples can be lost on the way. [`Recorder`] tells a loss from a
-//! command that was never given, and counts it: a judgement over a gap would be wrong.
+//! The monitor is best effort, so samples can be lost on the way, and cycles pass while no monitor
+//! lives. [`Recorder`] tells a loss from a command that was never given, and counts it.
 
+pub mod continuity;
 pub mod file;
+pub mod note;
 pub mod table;
 
+use continuity::{Continuity, Stamp, Succession};
 use signals::{Command, Feedback, Sample};
 use std::collections::VecDeque;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -38,9 +41,11 @@ pub struct Recorder {
     feedbacks: VecDeque<Feedback>,
     commands: VecDeque<Command>,
     records: Vec<CycleRecord>,
-    newest: Option<u64>,
+    /// The newest record.
+    newest: Option<Stamp>,
     started: bool,
-    lost: u64,
+    continuity: Continuity,
+    lost_commands: u64,
 }
 
 impl Recorder {
@@ -53,16 +58,14 @@ impl Recorder {
         Self::default()
     }
 
+    /// A recorder that goes on after `last`, which another process recorded, with what that counted.
+    pub fn resume(last: &CycleRecord, continuity: Continuity, lost_commands: u64) -> Self {
+        let newest = Some(Stamp::of(&last.feedback));
+        Self { newest, started: true, continuity, lost_commands, ..Self::default() }
+    }
+
     /// Takes a feedback; feedback comes in order, possibly with gaps.
     pub fn feedback(&mut self, feedback: &Feedback) {
-        let cycle = feedback.cycle.0;
-        if let Some(newest) = self.newest
-            && self.started
-        {
-            // A cycle number that falls back is another drives process: nothing joins up there.
-            self.lost += cycle.checked_sub(newest + 1).unwrap_or(1);
-        }
-        self.newest = Some(cycle);
         self.feedbacks.push_back(*feedback);
         self.pair(Self::PATIENCE);
     }
@@ -84,9 +87,14 @@ impl Recorder {
         std::mem::take(&mut self.records)
     }
 
-    /// Samples known to be lost since the first record.
-    pub fn lost(&self) -> u64 {
-        self.lost
+    /// What was recorded since the first record, and what was not.
+    pub fn continuity(&self) -> &Continuity {
+        &self.continuity
+    }
+
+    /// Commands that were in force in recorded cycles and never arrived here.
+    pub fn lost_commands(&self) -> u64 {
+        self.lost_commands
     }
 
     fn pair(&mut self, patience: usize) {
@@ -107,13 +115,21 @@ impl Recorder {
             if record.is_answered() {
                 self.started = true;
             } else if self.started && self.was_in_force(&feedback) {
-                self.lost += 1;
+                self.lost_commands += 1;
             }
             // Before the first answer nothing is lit, and nothing can be known to be lost.
             if self.started {
-                self.records.push(record);
+                self.push(record);
             }
         }
+    }
+
+    fn push(&mut self, record: CycleRecord) {
+        let stamp = Stamp::of(&record.feedback);
+        let succession = |newest| Succession::between(newest, stamp);
+        self.continuity.push(self.newest.map_or(Succession::Next, succession));
+        self.newest = Some(stamp);
+        self.records.push(record);
     }
 
     /// Whether drives reports a command for `feedback` that never arrived here.
@@ -162,7 +178,8 @@ mod tests {
             }
         }
         recorder.finish();
-        (recorder.take(), recorder.lost())
+        let lost = recorder.continuity().missing + recorder.lost_commands();
+        (recorder.take(), lost)
     }
 
     #[test]
@@ -201,7 +218,42 @@ mod tests {
             }
         }
         recorder.finish();
-        assert_eq!((recorder.take().len(), recorder.lost()), (600, 0));
+        assert_eq!((recorder.take().len(), recorder.lost_commands()), (600, 0));
+        assert_eq!(recorder.continuity().gaps, 0);
+    }
+
+    #[test]
+    fn a_successor_counts_the_gap_that_its_predecessor_left() {
+        let mut first = Recorder::new();
+        let mut second = None;
+        for cycle in 0..500 {
+            let recorder = match (&mut second, cycle) {
+                (None, 0..200) => &mut first,
+                (None, 300..) => {
+                    first.finish();
+                    let records = first.take();
+                    assert_eq!(records.len(), 200);
+                    let counted = (first.continuity().clone(), first.lost_commands());
+                    second.insert(Recorder::resume(&records[199], counted.0, counted.1))
+                }
+                (Some(second), _) => second,
+                _ => continue,
+            };
+            recorder.feedback(&feedback(cycle));
+            // The command for the first feedback came before the successor listened.
+            if cycle != 300 {
+                recorder.command(&command(cycle));
+            }
+        }
+        let mut second = second.unwrap();
+        second.finish();
+        let records = second.take();
+        assert_eq!((records.len(), records[0].feedback.cycle.0), (200, 300));
+        assert!(!records[0].is_answered() && records[1].is_answered());
+        let Continuity { records, gaps, missing, longest, list } = second.continuity().clone();
+        assert_eq!((records, gaps, missing, longest), (400, 1, 100, 100));
+        assert_eq!(list, [continuity::Gap { first: 200, last: 299 }]);
+        assert_eq!(second.lost_commands(), 1);
     }
 
     #[test]

@@ -6,7 +6,7 @@ pub mod path;
 pub mod workspace;
 
 use crate::latency::HopHistograms;
-use crate::run_folder::RunFolder;
+use crate::run_folder::{FileError, RunFolder};
 use crate::summary::Summary;
 use crate::trace::Trace;
 use signals::artwork::Artwork;
@@ -34,13 +34,8 @@ pub enum ReportError {
     #[error(transparent)]
     Picture(#[from] PictureError),
     /// A file could not be written.
-    #[error("cannot write {file}: {source}")]
-    File {
-        /// The file.
-        file: String,
-        /// What the operating system says.
-        source: std::io::Error,
-    },
+    #[error("cannot write {0}")]
+    File(#[from] FileError),
 }
 
 impl Report<'_> {
@@ -52,10 +47,7 @@ impl Report<'_> {
         for (name, content) in
             [(run_folder::PICTURE, self.picture()?), (run_folder::REPORT, self.page()?)]
         {
-            folder.write(name, content).map_err(|source| ReportError::File {
-                file: folder.file(name).display().to_string(),
-                source,
-            })?;
+            folder.write(name, content)?;
         }
         Ok(())
     }

@@ -1,48 +1,47 @@
 //! The monitor service: records every cycle of a job into its run folder.
 //!
 //! The machine does not wait for it. It reads feedback and commands from deep buffers, counts what
-//! it missed, and writes what it has. When the supervisor is lost it also writes the summary,
-//! because nobody else is left to.
+//! it missed, and writes what it has. A monitor that was started again goes on with the recording
+//! that its predecessor left. One that cannot write says so, gives the recording up, and watches
+//! on. When the supervisor is lost it also writes the summary, because nobody else is left to.
 
-use crate::conclusion::{self, Ending, LIGHT_LAG, WatchNote};
-use crate::latency::IntervalLog;
-use crate::recording::file::RecordingWriter;
-use crate::run_folder::RunFolder;
-use crate::stage::{Inputs, MonitorStage, Outputs};
-use crate::summary::{ErrorSummary, Outcome};
+mod alone;
+mod recording;
+
+use crate::conclusion::RecordingState;
+use crate::run_folder::{FileError, RunFolder};
+use crate::stage::Inputs;
 use machine::Machine;
+use recording::Recording;
+use runtime::message::tell;
 use runtime::peer::{PeerState, Peers};
 use runtime::{Domain, Reading, Role, ServiceError, Subscriber, signal};
 use signals::{Command, ControllerReport, DrivesReport, Feedback, JobOffer, run_folder};
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 /// How often the service looks at its channels.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// Length of an interval in the latency log.
-const INTERVAL: Duration = Duration::from_secs(1);
-
-/// How long the axes may take to rest after the supervisor was lost.
-const REST_PATIENCE: Duration = Duration::from_secs(5);
+/// How long feedback or commands may stay away before nothing more is waited for: three times what
+/// the clock of simulated drives may slip.
+const SILENCE: Duration = Duration::from_millis(300);
 
 /// Runs until it is told to end (SIGTERM) or the supervisor dies.
 ///
 /// # Errors
-/// When a channel or a file fails.
+/// When a channel fails, or when a recording fails and not even that can be written down.
 pub fn run(domain: &Domain, machine: &Machine) -> Result<(), ServiceError> {
     let mut service = Service::open(domain)?;
-    while signal::termination().is_none() {
+    while signal::termination().is_none() && service.has_supervisor() {
         service.look()?;
-        if service.peers.state(Role::Domain) == PeerState::Dead {
-            return service.conclude_alone(machine);
-        }
         std::thread::sleep(LOOK);
     }
     service.look()?;
-    service.end_recording()
+    if service.has_supervisor() {
+        return service.end_recording();
+    }
+    service.conclude_alone(machine)
 }
 
 struct Service {
@@ -56,28 +55,19 @@ struct Service {
     drives: Option<DrivesReport>,
     feedback_batch: Vec<Feedback>,
     command_batch: Vec<Command>,
+    /// When feedback and commands came last.
+    heard: [Instant; 2],
+    newest_command: Command,
+    job: Option<Job>,
     recording: Option<Recording>,
 }
 
-/// A recording under way.
-struct Recording {
+/// The newest job that was offered.
+struct Job {
     stream: u64,
     folder: RunFolder,
-    stage: MonitorStage,
-    outputs: Outputs,
-    writer: RecordingWriter<BufWriter<File>>,
-    log: IntervalLog<BufWriter<File>>,
     began: Instant,
-    logged: Duration,
-    records: u64,
-    newest: u64,
-    /// Whether the job was taken back.
-    withdrawn: bool,
-    /// Whether nothing more of it will be played.
-    closed: bool,
-    /// Whether any of the stream was played.
-    played: bool,
-    /// Overruns counted before this recording.
+    /// Overruns counted before it.
     overruns_before: u64,
 }
 
@@ -94,8 +84,15 @@ impl Service {
             drives: None,
             feedback_batch: Vec::new(),
             command_batch: Vec::new(),
+            heard: [Instant::now(); 2],
+            newest_command: Command::default(),
+            job: None,
             recording: None,
         })
+    }
+
+    fn has_supervisor(&mut self) -> bool {
+        self.peers.state(Role::Domain) != PeerState::Dead
     }
 
     fn look(&mut self) -> Result<(), ServiceError> {
@@ -104,6 +101,19 @@ impl Service {
         }
         self.drives = self.drives_reports.newest()?.or(self.drives);
         self.take_offer()?;
+        self.receive()?;
+        let Some(recording) = &mut self.recording else { return Ok(()) };
+        let inputs = Inputs { feedbacks: &self.feedback_batch, commands: &self.command_batch };
+        if let Err(error) = recording.take(&inputs) {
+            return self.drop_recording(&error);
+        }
+        let more_comes = self.more_comes();
+        let over = |recording: &Recording| recording.is_over(&self.controller, more_comes);
+        if self.recording.as_ref().is_some_and(over) { self.end_recording() } else { Ok(()) }
+    }
+
+    /// Empties the channels of the cycle.
+    fn receive(&mut self) -> Result<(), ServiceError> {
         self.feedback_batch.clear();
         self.command_batch.clear();
         while let Some(feedback) = self.feedbacks.receive()? {
@@ -112,18 +122,28 @@ impl Service {
         while let Some(command) = self.commands.receive()? {
             self.command_batch.push(command);
         }
-        let Some(recording) = &mut self.recording else { return Ok(()) };
-        recording
-            .take(&Inputs { feedbacks: &self.feedback_batch, commands: &self.command_batch })?;
-        let more_comes = [Role::Controller, Role::Drives]
-            .iter()
-            .all(|role| self.peers.state(*role) != PeerState::Dead);
-        if recording.is_over(&self.controller, more_comes) { self.end_recording() } else { Ok(()) }
+        let [feedback_heard, command_heard] = &mut self.heard;
+        if !self.feedback_batch.is_empty() {
+            *feedback_heard = Instant::now();
+        }
+        if let Some(command) = self.command_batch.last() {
+            *command_heard = Instant::now();
+            self.newest_command = *command;
+        }
+        Ok(())
+    }
+
+    /// Whether controller and drives live and speak. A monitor that was started after their death
+    /// never sees them alive; then their silence tells.
+    fn more_comes(&mut self) -> bool {
+        let dead = |role| self.peers.state(role) == PeerState::Dead;
+        let dead = [Role::Controller, Role::Drives].into_iter().any(dead);
+        !dead && self.heard.iter().all(|heard| heard.elapsed() < SILENCE)
     }
 
     fn take_offer(&mut self) -> Result<(), ServiceError> {
         let Some(offer) = self.offers.newest()? else { return Ok(()) };
-        let Some(folder) = offer.folder().filter(|folder| !folder.is_empty()) else {
+        let Some(path) = offer.folder().filter(|folder| !folder.is_empty()) else {
             // What is being played goes on until the axes rest, and so does its recording.
             if let Some(recording) = &mut self.recording
                 && recording.stream == offer.stream
@@ -133,205 +153,65 @@ impl Service {
             }
             return Ok(());
         };
-        let folder = RunFolder::create_at(Path::new(folder))?;
-        // A restarted monitor is offered the newest job again, even one that is long over.
-        let finished = self.controller.is_final == 1 && self.controller.stream >= offer.stream;
-        if finished || WatchNote::read(&folder).is_some_and(|note| note.stream == offer.stream) {
+        if self.job.as_ref().is_some_and(|job| job.stream == offer.stream) {
             return Ok(());
         }
         self.end_recording()?;
-        let overruns = self.drives.map_or(0, |report| report.overruns);
-        self.recording = Some(Recording::begin(offer.stream, folder, overruns)?);
+        self.job = None;
+        let folder = match RunFolder::open(Path::new(path)) {
+            Ok(folder) => folder,
+            Err(error) => {
+                tell(&format!("monitor: this job is not recorded: {error}"));
+                return Ok(());
+            }
+        };
+        let (stream, began) = (offer.stream, Instant::now());
+        let overruns_before = self.drives.map_or(0, |report| report.overruns);
+        if self.shall_record(stream, &folder) {
+            match Recording::begin(stream, folder.clone(), overruns_before) {
+                Ok(recording) => self.recording = Some(recording),
+                Err(error) => refuse(&folder, stream, &error)?,
+            }
+        }
+        let kept = self.recording.as_ref().map(|recording| recording.overruns_before);
+        let overruns_before = kept.unwrap_or(overruns_before);
+        self.job = Some(Job { stream, folder, began, overruns_before });
         Ok(())
+    }
+
+    /// A restarted monitor is offered the newest job again: one that is long over needs no
+    /// recording, but one that its predecessor left open is to be ended.
+    fn shall_record(&self, stream: u64, folder: &RunFolder) -> bool {
+        let over = self.controller.is_final == 1 && self.controller.stream >= stream;
+        match RecordingState::of(folder, stream) {
+            _ if folder.file(run_folder::SUMMARY).exists() => false,
+            RecordingState::Absent => !over,
+            RecordingState::Open => true,
+            RecordingState::Complete(_) | RecordingState::Failed(_) => false,
+        }
     }
 
     fn end_recording(&mut self) -> Result<(), ServiceError> {
-        if let Some(recording) = self.recording.take() {
-            recording.finish()?;
+        let Some(mut recording) = self.recording.take() else { return Ok(()) };
+        match recording.finish() {
+            Ok(()) => Ok(()),
+            Err(error) => refuse(&recording.folder, recording.stream, &error),
         }
-        Ok(())
     }
 
-    /// The supervisor is lost: waits until the machine is at rest, then writes its summary.
-    fn conclude_alone(&mut self, machine: &Machine) -> Result<(), ServiceError> {
-        let Some(recording) = &mut self.recording else { return Ok(()) };
-        let (folder, stream, began) = (recording.folder.clone(), recording.stream, recording.began);
-        let message = "the supervisor died: laser off, axes brought to rest".to_owned();
-        let mut ending = Ending {
-            outcome: Some(Outcome::Aborted),
-            error: Some(ErrorSummary { file: None, line: None, column: None, message }),
-            overruns_before: recording.overruns_before,
-            ..Ending::default()
-        };
-        // Nobody will start what is not being played yet.
-        recording.withdrawn = true;
-        let lost = Instant::now();
-        while self.recording.is_some() && lost.elapsed() < REST_PATIENCE {
-            self.look()?;
-            std::thread::sleep(LOOK);
-        }
-        self.end_recording()?;
-        let is_final = self.controller.is_final == 1 && self.controller.stream == stream;
-        ending.controller = is_final.then_some(self.controller);
-        ending.drives = self.drives;
-        conclusion::conclude(&folder, machine, &ending, began);
-        Ok(())
+    fn drop_recording(&mut self, error: &FileError) -> Result<(), ServiceError> {
+        let Some(recording) = self.recording.take() else { return Ok(()) };
+        refuse(&recording.folder, recording.stream, error)
     }
 }
 
-impl Recording {
-    fn begin(stream: u64, folder: RunFolder, overruns_before: u64) -> Result<Self, ServiceError> {
-        let samples = BufWriter::new(File::create(folder.file(run_folder::SAMPLES))?);
-        let log = BufWriter::new(File::create(folder.file(run_folder::LATENCY))?);
-        Ok(Self {
-            stream,
-            stage: MonitorStage::new(),
-            outputs: Outputs::default(),
-            writer: RecordingWriter::new(samples)?,
-            log: IntervalLog::new(log, SystemTime::now())?,
-            began: Instant::now(),
-            logged: Duration::ZERO,
-            records: 0,
-            newest: 0,
-            withdrawn: false,
-            closed: false,
-            played: false,
-            overruns_before,
-            folder,
-        })
-    }
-
-    fn take(&mut self, inputs: &Inputs<'_>) -> Result<(), ServiceError> {
-        self.played |= inputs.commands.iter().any(|command| command.stream == self.stream);
-        self.stage.step(inputs, &mut self.outputs);
-        self.write()?;
-        if self.began.elapsed() >= self.logged + INTERVAL {
-            self.log_interval()?;
-        }
-        Ok(())
-    }
-
-    fn write(&mut self) -> Result<(), ServiceError> {
-        self.records += self.outputs.records.len() as u64;
-        if let Some(record) = self.outputs.records.last() {
-            self.newest = record.feedback.cycle.0;
-        }
-        self.writer.write(&self.outputs.records)?;
-        Ok(())
-    }
-
-    fn log_interval(&mut self) -> Result<(), ServiceError> {
-        let now = self.began.elapsed();
-        let duration = now - self.logged;
-        self.stage.histograms_mut().write_interval(&mut self.log, self.logged, duration)?;
-        self.logged = now;
-        Ok(())
-    }
-
-    /// Whether the stream has ended and all its light has been told, or will not be: nothing was
-    /// played of a job that was taken back, or controller or drives are gone.
-    fn is_over(&self, report: &ControllerReport, more_comes: bool) -> bool {
-        let ended = report.is_final == 1 && report.stream == self.stream;
-        let told = self.newest >= report.last_cycle.0.saturating_add(LIGHT_LAG);
-        self.closed
-            || (ended && told)
-            || (self.withdrawn && !self.played)
-            || ((ended || self.withdrawn) && !more_comes)
-    }
-
-    fn finish(mut self) -> Result<(), ServiceError> {
-        self.stage.finish(&mut self.outputs);
-        self.write()?;
-        self.log_interval()?;
-        self.writer.finish()?.flush()?;
-        self.log.finish()?.flush()?;
-        let note =
-            WatchNote { stream: self.stream, records: self.records, lost: self.stage.lost() };
-        note.write(&self.folder)?;
-        Ok(())
-    }
+/// Says that a job cannot be recorded, or not any further, and notes it for whoever waits.
+fn refuse(folder: &RunFolder, stream: u64, error: &FileError) -> Result<(), ServiceError> {
+    tell(&format!("monitor: this job is not recorded any further: {error}"));
+    // Where not even that can be written, the end of this process says it.
+    recording::give_up(folder, stream, error).map_err(std::io::Error::from)?;
+    Ok(())
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-    use crate::recording::file::RecordingReader;
-    use signals::{Cycle, Nanoseconds};
-    use std::io::BufReader;
-
-    const STREAM: u64 = 5;
-
-    /// Cycles `from..to`, answered for `stream`.
-    fn take(recording: &mut Recording, from: u64, to: u64, stream: u64) {
-        let feedback = |cycle: u64| Feedback {
-            cycle: Cycle(cycle),
-            command_cycle: Cycle(cycle.saturating_sub(1)),
-            command_published: Nanoseconds(1),
-            ..Feedback::default()
-        };
-        let command =
-            |cycle: u64| Command { cycle: Cycle(cycle), stream, mode: 4, ..Command::default() };
-        let feedbacks: Vec<_> = (from..to).map(feedback).collect();
-        let commands: Vec<_> = (from..to).map(command).collect();
-        recording.take(&Inputs { feedbacks: &feedbacks, commands: &commands }).unwrap();
-    }
-
-    fn final_report(stream: u64, last: u64) -> ControllerReport {
-        let last_cycle = Cycle(last);
-        ControllerReport { stream, is_final: 1, last_cycle, ..ControllerReport::default() }
-    }
-
-    fn begin(below: &tempfile::TempDir) -> Recording {
-        Recording::begin(STREAM, RunFolder::create_at(below.path()).unwrap(), 0).unwrap()
-    }
-
-    #[test]
-    fn a_recording_is_over_when_its_last_light_is_told() {
-        let below = tempfile::tempdir().unwrap();
-        let mut recording = begin(&below);
-        take(&mut recording, 100, 202, STREAM);
-        // The newest cycle is 201.
-        assert!(!recording.is_over(&ControllerReport::default(), true));
-        assert!(!recording.is_over(&final_report(STREAM - 1, 150), true));
-        assert!(!recording.is_over(&final_report(STREAM, 200), true));
-        assert!(recording.is_over(&final_report(STREAM, 199), true));
-        // With drives dead, the cycles that are missing will not come.
-        assert!(recording.is_over(&final_report(STREAM, 200), false));
-        assert!(!recording.is_over(&ControllerReport::default(), false));
-    }
-
-    #[test]
-    fn a_job_taken_back_is_recorded_until_its_axes_rest() {
-        let below = tempfile::tempdir().unwrap();
-        let mut recording = begin(&below);
-        take(&mut recording, 0, 10, 0);
-        recording.withdrawn = true;
-        // Nothing of it was played.
-        assert!(recording.is_over(&ControllerReport::default(), true));
-        take(&mut recording, 10, 20, STREAM);
-        assert!(!recording.is_over(&ControllerReport::default(), true));
-        assert!(!recording.is_over(&final_report(STREAM, 18), true));
-        take(&mut recording, 20, 21, 0);
-        assert!(recording.is_over(&final_report(STREAM, 18), true));
-        assert!(recording.is_over(&ControllerReport::default(), false));
-    }
-
-    #[test]
-    fn the_note_comes_last_and_counts_what_is_in_the_file() {
-        let below = tempfile::tempdir().unwrap();
-        let mut recording = begin(&below);
-        let folder = recording.folder.clone();
-        let samples = folder.file(run_folder::SAMPLES);
-        let read = || RecordingReader::new(BufReader::new(File::open(&samples).unwrap())).unwrap();
-        assert_eq!(read().count(), 0, "the empty recording is one already");
-        // One look after a second away, and one that comes too late for three samples.
-        take(&mut recording, 0, 1000, STREAM);
-        take(&mut recording, 1003, 1500, STREAM);
-        assert!(!folder.file(run_folder::WATCH).exists());
-        recording.finish().unwrap();
-        let note = WatchNote { stream: STREAM, records: 1497, lost: 3 };
-        assert_eq!(WatchNote::read(&folder), Some(note));
-        assert_eq!(read().filter(Result::is_ok).count(), 1497);
-    }
-}
+mod tests;

@@ -5,6 +5,7 @@
 //! made of the whole recording when the run has ended.
 
 use crate::latency::HopHistograms;
+use crate::recording::continuity::Continuity;
 use crate::recording::{CycleRecord, Recorder};
 use signals::{Command, Feedback};
 
@@ -34,7 +35,12 @@ pub struct MonitorStage {
 impl MonitorStage {
     /// A stage that has seen nothing.
     pub fn new() -> Self {
-        Self { recorder: Recorder::new(), histograms: HopHistograms::new() }
+        Self::with(Recorder::new())
+    }
+
+    /// A stage that pairs samples with `recorder`, which may go on where another process ended.
+    pub fn with(recorder: Recorder) -> Self {
+        Self { recorder, histograms: HopHistograms::new() }
     }
 
     /// Takes samples; `outputs` is overwritten.
@@ -57,9 +63,14 @@ impl MonitorStage {
         outputs.records.iter().for_each(|record| self.histograms.push(record));
     }
 
-    /// Samples known to be lost: with any, the marks must not be judged.
-    pub fn lost(&self) -> u64 {
-        self.recorder.lost()
+    /// What was recorded so far, and what is missing.
+    pub fn continuity(&self) -> &Continuity {
+        self.recorder.continuity()
+    }
+
+    /// Commands that were in force in recorded cycles and never arrived here.
+    pub fn lost_commands(&self) -> u64 {
+        self.recorder.lost_commands()
     }
 
     /// Latencies so far.

@@ -8,6 +8,7 @@ pub mod text;
 
 use crate::latency::HopLatency;
 use crate::marks::Marks;
+use crate::recording::continuity::RecordingSummary;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use signals::{ControllerReport, RealtimeFacts};
@@ -67,8 +68,10 @@ pub struct Summary {
     pub plan_time: f64,
     /// Time to judge the marks and write the run folder [s].
     pub report_time: f64,
-    /// What was marked; null when nothing was, or when samples were lost.
+    /// What was marked; null when nothing of it was recorded.
     pub marks: Option<Marks>,
+    /// How complete the recording is; null without one.
+    pub recording: Option<RecordingSummary>,
     /// Setpoint minus feedback at the motors.
     pub following_error: FollowingError,
     /// The largest share of each limit used, as planned.
@@ -204,6 +207,7 @@ impl Summary {
             plan_time: 0.0,
             report_time: 0.0,
             marks: None,
+            recording: None,
             following_error: FollowingError::default(),
             limits: LimitUse::default(),
             cycles: 0,
@@ -276,6 +280,7 @@ mod tests {
             "plan_time",
             "report_time",
             "marks",
+            "recording",
             "following_error",
             "limits",
             "cycles",

@@ -6,6 +6,7 @@ pub mod outline;
 
 use crate::marks::tool_path::{Interval, LitSpan, LitSpans, Moment, ToolPath};
 use crate::recording::CycleRecord;
+use crate::recording::continuity::Succession;
 use envelope::Envelope;
 use outline::{Outline, OutlinePoint};
 use signals::hop::{Hop, latencies};
@@ -64,9 +65,16 @@ impl Trace {
         }
     }
 
-    /// Takes the next record.
+    /// Takes the next record. Over cycles that nobody recorded the curves have a gap.
     pub fn push(&mut self, record: &CycleRecord) {
         let CycleRecord { feedback, command } = record;
+        let moment = Moment::of(record);
+        let succession = self.path.succession(&moment);
+        let absent = match succession {
+            Succession::After(gap) => gap.cycles(),
+            Succession::Next | Succession::Apart => 0,
+        };
+        self.of_records().for_each(|envelope| envelope.skip(absent));
         let answered = record.is_answered();
         for axis in 0..MAX_AXES {
             let pick = |values: &signals::AxisArray| values.get(axis).copied();
@@ -84,9 +92,28 @@ impl Trace {
         if self.timed {
             self.push_latency(record);
         }
-        if let Some(interval) = self.path.push(Moment::of(record)) {
+        if let Some(interval) = self.path.push(moment) {
             self.interval(&interval);
         }
+        if succession != Succession::Next {
+            // A cycle needs the records at both its ends: one more of them is not known.
+            self.of_intervals().for_each(|envelope| envelope.skip(absent + 1));
+            self.marked.end();
+            self.dark.end();
+        }
+    }
+
+    /// The curves with a value for each record.
+    fn of_records(&mut self) -> impl Iterator<Item = &mut Envelope> {
+        let latency = self.latency.iter_mut().filter(|_| self.timed);
+        let axes = self.following_error.iter_mut().chain(&mut self.current);
+        axes.chain(&mut self.voltage).chain(latency)
+    }
+
+    /// The curves with a value for each cycle between two records.
+    fn of_intervals(&mut self) -> impl Iterator<Item = &mut Envelope> {
+        [&mut self.deviation_lit, &mut self.deviation_dark, &mut self.speed, &mut self.power]
+            .into_iter()
     }
 
     /// Ends the trace: the last cycle has no neighbour to wait for.

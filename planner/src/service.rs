@@ -18,8 +18,10 @@ use desk::Abandoned;
 use machine::Machine;
 use runtime::peer::{PeerState, Peers};
 use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, clock, signal};
-use signals::{ControllerState, JobOffer, PlannerPhase, PlannerReport, Progress, Setpoint};
-use std::path::PathBuf;
+use signals::{
+    ControllerState, JobOffer, PlannerPhase, PlannerReport, Progress, Setpoint, run_folder,
+};
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// How often the service looks at its channels.
@@ -121,6 +123,7 @@ impl Service {
         match offer.folder().filter(|folder| !folder.is_empty()) {
             // Over already: this process is a new one, and the offer of an old job still stands.
             Some(_) if offer.stream <= self.newest_progress.finished_stream => Ok(()),
+            Some(folder) if Path::new(folder).join(run_folder::SUMMARY).exists() => Ok(()),
             Some(folder) => {
                 self.work = Work::Waiting(PathBuf::from(folder));
                 self.report = PlannerReport { stream: offer.stream, ..PlannerReport::default() };
@@ -147,25 +150,26 @@ impl Service {
         self.enter(PlannerPhase::Idle)
     }
 
-    /// Begins to plan once the axes rest.
+    /// Begins to plan once the controller has said that the axes rest, and where: a process that was
+    /// started again may be offered a job that is over before it hears that.
     fn begin_plan(&mut self) -> Result<(), ServiceError> {
         let Work::Waiting(folder) = &self.work else { return Ok(()) };
         let progress = &self.newest_progress;
-        if matches!(
+        let moving = matches!(
             ControllerState::from_wire(progress.state),
             ControllerState::Running | ControllerState::Holding | ControllerState::Stopping
-        ) {
+        );
+        if progress.published.0 == 0 || moving {
             return Ok(());
         }
         let folder = folder.clone();
-        // Without a controller so far the job begins where its drawing does.
-        let standing = (progress.published.0 != 0).then_some(progress.position);
+        let standing = progress.position;
         let abandoned = Abandoned::default();
         let (sender, result) = bounded(1);
         let (place, machine, watched) = (folder.clone(), self.machine.clone(), abandoned.watch());
         spawn("plan", move || {
             // Nobody listens any more when the offer was withdrawn.
-            let _ = sender.send(desk::plan_request(&place, &machine, standing.as_ref(), &watched));
+            let _ = sender.send(desk::plan_request(&place, &machine, &standing, &watched));
         })?;
         let started = Instant::now();
         self.work = Work::Planning(Planning { folder, started, result, _abandoned: abandoned });

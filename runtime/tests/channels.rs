@@ -97,6 +97,32 @@ fn a_late_reader_gets_the_newest_sample_before_the_next_one() {
 }
 
 #[test]
+fn a_silent_publisher_greets_a_late_reader_with_its_newest_sample_once() {
+    let scratch = Scratch::new();
+    let holder = Domain::create(scratch.instance()).unwrap();
+    let mut publisher = holder.publisher::<JobOffer>().unwrap();
+    publisher.greet().unwrap();
+    let offer = JobOffer::new(1, "/tmp/job").unwrap();
+    publisher.publish(&JobOffer::new(0, "/tmp/old").unwrap()).unwrap();
+    publisher.publish(&offer).unwrap();
+
+    for reading in [Reading::Newest, Reading::Every] {
+        let mut reader = holder.subscriber::<JobOffer>(reading).unwrap();
+        assert_eq!(reader.receive().unwrap(), None, "nobody has greeted {reading:?} yet");
+        publisher.greet().unwrap();
+        publisher.greet().unwrap();
+        assert_eq!(reader.receive().unwrap(), Some(offer), "{reading:?}");
+        assert_eq!(reader.receive().unwrap(), None, "{reading:?}");
+        assert_eq!(reader.lost(), 0);
+    }
+    // On a channel that loses nothing there is no newest sample to give.
+    let mut planner = holder.publisher::<Setpoint>().unwrap();
+    let mut controller = holder.subscriber::<Setpoint>(Reading::Every).unwrap();
+    planner.greet().unwrap();
+    assert_eq!(controller.receive().unwrap(), None);
+}
+
+#[test]
 fn a_full_setpoint_channel_refuses_and_loses_nothing() {
     let scratch = Scratch::new();
     let holder = Domain::create(scratch.instance()).unwrap();

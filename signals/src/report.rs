@@ -44,7 +44,7 @@ sample! {
 }
 
 sample! {
-    /// What the controller counted over one stream.
+    /// What the controller counted over one stream: published every second, also after its end.
     ControllerReport = "graver.ControllerReport.v1" {
         /// The stream it speaks of.
         stream: u64,

@@ -53,7 +53,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     }
 
     let examining = Instant::now();
-    let findings = examination.finish();
+    let findings = examination.finish(Some(&simulated.controller));
     let time = simulated.controller.cycles as f64 * CYCLE_TIME;
     let ending = Ending {
         controller: Some(simulated.controller),
@@ -70,8 +70,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     if let Some(folder) = &folder {
         let artwork = serde_json::to_vec(&plan.artwork).map_err(Failure::service)?;
         folder.write(run_folder::ARTWORK, artwork).map_err(Failure::service)?;
-        conclusion::write(folder, &input.machine, &plan.artwork, &mut summary, Some(&findings))
-            .map_err(Failure::service)?;
+        conclusion::write(folder, &input.machine, &plan.artwork, &mut summary, Some(&findings));
     }
     Ok(output::summary(&summary, arguments.json))
 }

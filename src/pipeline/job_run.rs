@@ -7,7 +7,7 @@ use super::services::{Ended, Remedy};
 use super::{LOOK, Pipeline, Starter, is_dark_and_at_rest};
 use crate::exit::{Failure, error_summary};
 use crate::output::ProgressLine;
-use monitor::conclusion::{self, Ending, WatchNote};
+use monitor::conclusion::{self, Ending, RecordingState};
 use monitor::run_folder::RunFolder;
 use monitor::summary::{ErrorSummary, Outcome, Summary};
 use planner::request::{JobRequest, Refusal};
@@ -344,7 +344,7 @@ impl<'a> JobRun<'a> {
 
     /// A fault that the controller does not report with the stream.
     fn fail(&mut self, fault: Fault) {
-        self.ending.fault = Some(fault);
+        self.ending.latched = fault;
         self.ending.outcome = Some(Outcome::Faulted);
         self.rest();
     }
@@ -384,6 +384,9 @@ impl<'a> JobRun<'a> {
             self.await_recording();
         }
         self.ending.drives = Some(self.drives_with_cause());
+        if !self.ending.latched.is_some() {
+            self.ending.latched = self.pipeline.heard.progress.fault;
+        }
         let machine = &self.pipeline.machine;
         let summary = conclusion::conclude(&self.folder, machine, &self.ending, self.started);
         self.pipeline.board.name_job(None);
@@ -398,9 +401,8 @@ impl<'a> JobRun<'a> {
     fn await_recording(&mut self) {
         let stream = self.stream.unwrap_or_default();
         let since = Instant::now();
-        let is_open = || self.folder.file(run_folder::SAMPLES).exists();
-        let is_told = || WatchNote::read(&self.folder).is_some_and(|note| note.stream == stream);
-        while is_open() && !is_told() && !self.in_a_hurry() {
+        while RecordingState::of(&self.folder, stream) == RecordingState::Open && !self.in_a_hurry()
+        {
             let patience = match self.pipeline.peer(Role::Monitor) {
                 Some(monitor) if monitor.is_stopped() => STOPPED_PATIENCE,
                 Some(_) => WRITING_PATIENCE,

@@ -150,6 +150,8 @@ impl Pipeline {
     /// # Errors
     /// A channel that fails.
     pub fn look(&mut self) -> Result<Vec<Ended>, Failure> {
+        // An offer is published once: a service that was started again has not heard it.
+        self.offers.greet().map_err(Failure::service)?;
         let heard = &mut self.heard;
         if let Some(sample) = self.ears.progress.newest().map_err(Failure::service)? {
             heard.progress = sample;

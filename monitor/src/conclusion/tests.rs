@@ -8,7 +8,9 @@ use signals::artwork::Stroke;
 use signals::feedback::status;
 use signals::plan::Note;
 use signals::report::refused;
-use signals::{Command, Cycle, Fault, FaultCode, Feedback, LaserCycle, Nanoseconds};
+use signals::{
+    Command, ControllerState, Cycle, Fault, FaultCode, Feedback, LaserCycle, Nanoseconds,
+};
 
 /// The first cycle that is played, and the last.
 const FIRST: u64 = 500;
@@ -26,7 +28,10 @@ fn record(cycle: u64) -> CycleRecord {
     let along = |cycle: u64| 0.25 * CYCLE_TIME * (cycle as f64 - (FIRST + 1) as f64);
     let tool = [along(cycle), 0.0, 0.0];
     // Feedback tells the light of the cycle before it.
-    let lit = (FIRST + 2..FIRST + 2 + LIT).contains(&cycle);
+    let laser = |cycle: u64| {
+        let lit = (FIRST + 2..FIRST + 2 + LIT).contains(&cycle);
+        LaserCycle { gate: u32::from(lit), power: 0.5, ..LaserCycle::OFF }
+    };
     CycleRecord {
         feedback: Feedback {
             cycle: Cycle(cycle),
@@ -35,18 +40,28 @@ fn record(cycle: u64) -> CycleRecord {
             command_published: Nanoseconds(1),
             status: status::TOOL_KNOWN,
             tool,
-            laser: LaserCycle { gate: u32::from(lit), power: 0.5, ..LaserCycle::OFF },
+            laser: laser(cycle),
             ..Feedback::default()
         },
-        command: Command { cycle: Cycle(cycle), stream: 1, mode: 4, tool, ..Command::default() },
+        command: Command {
+            cycle: Cycle(cycle),
+            stream: 1,
+            stream_time: CYCLE_TIME * cycle.saturating_sub(FIRST) as f64,
+            state: ControllerState::Running as u32,
+            // A command acts one cycle later; it asks for light one cycle before that is told.
+            laser: laser(cycle + 2),
+            mode: 4,
+            tool,
+            ..Command::default()
+        },
     }
 }
 
-fn examined(cycles: std::ops::RangeInclusive<u64>) -> Findings {
+fn examined(cycles: impl Iterator<Item = u64>) -> Findings {
     let artwork = artwork();
-    let mut examination = Examination::new(&artwork, Clock::Virtual);
+    let mut examination = Examination::new(&artwork, Clock::Virtual).with_fastest(0.25);
     cycles.for_each(|cycle| examination.push(&record(cycle)));
-    examination.finish()
+    examination.finish(Some(&report()))
 }
 
 fn report() -> ControllerReport {
@@ -90,33 +105,33 @@ fn fault() -> Fault {
 }
 
 #[test]
-fn the_outcome_follows_from_the_reports_unless_it_is_known_better() {
-    let drives = |fault: Fault| Some(DrivesReport { fault, ..DrivesReport::default() });
-    let completed = report();
-    let broken_off = ControllerReport { completed: 0, ..report() };
-    let faulted = ControllerReport { fault: fault(), ..broken_off };
-    let cases = [
-        (ended(completed), Outcome::Completed, false),
-        (ended(broken_off), Outcome::Stopped, false),
-        (ended(faulted), Outcome::Faulted, true),
-        (Ending { drives: drives(fault()), ..ended(broken_off) }, Outcome::Faulted, true),
-        (Ending { drives: drives(Fault::default()), ..ended(broken_off) }, Outcome::Stopped, false),
-        // The job was whole before drives failed.
-        (Ending { drives: drives(fault()), ..ended(completed) }, Outcome::Completed, true),
-        (Ending::default(), Outcome::Aborted, false),
-        (Ending { drives: drives(fault()), ..Ending::default() }, Outcome::Aborted, true),
-        (Ending { outcome: Some(Outcome::Stopped), ..ended(completed) }, Outcome::Stopped, false),
-        (Ending { outcome: Some(Outcome::Refused), ..Ending::default() }, Outcome::Refused, false),
-    ];
-    for (ending, outcome, has_fault) in cases {
-        let summary = summary_of(&ending, None);
-        assert_eq!((summary.outcome, summary.fault.is_some()), (outcome, has_fault), "{ending:?}");
-    }
+fn what_happens_after_a_completed_job_is_none_of_its_faults() {
+    let drives = Some(DrivesReport { fault: fault(), ..DrivesReport::default() });
+    let message = "the supervisor died".to_owned();
+    let error = Some(ErrorSummary { file: None, line: None, column: None, message });
+    let outcome = Some(Outcome::Aborted);
+    let late = Ending { drives, outcome, error: error.clone(), ..ended(report()) };
+    let summary = summary_of(&late, None);
+    assert_eq!(
+        (summary.outcome, &summary.fault, &summary.error),
+        (Outcome::Completed, &None, &None)
+    );
+    let told = &summary.warnings[2..];
+    assert!(told[0].starts_with("after the job: following_error of axis"), "{told:?}");
+    assert_eq!(told[1], "after the job: the supervisor died");
+
+    let early = Ending { drives, outcome, error, ..Ending::default() };
+    let summary = summary_of(&early, None);
+    assert_eq!(summary.outcome, Outcome::Faulted);
+    assert!(summary.fault.is_some() && summary.error.is_some());
+    let latched = Ending { latched: fault(), ..Ending::default() };
+    assert!(summary_of(&latched, None).fault.is_some());
 }
 
 #[test]
 fn a_fault_names_its_axis() {
-    let summary = summary_of(&ended(ControllerReport { fault: fault(), ..report() }), None);
+    let broken_off = ControllerReport { fault: fault(), completed: 0, ..report() };
+    let summary = summary_of(&ended(broken_off), None);
     let machine = Machine::builtin();
     assert_eq!(summary.fault.unwrap().axis, Some(machine.axes[0].name.clone()));
     assert_eq!(summary.machine.axes.len(), machine.axes.len());
@@ -142,42 +157,58 @@ fn time_is_that_of_the_motion_with_its_holds() {
     }
 }
 
+/// Cycles of 1 ms at 0.25 m/s.
+const STEP: f64 = 2.5e-4;
+
 #[test]
-fn marks_are_judged_only_over_the_whole_stream() {
+fn what_was_not_recorded_is_told_and_the_rest_is_judged() {
     let end = LAST + LIGHT_LAG;
-    let whole = summary_of(&ended(report()), Some(&examined(FIRST..=end)));
-    let marks = whole.marks.unwrap();
-    assert!((marks.length - LENGTH).abs() < 1e-12, "{}", marks.length);
-    assert!(marks.missing < 1e-12 && marks.double < 1e-12, "{marks:?}");
-    assert_eq!(whole.warnings, ["everywhere", "line 7: here"]);
-
-    let lacking = "the marks are not judged: the recording lacks its beginning or its end";
-    for cycles in [FIRST + 1..=end, FIRST..=end - 1, FIRST + 1..=end - 1] {
-        let summary = summary_of(&ended(report()), Some(&examined(cycles.clone())));
-        assert_eq!(summary.marks, None, "{cycles:?}");
-        assert_eq!(summary.warnings, ["everywhere", "line 7: here", lacking], "{cycles:?}");
-    }
-    let empty = Examination::new(&Artwork::default(), Clock::Virtual).finish();
-    let summary = summary_of(&ended(report()), Some(&empty));
-    assert_eq!((summary.marks, summary.warnings[2].as_str()), (None, lacking));
-
-    let summary = summary_of(&Ending::default(), Some(&examined(FIRST..=end)));
-    assert_eq!(summary.marks, None);
-    assert!(summary.warnings[2].contains("the controller did not say"), "{:?}", summary.warnings);
+    let check = |cycles: &dyn Fn(u64) -> bool, unrecorded: f64, warning: Option<&str>| {
+        let findings = examined((FIRST..=end).filter(|cycle| cycles(*cycle)));
+        let summary = summary_of(&ended(report()), Some(&findings));
+        let marks = summary.marks.unwrap();
+        assert!((marks.length + unrecorded - LENGTH).abs() < 1e-12, "{marks:?}");
+        assert!((marks.unrecorded - unrecorded).abs() < 1e-12, "{marks:?}");
+        assert!(marks.missing < 1e-12 && marks.double < 1e-12, "{marks:?}");
+        assert_eq!((marks.strokes_lost, marks.missing_end_max), (0, 0.0), "{marks:?}");
+        assert_eq!(summary.warnings[..2], ["everywhere", "line 7: here"]);
+        assert_eq!(summary.warnings.get(2).map(String::as_str), warning);
+        summary.recording.unwrap()
+    };
+    let told =
+        "not all was recorded: 5.000 mm of stroke 1 may be marked or missing and are not judged";
+    let whole = check(&|_| true, 0.0, None);
+    assert_eq!((whole.cycles, whole.gaps, whole.missing), (102, 0, 0));
+    // In the middle of the stroke: 19 cycles are gone, and with them 20 ways between two.
+    let gap = check(&|cycle| !(520..539).contains(&cycle), 20.0 * STEP, Some(told));
+    assert_eq!((gap.cycles, gap.gaps, gap.missing, gap.longest), (83, 1, 19, 0.019));
+    // Its beginning and its end, where the first and the last of 80 lit cycles are 501 and 580.
+    check(&|cycle| cycle >= 521, 20.0 * STEP, Some(told));
+    check(&|cycle| cycle <= 561, 20.0 * STEP, Some(told));
+    // In the dark nothing is hidden.
+    let dark = check(&|cycle| !(585..595).contains(&cycle), 0.0, None);
+    assert_eq!((dark.gaps, dark.missing), (1, 10));
+    check(&|cycle| cycle <= 590, 0.0, None);
 }
 
 #[test]
-fn a_gap_is_a_warning_of_its_own() {
-    let artwork = artwork();
-    let mut examination = Examination::new(&artwork, Clock::Virtual);
-    let kept = (FIRST..=LAST + LIGHT_LAG).filter(|cycle| *cycle != FIRST + 30);
-    kept.for_each(|cycle| examination.push(&record(cycle)));
-    let mut ending = ended(report());
-    ending.warnings.push("first".into());
-    let summary = summary_of(&ending, Some(&examination.finish()));
-    assert_eq!(summary.marks, None);
-    let lost = "the marks are not judged: 1 samples were lost on the way to the monitor";
-    assert_eq!(summary.warnings, ["first", "everywhere", "line 7: here", lost]);
+fn nothing_recorded_or_an_end_that_nobody_knows_is_said() {
+    let summary = |ending: &Ending, cycles: std::ops::Range<u64>| {
+        let artwork = artwork();
+        let mut examination = Examination::new(&artwork, Clock::Virtual);
+        cycles.for_each(|cycle| examination.push(&record(cycle)));
+        summary_of(ending, Some(&examination.finish(ending.controller.as_ref())))
+    };
+    let nothing = summary(&ended(report()), 0..0);
+    assert_eq!(nothing.marks, None);
+    assert_eq!(nothing.warnings[2], "the marks are not judged: nothing of the job was recorded");
+    assert_eq!(nothing.recording.unwrap().missing, LAST + LIGHT_LAG - FIRST + 1);
+    // The controller did not say where the job ends, and the last record is lit.
+    let open = summary(&Ending::default(), FIRST..FIRST + 41);
+    let marks = open.marks.unwrap();
+    assert!((marks.unrecorded - 41.0 * STEP).abs() < 1e-12, "{marks:?}");
+    assert!(open.warnings[2].contains("10.250 mm of stroke 1"), "{:?}", open.warnings);
+    assert!(open.warnings[3].contains("nobody can tell how far it went on"), "{:?}", open.warnings);
 }
 
 #[test]
@@ -282,16 +313,49 @@ fn a_run_is_concluded_from_its_folder() {
 }
 
 #[test]
-fn a_torn_last_record_costs_the_judgement_when_it_was_needed() {
-    for (more, judged) in [(0, false), (1, true)] {
-        let below = tempfile::tempdir().unwrap();
-        let records: Vec<_> = (FIRST..=LAST + LIGHT_LAG + more).map(record).collect();
-        let folder = folder(&below, &records);
-        let whole = fs::read(folder.file(run_folder::SAMPLES)).unwrap();
-        folder.write(run_folder::SAMPLES, &whole[..whole.len() - 10]).unwrap();
-        let summary = concluded(&folder, &ended(report()));
-        assert_eq!(summary.marks.is_some(), judged);
+fn a_torn_last_record_is_one_that_was_not_recorded() {
+    let below = tempfile::tempdir().unwrap();
+    let folder = folder(&below, &records());
+    let whole = fs::read(folder.file(run_folder::SAMPLES)).unwrap();
+    folder.write(run_folder::SAMPLES, &whole[..whole.len() - 10]).unwrap();
+    let summary = concluded(&folder, &ended(report()));
+    assert_eq!(summary.recording.unwrap().missing, 1);
+    // Dark as it was, it hides nothing.
+    assert_eq!(summary.marks.unwrap().unrecorded, 0.0);
+}
+
+#[test]
+fn a_summary_that_cannot_be_written_is_given_back_and_says_so() {
+    let below = tempfile::tempdir().unwrap();
+    let folder = folder(&below, &records());
+    for name in [run_folder::SUMMARY, run_folder::REPORT] {
+        fs::create_dir(folder.file(name)).unwrap();
     }
+    let summary = concluded(&folder, &ended(report()));
+    assert_eq!((summary.outcome, summary.marks.is_some()), (Outcome::Completed, true));
+    for name in [run_folder::SUMMARY, run_folder::REPORT] {
+        let said =
+            |warning: &&String| warning.starts_with("cannot write") && warning.contains(name);
+        assert!(summary.warnings.iter().any(|it| said(&it)), "{name}: {:?}", summary.warnings);
+    }
+    fs::remove_dir_all(folder.path()).unwrap();
+    let summary = concluded(&folder, &ended(report()));
+    assert_eq!(summary.outcome, Outcome::Completed);
+    let told = summary.warnings.last().unwrap();
+    assert!(told.contains("summary.json: No such file"), "{told}");
+}
+
+#[test]
+fn a_recording_that_was_broken_off_is_said_to_be() {
+    let below = tempfile::tempdir().unwrap();
+    let folder = folder(&below, &records()[..50]);
+    let message = "samples.bin: No space left on device".to_owned();
+    let note = WatchNote { message: message.clone(), ..WatchNote::default() };
+    note.write(&folder).unwrap();
+    let summary = concluded(&folder, &ended(report()));
+    assert_eq!(summary.warnings[0], format!("the recording was broken off: {message}"));
+    let marks = summary.marks.unwrap();
+    assert!((marks.length + marks.unrecorded - LENGTH).abs() < 1e-12 && marks.missing < 1e-12);
 }
 
 #[test]
@@ -305,11 +369,11 @@ fn what_cannot_be_read_is_a_warning_and_not_a_figure() {
         assert!(said, "{name}: {:?}", summary.warnings);
         summary
     };
-    assert_eq!(check(run_folder::ARTWORK, "{", "cannot read artwork.json: EOF").marks, None);
-    let summary = check(run_folder::SAMPLES, "GRAVE", "there is no recording: not a recording");
+    assert_eq!(check(run_folder::ARTWORK, "{", "artwork.json: EOF").marks, None);
+    let summary = check(run_folder::SAMPLES, "GRAVE", "samples.bin: not a recording");
     assert_eq!(summary.marks, None);
     // The marks need no plan.
-    assert!(check(run_folder::PLAN, "[]", "cannot read plan.json: ").marks.is_some());
+    assert!(check(run_folder::PLAN, "[]", "plan.json: ").marks.is_some());
 }
 
 #[test]
@@ -329,16 +393,4 @@ fn a_job_that_was_never_planned_has_no_marks_and_no_warnings() {
     assert_eq!((summary.job.name.as_str(), summary.job.length), ("mine", 0.0));
     assert_eq!((summary.marks, summary.warnings.len()), (None, 0));
     assert!(!folder.file(run_folder::REPORT).exists());
-}
-
-#[test]
-fn the_note_of_a_recording_is_read_as_it_was_written() {
-    let below = tempfile::tempdir().unwrap();
-    let folder = RunFolder::create_at(below.path()).unwrap();
-    assert_eq!(WatchNote::read(&folder), None);
-    let note = WatchNote { stream: 3, records: 4711, lost: 2 };
-    note.write(&folder).unwrap();
-    assert_eq!(WatchNote::read(&folder), Some(note));
-    folder.write(run_folder::WATCH, "{\"stream\": 3").unwrap();
-    assert_eq!(WatchNote::read(&folder), None);
 }

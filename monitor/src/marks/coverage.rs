@@ -1,4 +1,5 @@
-//! Which stretches of one stroke were marked: never, once, more than once, or beyond its ends.
+//! Which stretches of one stroke were marked: never, once, more than once, or beyond its ends; and
+//! of which nobody knows.
 
 /// Movement back along the stroke that is not yet a second mark [m]: the tool's vibration.
 const VIBRATION: f64 = 1e-6;
@@ -8,6 +9,8 @@ const VIBRATION: f64 = 1e-6;
 pub struct Coverage {
     stretches: Vec<(f64, f64)>,
     leg: Option<Leg>,
+    /// Stretches that were passed while nobody recorded.
+    hidden: Vec<(f64, f64)>,
 }
 
 /// The stretch being marked, in one direction.
@@ -25,6 +28,8 @@ pub struct Extent {
     pub missing: f64,
     /// Length marked more than once, and beyond the ends.
     pub double: f64,
+    /// Length of which nobody knows whether it was marked.
+    pub unrecorded: f64,
     /// Length not marked at the start and at the end.
     pub missing_ends: [f64; 2],
     /// Length marked beyond the start and beyond the end.
@@ -56,54 +61,69 @@ impl Coverage {
         }
     }
 
-    /// Whether there was any light.
-    pub fn is_empty(&self) -> bool {
-        self.stretches.is_empty() && self.leg.is_none()
+    /// From arc length `from` to `to` [m] the stroke was passed while nobody recorded. A stretch of
+    /// no length says it of a dot, or of an end.
+    pub fn hide(&mut self, from: f64, to: f64) {
+        self.hidden.push((from, to));
+    }
+
+    /// Whether it is certain that there was no light at all.
+    pub fn is_lost(&self) -> bool {
+        self.stretches.is_empty() && self.leg.is_none() && self.hidden.is_empty()
+    }
+
+    /// Whether any of it was passed while nobody recorded.
+    pub fn is_hidden(&self) -> bool {
+        !self.hidden.is_empty()
     }
 
     /// How a stroke of `length` [m] was covered. Call after [`Self::end`].
     pub fn extent(&self, length: f64) -> Extent {
-        if self.stretches.is_empty() {
+        let known = || self.stretches.iter();
+        let all = || known().chain(&self.hidden);
+        if self.is_lost() {
             return Extent { missing: length, missing_ends: [length; 2], ..Extent::default() };
         }
-        let low = self.stretches.iter().fold(f64::INFINITY, |low, stretch| low.min(stretch.0));
-        let high = self.stretches.iter().fold(f64::NEG_INFINITY, |high, s| high.max(s.1));
+        let low = all().fold(f64::INFINITY, |low, stretch| low.min(stretch.0));
+        let high = all().fold(f64::NEG_INFINITY, |high, stretch| high.max(stretch.1));
         let missing_ends = [low.clamp(0.0, length), (length - high).clamp(0.0, length)];
         let double_ends =
-            [self.measure(f64::NEG_INFINITY, 0.0).0, self.measure(length, f64::INFINITY).0];
-        let (once, twice) = self.measure(0.0, length);
+            [measure(known(), f64::NEG_INFINITY, 0.0).0, measure(known(), length, f64::INFINITY).0];
+        let (once, twice) = measure(known(), 0.0, length);
+        let passed = measure(all(), 0.0, length).0;
         Extent {
-            missing: (length - once).max(0.0),
+            missing: (length - passed).max(0.0),
             double: twice + double_ends[0] + double_ends[1],
+            unrecorded: (passed - once).max(0.0),
             missing_ends,
             double_ends,
         }
     }
+}
 
-    /// Length between two arc lengths marked at least once, and at least twice.
-    fn measure(&self, from: f64, to: f64) -> (f64, f64) {
-        let mut bounds: Vec<(f64, i64)> = Vec::with_capacity(2 * self.stretches.len());
-        for &(low, high) in &self.stretches {
-            let (low, high) = (low.max(from), high.min(to));
-            if low < high {
-                bounds.push((low, 1));
-                bounds.push((high, -1));
-            }
+/// Length between two arc lengths that these stretches cover at least once, and at least twice.
+fn measure<'a>(stretches: impl Iterator<Item = &'a (f64, f64)>, from: f64, to: f64) -> (f64, f64) {
+    let mut bounds: Vec<(f64, i64)> = Vec::new();
+    for &(low, high) in stretches {
+        let (low, high) = (low.max(from), high.min(to));
+        if low < high {
+            bounds.push((low, 1));
+            bounds.push((high, -1));
         }
-        bounds.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
-        let (mut once, mut twice, mut depth, mut since) = (0.0, 0.0, 0, 0.0);
-        for (at, change) in bounds {
-            if depth >= 1 {
-                once += at - since;
-            }
-            if depth >= 2 {
-                twice += at - since;
-            }
-            depth += change;
-            since = at;
-        }
-        (once, twice)
     }
+    bounds.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+    let (mut once, mut twice, mut depth, mut since) = (0.0, 0.0, 0, 0.0);
+    for (at, change) in bounds {
+        if depth >= 1 {
+            once += at - since;
+        }
+        if depth >= 2 {
+            twice += at - since;
+        }
+        depth += change;
+        since = at;
+    }
+    (once, twice)
 }
 
 #[cfg(test)]
@@ -140,7 +160,13 @@ mod tests {
         check(&[&[0.0, 4.0], &[3.0, 10.0]], Extent { double: 1.0, ..none });
         check(
             &[&[-0.5, 9.0]],
-            Extent { missing: 1.0, double: 0.5, missing_ends: [0.0, 1.0], double_ends: [0.5, 0.0] },
+            Extent {
+                missing: 1.0,
+                double: 0.5,
+                missing_ends: [0.0, 1.0],
+                double_ends: [0.5, 0.0],
+                ..none
+            },
         );
         // Forward, back by two, forward again: marked three times there, counted once.
         check(&[&[0.0, 5.0, 3.0, 10.0]], Extent { double: 2.0, ..none });
@@ -153,7 +179,30 @@ mod tests {
                 double: 1.0,
                 missing_ends: [10.0, 0.0],
                 double_ends: [0.0, 1.0],
+                ..none
             },
         );
+    }
+
+    #[test]
+    fn what_is_hidden_is_neither_marked_nor_missing() {
+        let check =
+            |run: &[f64], hidden: &[(f64, f64)], missing: f64, unrecorded: f64, ends: [f64; 2]| {
+                let mut coverage = Coverage::default();
+                run.iter().for_each(|&at| coverage.mark(at));
+                coverage.end();
+                hidden.iter().for_each(|&(from, to)| coverage.hide(from, to));
+                let extent = coverage.extent(10.0);
+                let found = (extent.missing, extent.unrecorded, extent.missing_ends);
+                assert_eq!(found, (missing, unrecorded, ends), "{run:?} {hidden:?}");
+                assert!(coverage.is_hidden() && !coverage.is_lost());
+            };
+        check(&[0.0, 4.0], &[(4.0, 10.0)], 0.0, 6.0, [0.0, 0.0]);
+        check(&[0.0, 4.0], &[(5.0, 7.0)], 4.0, 2.0, [0.0, 3.0]);
+        // Marked all the same, later: it is known then.
+        check(&[3.0, 10.0], &[(0.0, 5.0)], 0.0, 3.0, [0.0, 0.0]);
+        check(&[3.0, 10.0], &[(1.0, 3.0), (2.0, 4.0)], 1.0, 2.0, [1.0, 0.0]);
+        check(&[], &[(-1.0, 11.0)], 0.0, 10.0, [0.0, 0.0]);
+        check(&[], &[(2.0, 3.0)], 9.0, 1.0, [2.0, 7.0]);
     }
 }

@@ -13,6 +13,18 @@ pub struct Foot {
     pub distance: f64,
 }
 
+/// A place at which a stroke's line passes a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Passage {
+    /// The foot there.
+    pub foot: Foot,
+    /// Which way the line goes there; of no particular length.
+    pub direction: Vector3<f64>,
+}
+
+/// How much further along the line than the tolerance two feet may be apart and be of one passage.
+const ONE_PASSAGE: f64 = 10.0;
+
 /// The polyline of a stroke with the arc length of each of its points.
 #[derive(Debug, Clone)]
 pub struct Line {
@@ -78,6 +90,37 @@ impl Line {
             .filter_map(|index| self.foot_on(index, point))
             .min_by(|a, b| a.distance.total_cmp(&b.distance))
             .unwrap_or_else(|| Foot { at: 0.0, distance: self.distance_from_dot(point) })
+    }
+
+    /// Every place on the line that `point` may belong to, in order of arc length: where the line
+    /// passes it within `tolerance` [m] of its nearest distance, once for each passage.
+    pub fn passages(&self, point: &Vector3<f64>, tolerance: f64) -> Vec<Passage> {
+        let most = self.nearest(point).distance + tolerance;
+        let mut passages: Vec<Passage> = Vec::new();
+        for index in 0..self.points.len() {
+            let Some(foot) = self.foot_on(index, point) else { break };
+            if foot.distance > most {
+                continue;
+            }
+            let found = Passage { foot, direction: self.direction(index) };
+            match passages.last_mut() {
+                // Segments that meet near the point are one passage.
+                Some(last) if foot.at - last.foot.at <= ONE_PASSAGE * tolerance => {
+                    if foot.distance < last.foot.distance {
+                        *last = found;
+                    }
+                }
+                _ => passages.push(found),
+            }
+        }
+        passages
+    }
+
+    fn direction(&self, index: usize) -> Vector3<f64> {
+        match (self.points.get(index), self.points.get(index + 1)) {
+            (Some(from), Some(to)) => to - from,
+            _ => Vector3::zeros(),
+        }
     }
 
     /// Goes on to neighbouring segments while that brings the foot nearer.
@@ -148,6 +191,31 @@ mod tests {
         assert!((there.at - 0.0099).abs() < 1e-12, "{there:?}");
         let back = line.foot(&point, 0.0101, 0.01012, 4e-4);
         assert!((back.at - 0.01012).abs() < 1e-9, "{back:?}");
+    }
+
+    #[test]
+    fn a_line_passes_a_point_as_often_as_it_comes_by() {
+        // There, and back over the same places; then across.
+        let line = line(&[
+            [0.0; 3],
+            [0.01, 0.0, 0.0],
+            [0.004, 0.0, 0.0],
+            [0.002, 0.002, 0.0],
+            [0.002, -0.002, 0.0],
+        ]);
+        let at = |x: f64| {
+            let passages = line.passages(&Vector3::new(x, 0.0, 0.0), 5e-6);
+            passages.iter().map(|passage| passage.foot.at).collect::<Vec<_>>()
+        };
+        assert_eq!(at(0.001), [0.001]);
+        let found = at(0.007);
+        assert!(found.len() == 2 && (found[1] - 0.013).abs() < 1e-12, "{found:?}");
+        assert_eq!(at(0.002).len(), 2);
+        // At the turn there and back are one, and so are the segments at a corner.
+        assert_eq!((at(0.01).len(), at(0.004).len()), (1, 2));
+        let direction =
+            |index: usize| line.passages(&Vector3::new(0.007, 0.0, 0.0), 5e-6)[index].direction;
+        assert!(direction(0).x > 0.0 && direction(1).x < 0.0);
     }
 
     #[test]

@@ -4,15 +4,24 @@
 use super::*;
 use signals::artwork::Stroke;
 use signals::feedback::status;
-use signals::{Command, Cycle, Feedback, GateEdge, LaserCycle, Nanoseconds, Sample};
+use signals::{Command, ControllerState, Cycle, Feedback, GateEdge, LaserCycle, Nanoseconds};
 
 type Point = [f64; 3];
 
-/// Judges the marks of a whole recording.
-fn judge(artwork: &Artwork, records: &[CycleRecord]) -> Result<Marks, Unjudged> {
+/// Judges the marks of a recording of a job that was completed.
+fn judgement(artwork: &Artwork, records: &[CycleRecord]) -> Result<Judgement, Unjudged> {
     let mut judge = Judge::new(artwork);
     records.iter().for_each(|record| judge.push(record));
-    judge.finish()
+    let last_cycle = Cycle(FIRST);
+    let completed = ControllerReport { completed: 1, last_cycle, ..ControllerReport::default() };
+    judge.finish(Some(&completed))
+}
+
+/// The marks of a recording of which nothing is missing.
+fn judge(artwork: &Artwork, records: &[CycleRecord]) -> Result<Marks, Unjudged> {
+    let judgement = judgement(artwork, records)?;
+    assert_eq!((judgement.marks.unrecorded, judgement.unrecorded_strokes), (0.0, None));
+    Ok(judgement.marks)
 }
 
 const SPEED: f64 = 0.25;
@@ -59,6 +68,10 @@ fn play(
                 },
                 command: Command {
                     cycle: Cycle(cycle + FIRST),
+                    stream: u64::from(time >= 0.0),
+                    stream_time: time.max(0.0),
+                    state: ControllerState::Running as u32,
+                    laser: laser(plan.light, time + CYCLE_TIME),
                     stroke: stroke_in(time + CYCLE_TIME),
                     mode: 4,
                     tool: planned,
@@ -395,19 +408,14 @@ fn light_that_comes_late_is_found_where_it_falls() {
 }
 
 #[test]
-fn rather_no_judgement_than_a_wrong_one() {
-    let records = play(&one_plan(), |_, tool| tool, |_, _| 0.0);
-    let mut gap = records.clone();
-    gap.drain(50..53);
-    assert_eq!(judge(&one_line(), &gap), Err(Unjudged::SamplesLost { count: 3 }));
-
-    let mut unanswered = records.clone();
-    unanswered[60].command = Command::zeroed();
-    assert_eq!(judge(&one_line(), &unanswered), Err(Unjudged::SamplesLost { count: 1 }));
-
-    let mut blind = records;
-    blind[60].feedback.status = 0;
-    assert_eq!(judge(&one_line(), &blind), Err(Unjudged::ToolUnknown { cycle: FIRST + 60 }));
+fn where_nothing_was_recorded_nothing_is_judged() {
+    let art = one_line();
+    assert_eq!(judge(&art, &[]), Err(Unjudged::Unrecorded));
+    let mut records = play(&one_plan(), |_, tool| tool, |_, _| 0.0);
+    // The cycles before the stream are none of the job's.
+    assert_eq!(judge(&art, &records[..10]), Err(Unjudged::Unrecorded));
+    records.iter_mut().for_each(|record| record.feedback.status = 0);
+    assert_eq!(judge(&art, &records), Err(Unjudged::ToolUnknown));
 }
 
 /// A closed figure of eight: it crosses itself, and ends where it starts.

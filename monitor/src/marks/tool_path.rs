@@ -5,16 +5,21 @@
 //! `jerk·h³/48`, 0.01 µm at 500 m/s³ and a cycle of 1 ms.
 
 use crate::recording::CycleRecord;
+use crate::recording::continuity::{Stamp, Succession};
 use nalgebra::Vector3;
 use signals::feedback::status;
 use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
-use signals::{LaserCycle, MAX_EDGES};
+use signals::{ControllerState, LaserCycle, MAX_EDGES};
+
+/// Bits of a feedback's status that say: the cycle which begins with it is dark, whatever the
+/// command in force says.
+const KEPT_DARK: u32 = status::COMMAND_MISSED | status::STOPPED_ALONE | status::GATE_INHIBITED;
 
 /// What one record tells about its deadline `t[k]` and the cycle before.
 #[derive(Debug, Clone, Copy)]
 pub struct Moment {
-    /// `k`.
-    pub cycle: u64,
+    /// `k`, in the run of drives.
+    pub stamp: Stamp,
     /// The tool at `t[k]` [m].
     pub tool: Vector3<f64>,
     /// Whether `tool` is known.
@@ -23,25 +28,69 @@ pub struct Moment {
     pub planned: Option<Vector3<f64>>,
     /// What the laser did in `[t[k−1], t[k])`.
     pub laser: LaserCycle,
-    /// Stroke that the command which answered this feedback names, from 1; 0 for none.
-    pub stroke: u64,
+    /// What the command which answered this feedback asks for.
+    pub asked: Asked,
     /// Cycle of the command in force from `t[k]` on; `None` before the first.
     pub in_force: Option<u64>,
+    /// Whether drives keeps the cycle from `t[k]` on dark, whatever that command asks for.
+    pub kept_dark: bool,
+}
+
+/// What a command asks for in the cycle in which it acts.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Asked {
+    /// The stream that it plays, 0 for none.
+    pub stream: u64,
+    /// Stream time at the feedback that it answers [s].
+    pub stream_time: f64,
+    /// Stroke to be marked, from 1; 0 for none.
+    pub stroke: u64,
+    /// The first light in the cycle, and the last.
+    pub light: Option<(LitSpan, LitSpan)>,
+    /// Whether the stream is being played, neither held nor given up.
+    pub running: bool,
+}
+
+impl Asked {
+    /// Whether light is asked for at the end of the cycle.
+    pub fn stays_lit(&self) -> bool {
+        self.light.is_some_and(|(_, last)| last.to == 1.0)
+    }
 }
 
 impl Moment {
     /// The moment of a record, with the tool as drives reported it.
     pub fn of(record: &CycleRecord) -> Self {
         let CycleRecord { feedback, command } = record;
+        let asked = || {
+            let light = LitSpans::of(&command.laser);
+            let light = light.as_slice();
+            Asked {
+                stream: command.stream,
+                stream_time: command.stream_time,
+                stroke: command.stroke,
+                light: light.first().copied().zip(light.last().copied()),
+                running: command.state() == ControllerState::Running,
+            }
+        };
+        let answered = record.is_answered();
         Self {
-            cycle: feedback.cycle.0,
+            stamp: Stamp::of(feedback),
             tool: Vector3::from(feedback.tool),
             tool_known: feedback.has(status::TOOL_KNOWN),
-            planned: record.is_answered().then(|| Vector3::from(command.tool)),
+            planned: answered.then(|| Vector3::from(command.tool)),
             laser: feedback.laser,
-            stroke: command.stroke,
+            asked: if answered { asked() } else { Asked::default() },
             in_force: (feedback.command_received.0 != 0).then_some(feedback.command_cycle.0),
+            kept_dark: feedback.status & KEPT_DARK != 0,
         }
+    }
+}
+
+impl Moment {
+    /// Stream time at `t[k]` [s]; `None` where the feedback was not answered.
+    pub fn stream_time(&self) -> Option<f64> {
+        self.planned.is_some().then_some(self.asked.stream_time)
     }
 }
 
@@ -56,14 +105,22 @@ pub struct ToolPath {
 const WINDOW: usize = 5;
 
 impl ToolPath {
-    /// Takes the next moment, and gives the cycle that now has both its neighbours. After a gap
-    /// in the cycles nothing is joined across it.
-    pub fn push(&mut self, moment: Moment) -> Option<Interval> {
+    /// How `moment` would follow the newest; [`Succession::Next`] where there is none yet.
+    pub fn succession(&self, moment: &Moment) -> Succession {
         let newest = self.window.last().copied().flatten();
-        if newest.is_some_and(|newest| moment.cycle != newest.cycle + 1) {
-            self.window = [None; WINDOW];
+        newest.map_or(Succession::Next, |newest| Succession::between(newest.stamp, moment.stamp))
+    }
+
+    /// Takes the next moment, and gives the cycle that now has both its neighbours. After a gap
+    /// in the cycles nothing is joined across it: what it gives is the last cycle before the gap.
+    pub fn push(&mut self, moment: Moment) -> Option<Interval> {
+        if self.succession(&moment) == Succession::Next {
+            return self.shift(Some(moment));
         }
-        self.shift(Some(moment))
+        let last = self.finish();
+        self.window = [None; WINDOW];
+        self.shift(Some(moment));
+        last
     }
 
     /// The last cycle, once no moment follows.
@@ -109,6 +166,34 @@ impl Interval {
         Some(hermite(before, deviation(self.start)?, deviation(self.end)?, after, part))
     }
 
+    /// Whether the tool's place between the deadlines is known as well as at them: it takes a
+    /// neighbour on both sides.
+    pub fn is_surrounded(&self) -> bool {
+        self.before.is_some() && self.after.is_some()
+    }
+
+    /// Whether a difference of fourth order can be taken at its start.
+    pub fn is_wide(&self) -> bool {
+        self.is_surrounded() && self.earliest.is_some()
+    }
+
+    /// Whether nothing was recorded right before it.
+    pub fn is_first(&self) -> bool {
+        self.before.is_none()
+    }
+
+    /// Distance of the tool's places at its two ends [m].
+    pub fn chord(&self) -> f64 {
+        (self.end.tool - self.start.tool).norm()
+    }
+
+    /// Which way the plan goes in this cycle, or the tool where the plan is not known [m].
+    pub fn planned_step(&self) -> Vector3<f64> {
+        let planned = self.start.planned.zip(self.end.planned);
+        let (start, end) = planned.unwrap_or((self.start.tool, self.end.tool));
+        end - start
+    }
+
     /// Speed of the tool at the start of the cycle [m/s], by differences of fourth order where
     /// there are neighbours enough.
     pub fn speed_at_start(&self) -> f64 {
@@ -130,12 +215,17 @@ impl Interval {
         self.start.tool_known && self.end.tool_known
     }
 
-    /// Stroke that the command in force in this cycle names, from 1; 0 for none. What is marked
-    /// is what [`Interval::lit`] says.
-    pub fn commanded_stroke(&self) -> u64 {
-        let in_force = |moment: &Moment| Some(moment.cycle) == self.start.in_force;
+    /// What the command in force in this cycle asks for; `None` where that command is not known.
+    /// What is marked is what [`Interval::lit`] says.
+    pub fn commanded(&self) -> Option<Asked> {
+        let in_force = |moment: &Moment| Some(moment.stamp.cycle) == self.start.in_force;
         let mut answered = [self.before, self.earliest].into_iter().flatten();
-        answered.find(in_force).map_or(0, |moment| moment.stroke)
+        answered.find(in_force).filter(|moment| moment.planned.is_some()).map(|moment| moment.asked)
+    }
+
+    /// The same, `None` also where drives kept the cycle dark.
+    pub fn due(&self) -> Option<Asked> {
+        self.commanded().filter(|_| !self.start.kept_dark)
     }
 
     /// The parts of the cycle with light.
@@ -232,17 +322,19 @@ fn hermite(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use signals::GateEdge;
+    use signals::{Cycle, Feedback, GateEdge};
 
     fn moment(cycle: u64, tool: Vector3<f64>) -> Moment {
+        let feedback = Feedback { cycle: Cycle(cycle), ..Feedback::default() };
         Moment {
-            cycle,
+            stamp: Stamp::of(&feedback),
             tool,
             tool_known: true,
-            planned: None,
+            planned: Some(tool),
             laser: LaserCycle::OFF,
-            stroke: cycle,
+            asked: Asked { stroke: cycle, ..Asked::default() },
             in_force: cycle.checked_sub(1),
+            kept_dark: false,
         }
     }
 
@@ -264,10 +356,10 @@ mod tests {
                 && interval.before.is_some()
             {
                 for part in [0.0, 0.2, 0.5, 0.77, 1.0] {
-                    let time = (interval.start.cycle as f64 + part) * CYCLE_TIME;
+                    let time = (interval.start.stamp.cycle as f64 + part) * CYCLE_TIME;
                     worst = worst.max((interval.tool(part) - path(time)).norm());
                 }
-                let time = interval.start.cycle as f64 * CYCLE_TIME;
+                let time = interval.start.stamp.cycle as f64 * CYCLE_TIME;
                 let velocity = 0.25 + 10.0 * time - 250.0 * time * time;
                 let speed = (velocity * velocity + 0.01).sqrt();
                 let tolerance = if interval.earliest.is_some() { 1e-9 } else { 1e-4 };
@@ -289,7 +381,8 @@ mod tests {
             window.push(moment(7, Vector3::zeros()));
             // The cycle from 6 to 7, with two moments before it.
             let interval = window.finish().unwrap();
-            assert_eq!(interval.commanded_stroke(), expect, "{in_force:?}");
+            let stroke = interval.commanded().map_or(0, |asked| asked.stroke);
+            assert_eq!(stroke, expect, "{in_force:?}");
         }
     }
 
@@ -298,10 +391,14 @@ mod tests {
         let mut window = ToolPath::default();
         assert!(window.push(moment(4, Vector3::zeros())).is_none());
         assert!(window.push(moment(5, Vector3::zeros())).is_none());
-        assert_eq!(window.push(moment(6, Vector3::zeros())).unwrap().end.cycle, 5);
-        assert!(window.push(moment(8, Vector3::zeros())).is_none());
+        assert_eq!(window.push(moment(6, Vector3::zeros())).unwrap().end.stamp.cycle, 5);
+        // The last cycle before the gap, which waited for its neighbour.
+        let last = window.push(moment(8, Vector3::zeros())).unwrap();
+        assert_eq!((last.end.stamp.cycle, last.is_surrounded()), (6, false));
         assert!(window.push(moment(9, Vector3::zeros())).is_none());
-        assert_eq!(window.finish().unwrap().end.cycle, 9);
+        let first = window.push(moment(10, Vector3::zeros())).unwrap();
+        assert_eq!((first.start.stamp.cycle, first.is_surrounded()), (8, false));
+        assert_eq!(window.finish().unwrap().end.stamp.cycle, 10);
         assert!(window.finish().is_none());
     }
 

@@ -2,7 +2,9 @@
 
 use super::CycleRecord;
 use signals::{Command, Feedback, Sample, sample};
-use std::io::{self, Read, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::Path;
 use zerocopy::{FromBytes, FromZeros, IntoBytes};
 
 /// Bytes for a sample's name in the header, unused ones zero.
@@ -62,7 +64,7 @@ fn name_text(bytes: &[u8]) -> String {
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// The operating system refused.
-    #[error("cannot read the recording: {0}")]
+    #[error("{0}")]
     Io(#[from] io::Error),
     /// The file does not begin like a recording.
     #[error("not a recording: a samples.bin of Graver begins with \"GRAVERec\"")]
@@ -108,12 +110,25 @@ impl<W: Write> RecordingWriter<W> {
         Ok(Self { writer })
     }
 
+    /// Appends to a recording that has its header already.
+    pub fn append(writer: W) -> Self {
+        Self { writer }
+    }
+
     /// Appends records.
     ///
     /// # Errors
     /// Whatever the writer reports.
     pub fn write(&mut self, records: &[CycleRecord]) -> io::Result<()> {
         self.writer.write_all(records.as_bytes())
+    }
+
+    /// Hands on what is buffered.
+    ///
+    /// # Errors
+    /// Whatever the writer reports.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
     }
 
     /// Flushes, and gives the writer back.
@@ -123,6 +138,52 @@ impl<W: Write> RecordingWriter<W> {
     pub fn finish(mut self) -> io::Result<W> {
         self.writer.flush()?;
         Ok(self.writer)
+    }
+}
+
+/// A recording that another process left, opened to be gone on with.
+#[derive(Debug)]
+pub struct Resumed {
+    /// Appends to it.
+    pub writer: RecordingWriter<BufWriter<File>>,
+    /// Its last whole record, if it has any.
+    pub last: Option<CycleRecord>,
+    /// How many whole records it has.
+    pub records: u64,
+}
+
+impl RecordingWriter<BufWriter<File>> {
+    /// Begins a recording in a file, in place of what may be there.
+    ///
+    /// # Errors
+    /// Whatever the operating system reports.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        Self::new(BufWriter::new(File::create(path)?))
+    }
+
+    /// Opens a recording to append to it. A last record that its writer did not complete is cut
+    /// off; one that does not even have its header begins anew.
+    ///
+    /// # Errors
+    /// [`RecordingError`] when the file is no recording of this build, or cannot be opened.
+    pub fn resume(path: &Path) -> Result<Resumed, RecordingError> {
+        let mut file = OpenOptions::new().read(true).write(true).open(path)?;
+        let (header, record) = (size_of::<Header>() as u64, size_of::<CycleRecord>() as u64);
+        let Some(bytes) = file.metadata()?.len().checked_sub(header) else {
+            return Ok(Resumed { writer: Self::create(path)?, last: None, records: 0 });
+        };
+        RecordingReader::new(BufReader::new(&file))?;
+        let records = bytes / record;
+        file.set_len(header + records * record)?;
+        let mut last = None;
+        if let Some(before) = records.checked_sub(1) {
+            file.seek(SeekFrom::Start(header + before * record))?;
+            let mut whole = CycleRecord::new_zeroed();
+            file.read_exact(whole.as_mut_bytes())?;
+            last = Some(whole);
+        }
+        file.seek(SeekFrom::End(0))?;
+        Ok(Resumed { writer: Self::append(BufWriter::new(file)), last, records })
     }
 }
 
@@ -238,6 +299,43 @@ mod tests {
         let results: Vec<_> = RecordingReader::new(&bytes[..bytes.len() - 1]).unwrap().collect();
         assert_eq!(results.len(), 3);
         assert!(matches!(results[2], Err(RecordingError::Truncated { record: 2 })));
+    }
+
+    #[test]
+    fn a_successor_appends_after_the_last_whole_record() {
+        let below = tempfile::tempdir().unwrap();
+        let path = below.path().join("samples.bin");
+        let bytes = written(4);
+        let (header, record) = (size_of::<Header>(), size_of::<CycleRecord>());
+        // Torn anywhere: inside a record, between two, inside the header.
+        for (kept, whole) in [
+            (bytes.len(), 4),
+            (bytes.len() - 1, 3),
+            (header + record + 1, 1),
+            (header + record, 1),
+            (header + 5, 0),
+            (header, 0),
+            (header - 1, 0),
+            (0, 0),
+        ] {
+            std::fs::write(&path, &bytes[..kept]).unwrap();
+            let Resumed { mut writer, last, records } = RecordingWriter::resume(&path).unwrap();
+            assert_eq!(records, whole, "{kept}");
+            assert_eq!(last.map(|last| last.feedback.cycle.0 + 1).unwrap_or(0), whole, "{kept}");
+            let mut next = CycleRecord::new_zeroed();
+            next.feedback.cycle = Cycle(100);
+            writer.write(&[next]).unwrap();
+            writer.finish().unwrap();
+            let reader = RecordingReader::new(BufReader::new(File::open(&path).unwrap())).unwrap();
+            let cycles: Vec<u64> = reader.map(|record| record.unwrap().feedback.cycle.0).collect();
+            assert_eq!(cycles, (0..whole).chain([100]).collect::<Vec<_>>(), "{kept}");
+        }
+        std::fs::write(&path, vec![b'x'; 4000]).unwrap();
+        let error = RecordingWriter::resume(&path).unwrap_err();
+        assert!(matches!(error, RecordingError::NotARecording), "{error}");
+        assert_eq!(std::fs::read(&path).unwrap(), vec![b'x'; 4000], "left alone");
+        let error = RecordingWriter::resume(&below.path().join("none")).unwrap_err();
+        assert!(matches!(error, RecordingError::Io(_)), "{error}");
     }
 
     #[test]

@@ -102,9 +102,9 @@ fn the_page_shows_the_run_and_needs_no_network() {
         outputs.records.iter().for_each(|record| examination.push(record));
     }
     stage.finish(&mut outputs);
-    assert_eq!((count, outputs.records.len(), stage.lost()), (1000, 0, 0));
+    assert_eq!((count, outputs.records.len(), stage.continuity().missing), (1000, 0, 0));
 
-    let findings = examination.finish();
+    let findings = examination.finish(None);
     let machine = MachineSummary {
         name: "sample <machine>".into(),
         mechanism: "corexy".into(),
@@ -112,7 +112,7 @@ fn the_page_shows_the_run_and_needs_no_network() {
     };
     let job = JobSummary { name: "circle & cross".into(), strokes: 2, length: artwork.length() };
     let mut summary = Summary::new(Outcome::Completed, job, machine);
-    summary.marks = Some(findings.marks.unwrap());
+    summary.marks = Some(findings.marks.unwrap().marks);
     summary.latency = findings.histograms.summary();
     assert_eq!(stage.histograms().summary(), summary.latency);
     summary.warnings.push("memory is not locked".into());
@@ -156,7 +156,7 @@ fn the_page_shows_the_run_and_needs_no_network() {
 fn a_run_without_marks_has_a_report_too() {
     let summary = Summary::new(Outcome::Aborted, JobSummary::default(), MachineSummary::default());
     let artwork = Artwork::default();
-    let findings = Examination::new(&artwork, Clock::Virtual).finish();
+    let findings = Examination::new(&artwork, Clock::Virtual).finish(None);
     let report = Report {
         summary: &summary,
         artwork: &artwork,

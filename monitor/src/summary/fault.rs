@@ -29,6 +29,13 @@ impl FaultSummary {
     }
 }
 
+impl std::fmt::Display for FaultSummary {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let axis = self.axis.as_ref().map(|axis| format!(" of axis {axis}")).unwrap_or_default();
+        write!(formatter, "{}{axis}: {}", self.code, self.detail)
+    }
+}
+
 fn detail(fault: &Fault, joint: Option<JointUnit>) -> String {
     let quantity = fault.quantity();
     match (fault.code(), quantity) {

@@ -2,6 +2,7 @@
 
 use super::{Realtime, Summary};
 use crate::marks::Marks;
+use crate::recording::continuity::RecordingSummary;
 use std::fmt::Write;
 
 /// Width of the column of names.
@@ -51,9 +52,7 @@ impl Rows {
     fn ending(&mut self, summary: &Summary) {
         self.add("outcome", summary.outcome.name());
         if let Some(fault) = &summary.fault {
-            let axis =
-                fault.axis.as_ref().map(|axis| format!(" of axis {axis}")).unwrap_or_default();
-            self.add("fault", format!("{}{axis}: {}", fault.code, fault.detail));
+            self.add("fault", fault.to_string());
         }
         if let Some(error) = &summary.error {
             self.add("error", error.message.as_str());
@@ -96,6 +95,12 @@ impl Rows {
         self.add("tracking error", pair("max ", marks.tracking_max, "rms", marks.tracking_rms));
         self.add("missing", pair("", marks.missing, "worst end", marks.missing_end_max));
         self.add("double", pair("", marks.double, "worst end", marks.double_end_max));
+        if marks.unrecorded > 0.0 {
+            self.add(
+                "unrecorded",
+                format!("{}, neither marked nor missing", length(marks.unrecorded)),
+            );
+        }
         if marks.strokes_lost > 0 {
             self.add("strokes lost", marks.strokes_lost.to_string());
         }
@@ -128,6 +133,13 @@ impl Rows {
 
     fn cycles(&mut self, summary: &Summary) {
         self.add("cycles", format!("{}, {} overruns", summary.cycles, summary.overruns));
+        if let Some(recording) = summary.recording.filter(|recording| recording.gaps > 0) {
+            let RecordingSummary { cycles, gaps, missing, longest } = recording;
+            let text = format!(
+                "{cycles} cycles, {missing} missing in {gaps} gaps, the longest {longest:.3} s"
+            );
+            self.add("recording", text);
+        }
         for (hop, figures) in &summary.latency {
             let [p50, p99, p999, max] =
                 [figures.p50, figures.p99, figures.p999, figures.max].map(latency);
@@ -197,5 +209,17 @@ mod tests {
     fn lengths_take_the_unit_that_reads_best() {
         assert_eq!(length(4.24e-6), "4.2 µm");
         assert_eq!(length(0.0123456), "12.346 mm");
+    }
+
+    #[test]
+    fn a_whole_recording_goes_without_saying() {
+        let machine = MachineSummary::default();
+        let mut summary = Summary::new(Outcome::Completed, JobSummary::default(), machine);
+        summary.recording = Some(RecordingSummary { cycles: 9, ..RecordingSummary::default() });
+        assert!(!summary.text().contains("recording"));
+        let gaps = RecordingSummary { cycles: 9, gaps: 2, missing: 70, longest: 0.0612 };
+        summary.recording = Some(gaps);
+        let line = "recording         9 cycles, 70 missing in 2 gaps, the longest 0.061 s\n";
+        assert!(summary.text().contains(line), "{}", summary.text());
     }
 }

@@ -42,6 +42,20 @@ impl Envelope {
         self.filled = 1;
     }
 
+    /// Leaves a gap of this many cycles.
+    pub fn skip(&mut self, cycles: u64) {
+        let mut left = cycles;
+        while left > 0 {
+            // The rest of the last bucket, or as much of the next one as there is.
+            let free =
+                if self.filled < self.stride { self.stride - self.filled } else { self.stride };
+            self.push(None);
+            let more = left.min(free) - 1;
+            self.filled += more;
+            left -= more + 1;
+        }
+    }
+
     /// Lowest and highest of all; `None` when empty.
     pub fn range(&self) -> Option<(f64, f64)> {
         self.buckets.iter().fold(None, |a, b| join(a, *b))
@@ -94,6 +108,24 @@ mod tests {
         assert!((spike.0 - 654.321).abs() <= width, "{spike:?}");
         let last = lines[0].last().expect("a point");
         assert!((last.0 - 1000.0).abs() <= 2.0 * width, "{last:?}");
+    }
+
+    #[test]
+    fn a_skipped_stretch_is_as_long_as_so_many_cycles_without_a_value() {
+        for (before, skipped, after) in
+            [(0, 3, 1), (5, 0, 2), (1, 1, 1), (1999, 1, 5), (1500, 7000, 3000), (9001, 123_456, 7)]
+        {
+            let (mut one, mut other) = (Envelope::default(), Envelope::default());
+            for envelope in [&mut one, &mut other] {
+                (0..before).for_each(|_| envelope.push(Some(1.0)));
+            }
+            one.skip(skipped);
+            (0..skipped).for_each(|_| other.push(None));
+            for envelope in [&mut one, &mut other] {
+                (0..after).for_each(|_| envelope.push(Some(2.0)));
+            }
+            assert_eq!(one, other, "{before} {skipped} {after}");
+        }
     }
 
     #[test]

@@ -44,7 +44,7 @@ impl Drop for Abandoned {
 pub(super) fn plan_request(
     folder: &Path,
     machine: &Machine,
-    standing: Option<&AxisArray>,
+    standing: &AxisArray,
     abandoned: &AtomicBool,
 ) -> Result<Plan, Refusal> {
     let file = folder.join(run_folder::REQUEST);
@@ -52,9 +52,7 @@ pub(super) fn plan_request(
     let text = std::fs::read(&file).map_err(|error| failed(&error))?;
     let request: JobRequest = serde_json::from_slice(&text).map_err(|error| failed(&error))?;
     let mut job = request.read(machine)?;
-    if let Some(standing) = standing {
-        approach(&mut job, machine, standing).map_err(Refusal::internal)?;
-    }
+    approach(&mut job, machine, standing).map_err(Refusal::internal)?;
     let plan = plan_unless(machine, &job, &|| abandoned.load(Ordering::Relaxed))
         .map_err(|error| request.refuse(&error))?;
     write_plan(folder, &plan).map_err(Refusal::internal)?;

@@ -32,6 +32,13 @@ struct Bench {
 impl Bench {
     /// A planner that has heard a controller at rest at home.
     fn new() -> Self {
+        let mut bench = Self::silent();
+        bench.say(|_| ());
+        bench
+    }
+
+    /// A planner that has heard nothing yet.
+    fn silent() -> Self {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let name = format!("planner-test-{}-{number}", std::process::id());
@@ -39,7 +46,7 @@ impl Bench {
         let holder = Domain::create(&instance).unwrap();
         let planner = Domain::join(&instance, Role::Planner).unwrap();
         let service = Service::open(&planner, &Machine::builtin()).unwrap();
-        let mut bench = Self {
+        Self {
             service,
             offers: holder.publisher().unwrap(),
             progress: holder.publisher().unwrap(),
@@ -53,9 +60,7 @@ impl Bench {
             },
             _planner: planner,
             _holder: holder,
-        };
-        bench.say(|_| ());
-        bench
+        }
     }
 
     fn say(&mut self, change: impl FnOnce(&mut Progress)) {
@@ -168,6 +173,24 @@ fn a_job_begins_where_the_axes_rest() {
     let first = bench.collect(100)[0];
     assert!((first.tool[0] - 0.06).abs() < 1e-12 && (first.tool[1] - 0.13).abs() < 1e-12);
     assert_eq!((first.sequence, first.path_velocity), (0, 0.0));
+}
+
+/// A planner that was started again is offered the newest job anew, be it long over.
+#[test]
+fn a_job_that_is_over_is_not_planned_again() {
+    for concluded in [false, true] {
+        let mut bench = Bench::silent();
+        if concluded {
+            // Refused or given up before it began: the controller never heard of it.
+            std::fs::write(bench.folder.path().join(run_folder::SUMMARY), "{}").unwrap();
+        }
+        bench.offer(3, &SMALL);
+        bench.collect(1);
+        bench.say(|progress| progress.finished_stream = if concluded { 2 } else { 3 });
+        bench.collect(1);
+        assert!(matches!(bench.service.work, Work::Idle), "{concluded}");
+        assert!(!bench.folder.path().join(run_folder::ARTWORK).exists());
+    }
 }
 
 #[test]

@@ -1,0 +1,94 @@
+//! What the monitor does when the supervisor is lost: it waits for the machine to rest, and writes
+//! the summary that nobody else will.
+
+use super::{Job, LOOK, Service};
+use crate::conclusion::{self, Ending};
+use crate::run_folder::RunFolder;
+use crate::summary::{ErrorSummary, Outcome};
+use machine::Machine;
+use runtime::ServiceError;
+use runtime::message::tell;
+use serde::Deserialize;
+use signals::run_folder;
+use std::time::{Duration, Instant};
+
+/// How long the axes may take to rest after the supervisor was lost.
+const REST_PATIENCE: Duration = Duration::from_secs(5);
+
+/// What `refused.json` says of a job that was refused.
+#[derive(Debug, Deserialize)]
+struct Refused {
+    file: Option<String>,
+    line: Option<u64>,
+    column: Option<u64>,
+    message: String,
+}
+
+impl Service {
+    /// The supervisor is lost. Writes the summary of the newest job, unless the supervisor wrote it.
+    pub(super) fn conclude_alone(&mut self, machine: &Machine) -> Result<(), ServiceError> {
+        let told = |job: &Job| job.folder.file(run_folder::SUMMARY).exists();
+        let Some(job) = self.job.take().filter(|job| !told(job)) else {
+            return self.end_recording();
+        };
+        if let Some(recording) = &mut self.recording {
+            // Nobody will start what is not being played yet.
+            recording.withdrawn = true;
+        }
+        let lost = Instant::now();
+        while !self.rests(job.stream) && lost.elapsed() < REST_PATIENCE {
+            self.look()?;
+            std::thread::sleep(LOOK);
+        }
+        self.end_recording()?;
+        let ending = self.ending(&job);
+        let summary = conclusion::conclude(&job.folder, machine, &ending, job.began);
+        if !told(&job) {
+            // Nobody else is left to say it.
+            summary.warnings.iter().for_each(|warning| tell(&format!("monitor: {warning}")));
+        }
+        Ok(())
+    }
+
+    /// Whether the job's stream is over, and its recording complete.
+    fn rests(&mut self, stream: u64) -> bool {
+        if self.recording.is_some() {
+            return false;
+        }
+        let ended = self.controller.is_final == 1 && self.controller.stream == stream;
+        ended || self.newest_command.stream != stream || !self.more_comes()
+    }
+
+    /// How a job ended whose supervisor is lost. A stream that the controller ended without a fault
+    /// had ended before that.
+    fn ending(&self, job: &Job) -> Ending {
+        let is_final = self.controller.is_final == 1 && self.controller.stream == job.stream;
+        let controller = is_final.then_some(self.controller);
+        let mut ending = Ending {
+            overruns_before: job.overruns_before,
+            controller,
+            latched: self.newest_command.fault,
+            drives: self.drives,
+            ..Ending::default()
+        };
+        if let Some(refusal) = refusal(&job.folder) {
+            ending.outcome = Some(Outcome::Refused);
+            ending.error = Some(refusal);
+            ending.warnings.push("the supervisor died after the job was refused".to_owned());
+        } else if controller.is_some_and(|report| !report.fault.is_some()) {
+            ending.warnings.push("the supervisor died after the job had ended".to_owned());
+        } else {
+            let message = "the supervisor died: laser off, axes brought to rest".to_owned();
+            ending.outcome = Some(Outcome::Aborted);
+            ending.error = Some(ErrorSummary { file: None, line: None, column: None, message });
+        }
+        ending
+    }
+}
+
+/// Why the planner refused the job, if it did.
+fn refusal(folder: &RunFolder) -> Option<ErrorSummary> {
+    let text = std::fs::read(folder.file(run_folder::REFUSAL)).ok()?;
+    let Refused { file, line, column, message } = serde_json::from_slice(&text).ok()?;
+    Some(ErrorSummary { file, line, column, message })
+}

@@ -1,0 +1,238 @@
+//! A recording under way: its three files in the run folder, and what is known of it.
+
+use crate::conclusion::LIGHT_LAG;
+use crate::latency::IntervalLog;
+use crate::recording::Recorder;
+use crate::recording::continuity::Continuity;
+use crate::recording::file::{RecordingError, RecordingWriter, Resumed};
+use crate::recording::note::{Progress, WatchNote};
+use crate::run_folder::{FileError, RunFolder};
+use crate::stage::{Inputs, MonitorStage, Outputs};
+use signals::{ControllerReport, run_folder};
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::time::{Duration, Instant};
+
+/// Length of an interval in the latency log.
+const INTERVAL: Duration = Duration::from_secs(1);
+
+/// A recording under way.
+pub(super) struct Recording {
+    pub(super) stream: u64,
+    pub(super) folder: RunFolder,
+    stage: MonitorStage,
+    outputs: Outputs,
+    writer: RecordingWriter<BufWriter<File>>,
+    log: IntervalLog<BufWriter<File>>,
+    /// Time since the log began, when this process took it up.
+    log_began: Duration,
+    began: Instant,
+    logged: Duration,
+    newest: u64,
+    /// Whether the job was taken back.
+    pub(super) withdrawn: bool,
+    /// Whether nothing more of it will be played.
+    pub(super) closed: bool,
+    /// Whether any of the stream was played.
+    played: bool,
+    /// Overruns counted before this job.
+    pub(super) overruns_before: u64,
+    /// Gaps that the note tells.
+    gaps_noted: u64,
+}
+
+impl Recording {
+    /// Begins the recording of a job, or goes on with the one that a dead monitor has left.
+    ///
+    /// # Errors
+    /// A file that cannot be opened or written, with its path.
+    pub(super) fn begin(
+        stream: u64,
+        folder: RunFolder,
+        overruns_before: u64,
+    ) -> Result<Self, FileError> {
+        let left = WatchNote::of(&folder, stream).filter(|note| note.progress == Progress::Open);
+        let samples = folder.file(run_folder::SAMPLES);
+        match left {
+            Some(note) if samples.exists() => Self::resume(folder, note),
+            _ => Self::create(stream, folder, overruns_before),
+        }
+    }
+
+    fn create(stream: u64, folder: RunFolder, overruns_before: u64) -> Result<Self, FileError> {
+        // The note first: a recording without one is nobody's.
+        WatchNote { stream, progress: Progress::Open, overruns_before, ..WatchNote::default() }
+            .write(&folder)?;
+        let samples = folder.file(run_folder::SAMPLES);
+        let writer = RecordingWriter::create(&samples).map_err(FileError::at(&samples))?;
+        let latency = folder.file(run_folder::LATENCY);
+        let log = IntervalLog::create(&latency).map_err(FileError::at(&latency))?;
+        let stage = MonitorStage::new();
+        Ok(Self::new(stream, folder, stage, writer, (log, Duration::ZERO), overruns_before))
+    }
+
+    fn resume(folder: RunFolder, note: WatchNote) -> Result<Self, FileError> {
+        let samples = folder.file(run_folder::SAMPLES);
+        let refused = |error: RecordingError| match error {
+            RecordingError::Io(error) => error,
+            other => io::Error::other(other),
+        };
+        let Resumed { writer, last, records } = RecordingWriter::resume(&samples)
+            .map_err(|error| FileError::at(&samples)(refused(error)))?;
+        let latency = folder.file(run_folder::LATENCY);
+        let log = IntervalLog::resume(&latency).map_err(FileError::at(&latency))?;
+        let recorder = match &last {
+            Some(last) => {
+                let missing = note.lost.saturating_sub(note.lost_commands);
+                let longest = note.gaps.iter().map(|gap| gap.cycles()).max().unwrap_or(0);
+                let (gaps, list) = (note.gap_count, note.gaps);
+                let continuity = Continuity { records, gaps, missing, longest, list };
+                Recorder::resume(last, continuity, note.lost_commands)
+            }
+            None => Recorder::new(),
+        };
+        let stage = MonitorStage::with(recorder);
+        let mut recording =
+            Self::new(note.stream, folder, stage, writer, log, note.overruns_before);
+        if let Some(last) = last {
+            recording.newest = last.feedback.cycle.0;
+            recording.played = last.command.stream == note.stream;
+        }
+        recording.gaps_noted = note.gap_count;
+        Ok(recording)
+    }
+
+    fn new(
+        stream: u64,
+        folder: RunFolder,
+        stage: MonitorStage,
+        writer: RecordingWriter<BufWriter<File>>,
+        (log, log_began): (IntervalLog<BufWriter<File>>, Duration),
+        overruns_before: u64,
+    ) -> Self {
+        Self {
+            stream,
+            folder,
+            stage,
+            outputs: Outputs::default(),
+            writer,
+            log,
+            log_began,
+            began: Instant::now(),
+            logged: Duration::ZERO,
+            newest: 0,
+            withdrawn: false,
+            closed: false,
+            played: false,
+            overruns_before,
+            gaps_noted: 0,
+        }
+    }
+
+    /// Takes what arrived.
+    ///
+    /// # Errors
+    /// A file that cannot be written, with its path.
+    pub(super) fn take(&mut self, inputs: &Inputs<'_>) -> Result<(), FileError> {
+        self.played |= inputs.commands.iter().any(|command| command.stream == self.stream);
+        self.stage.step(inputs, &mut self.outputs);
+        self.write()?;
+        if self.began.elapsed() >= self.logged + INTERVAL {
+            self.log_interval()?;
+        }
+        if self.stage.continuity().gaps > self.gaps_noted {
+            // A successor must know of it.
+            self.gaps_noted = self.stage.continuity().gaps;
+            self.note(Progress::Open, "").write(&self.folder)?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self) -> Result<(), FileError> {
+        if let Some(record) = self.outputs.records.last() {
+            self.newest = record.feedback.cycle.0;
+        }
+        let written = self.writer.write(&self.outputs.records);
+        written.map_err(|source| self.refused(run_folder::SAMPLES, source))
+    }
+
+    fn log_interval(&mut self) -> Result<(), FileError> {
+        let now = self.began.elapsed();
+        let (start, duration) = (self.log_began + self.logged, now - self.logged);
+        let written = self.stage.histograms_mut().write_interval(&mut self.log, start, duration);
+        self.logged = now;
+        written.map_err(|source| self.refused(run_folder::LATENCY, source))
+    }
+
+    fn refused(&self, name: &str, source: io::Error) -> FileError {
+        FileError { path: self.folder.file(name), source }
+    }
+
+    fn note(&self, progress: Progress, message: &str) -> WatchNote {
+        let (continuity, lost_commands) = (self.stage.continuity(), self.stage.lost_commands());
+        WatchNote {
+            stream: self.stream,
+            progress,
+            records: continuity.records,
+            lost: continuity.missing + lost_commands,
+            lost_commands,
+            gap_count: continuity.gaps,
+            gaps: continuity.list.clone(),
+            overruns_before: self.overruns_before,
+            message: message.to_owned(),
+        }
+    }
+
+    /// Whether the stream has ended and all its light has been told, or will not be: nothing was
+    /// played of a job that was taken back, or nothing more comes from controller or drives.
+    pub(super) fn is_over(&self, report: &ControllerReport, more_comes: bool) -> bool {
+        let ended = report.is_final == 1 && report.stream == self.stream;
+        let told = self.newest >= report.last_cycle.0.saturating_add(LIGHT_LAG);
+        self.closed
+            || (ended && told)
+            || (self.withdrawn && !self.played)
+            || ((ended || self.withdrawn) && !more_comes)
+    }
+
+    /// Ends it, and notes that it is complete.
+    ///
+    /// # Errors
+    /// A file that cannot be written, with its path; [`give_up`] must note it then.
+    pub(super) fn finish(&mut self) -> Result<(), FileError> {
+        self.stage.finish(&mut self.outputs);
+        self.write()?;
+        self.log_interval()?;
+        let flushed = self.writer.flush();
+        flushed.map_err(|source| self.refused(run_folder::SAMPLES, source))?;
+        let flushed = self.log.flush();
+        flushed.map_err(|source| self.refused(run_folder::LATENCY, source))?;
+        self.note(Progress::Complete, "").write(&self.folder)
+    }
+}
+
+/// Notes that a recording could not be written; what there is of it stays. Where the folder is gone
+/// nobody waits for it.
+///
+/// # Errors
+/// When whoever waits cannot be told by a file: the note that is there still says that the
+/// recording goes on.
+pub(super) fn give_up(
+    folder: &RunFolder,
+    stream: u64,
+    reason: &FileError,
+) -> Result<(), FileError> {
+    let note = WatchNote {
+        stream,
+        progress: Progress::Failed,
+        message: reason.to_string(),
+        ..WatchNote::default()
+    };
+    let written = note.write(folder).or_else(|_| note.overwrite(folder));
+    written.or_else(|error| match WatchNote::of(folder, stream) {
+        Some(left) if left.progress == Progress::Open => Err(error),
+        _ => Ok(()),
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,240 @@
+//! Recordings that end, that a successor goes on with, and that cannot be written.
+#![allow(clippy::unwrap_used)]
+
+use super::*;
+use crate::conclusion::RecordingState;
+use crate::recording::CycleRecord;
+use crate::recording::continuity::Gap;
+use crate::recording::file::RecordingReader;
+use signals::{Command, Cycle, Feedback, Nanoseconds};
+use std::io::BufReader;
+
+const STREAM: u64 = 5;
+
+/// Cycles `from..to`, answered for `stream`.
+fn taken(recording: &mut Recording, from: u64, to: u64, stream: u64) -> Result<(), FileError> {
+    let feedback = |cycle: u64| Feedback {
+        cycle: Cycle(cycle),
+        command_cycle: Cycle(cycle.saturating_sub(1)),
+        command_published: Nanoseconds(1),
+        ..Feedback::default()
+    };
+    let command =
+        |cycle: u64| Command { cycle: Cycle(cycle), stream, mode: 4, ..Command::default() };
+    let feedbacks: Vec<_> = (from..to).map(feedback).collect();
+    let commands: Vec<_> = (from..to).map(command).collect();
+    recording.take(&Inputs { feedbacks: &feedbacks, commands: &commands })
+}
+
+fn take(recording: &mut Recording, from: u64, to: u64, stream: u64) {
+    taken(recording, from, to, stream).unwrap();
+}
+
+fn final_report(stream: u64, last: u64) -> ControllerReport {
+    let last_cycle = Cycle(last);
+    ControllerReport { stream, is_final: 1, last_cycle, ..ControllerReport::default() }
+}
+
+fn folder(below: &tempfile::TempDir) -> RunFolder {
+    RunFolder::create_at(below.path()).unwrap()
+}
+
+fn begin(below: &tempfile::TempDir) -> Recording {
+    Recording::begin(STREAM, folder(below), 0).unwrap()
+}
+
+fn cycles(folder: &RunFolder) -> Vec<u64> {
+    let file = File::open(folder.file(run_folder::SAMPLES)).unwrap();
+    let reader = RecordingReader::new(BufReader::new(file)).unwrap();
+    reader.map(|record| record.unwrap().feedback.cycle.0).collect()
+}
+
+#[test]
+fn a_recording_is_over_when_its_last_light_is_told() {
+    let below = tempfile::tempdir().unwrap();
+    let mut recording = begin(&below);
+    take(&mut recording, 100, 202, STREAM);
+    // The newest cycle is 201.
+    assert!(!recording.is_over(&ControllerReport::default(), true));
+    assert!(!recording.is_over(&final_report(STREAM - 1, 150), true));
+    assert!(!recording.is_over(&final_report(STREAM, 200), true));
+    assert!(recording.is_over(&final_report(STREAM, 199), true));
+    // With drives dead, the cycles that are missing will not come.
+    assert!(recording.is_over(&final_report(STREAM, 200), false));
+    assert!(!recording.is_over(&ControllerReport::default(), false));
+}
+
+#[test]
+fn a_job_taken_back_is_recorded_until_its_axes_rest() {
+    let below = tempfile::tempdir().unwrap();
+    let mut recording = begin(&below);
+    take(&mut recording, 0, 10, 0);
+    recording.withdrawn = true;
+    // Nothing of it was played.
+    assert!(recording.is_over(&ControllerReport::default(), true));
+    take(&mut recording, 10, 20, STREAM);
+    assert!(!recording.is_over(&ControllerReport::default(), true));
+    assert!(!recording.is_over(&final_report(STREAM, 18), true));
+    take(&mut recording, 20, 21, 0);
+    assert!(recording.is_over(&final_report(STREAM, 18), true));
+    assert!(recording.is_over(&ControllerReport::default(), false));
+}
+
+#[test]
+fn the_note_tells_how_the_recording_stands_and_counts_what_is_in_the_file() {
+    let below = tempfile::tempdir().unwrap();
+    let mut recording = begin(&below);
+    let folder = folder(&below);
+    assert!(cycles(&folder).is_empty(), "the empty recording is one already");
+    // One look after a second away, and one that comes too late for three samples.
+    take(&mut recording, 0, 1000, STREAM);
+    assert_eq!(RecordingState::of(&folder, STREAM), RecordingState::Open);
+    take(&mut recording, 1003, 1500, STREAM);
+    let gaps = vec![Gap { first: 1000, last: 1002 }];
+    let open = WatchNote::read(&folder).unwrap();
+    assert_eq!((open.progress, open.lost, &open.gaps), (Progress::Open, 3, &gaps));
+    recording.finish().unwrap();
+    let note = WatchNote {
+        stream: STREAM,
+        records: 1497,
+        lost: 3,
+        gap_count: 1,
+        gaps,
+        ..WatchNote::default()
+    };
+    assert_eq!(RecordingState::of(&folder, STREAM), RecordingState::Complete(note));
+    assert_eq!(cycles(&folder).len(), 1497);
+}
+
+#[test]
+fn a_successor_goes_on_with_the_recording_and_counts_the_gap() {
+    // Killed before anything was written, between two records, and inside one.
+    for torn in [0, 1, size_of::<CycleRecord>() as u64 - 1] {
+        let below = tempfile::tempdir().unwrap();
+        let folder = folder(&below);
+        let mut first = Recording::begin(STREAM, folder.clone(), 7).unwrap();
+        take(&mut first, 0, 100, STREAM);
+        take(&mut first, 110, 200, STREAM);
+        first.writer.flush().unwrap();
+        drop(first);
+        let samples = File::options().write(true).open(folder.file(run_folder::SAMPLES)).unwrap();
+        samples.set_len(samples.metadata().unwrap().len() - torn).unwrap();
+        let kept = if torn == 0 { 200 } else { 199 };
+
+        let mut second = Recording::begin(STREAM, folder.clone(), 99).unwrap();
+        assert_eq!((second.overruns_before, second.played), (7, true));
+        take(&mut second, 300, 400, STREAM);
+        second.finish().unwrap();
+        let expect: Vec<u64> = (0..100).chain(110..kept).chain(300..400).collect();
+        assert_eq!(cycles(&folder), expect);
+        let RecordingState::Complete(note) = RecordingState::of(&folder, STREAM) else { panic!() };
+        let gaps = vec![Gap { first: 100, last: 109 }, Gap { first: kept, last: 299 }];
+        assert_eq!((note.records, note.gap_count), (expect.len() as u64, 2));
+        assert_eq!((note.lost, note.gaps), (10 + 300 - kept, gaps));
+        let log = std::fs::read_to_string(folder.file(run_folder::LATENCY)).unwrap();
+        assert_eq!(log.matches("#[StartTime").count(), 1, "one log: {log}");
+    }
+}
+
+#[test]
+fn a_recording_of_another_job_is_not_gone_on_with() {
+    let below = tempfile::tempdir().unwrap();
+    let folder = folder(&below);
+    let mut first = Recording::begin(STREAM - 1, folder.clone(), 0).unwrap();
+    take(&mut first, 0, 100, STREAM - 1);
+    first.writer.flush().unwrap();
+    let mut second = begin(&below);
+    take(&mut second, 300, 310, STREAM);
+    second.finish().unwrap();
+    assert_eq!(cycles(&folder), (300..310).collect::<Vec<_>>());
+    assert_eq!(WatchNote::read(&folder).unwrap().gap_count, 0);
+}
+
+#[test]
+fn a_note_whose_samples_are_gone_begins_them_anew() {
+    let below = tempfile::tempdir().unwrap();
+    drop(begin(&below));
+    let folder = folder(&below);
+    std::fs::remove_file(folder.file(run_folder::SAMPLES)).unwrap();
+    let mut recording = begin(&below);
+    take(&mut recording, 3, 5, STREAM);
+    recording.finish().unwrap();
+    assert_eq!(cycles(&folder), [3, 4]);
+}
+
+#[test]
+fn a_file_that_is_no_recording_is_refused_by_its_name() {
+    let below = tempfile::tempdir().unwrap();
+    drop(begin(&below));
+    let samples = folder(&below).file(run_folder::SAMPLES);
+    std::fs::write(&samples, vec![7; 5000]).unwrap();
+    let error = Recording::begin(STREAM, folder(&below), 0).err().unwrap().to_string();
+    assert!(error.contains("samples.bin: not a recording"), "{error}");
+}
+
+/// A recording whose samples go to a device that is always full.
+fn on_a_full_disk(below: &tempfile::TempDir) -> Recording {
+    let samples = folder(below).file(run_folder::SAMPLES);
+    let _ = std::fs::remove_file(&samples);
+    std::os::unix::fs::symlink("/dev/full", &samples).unwrap();
+    let mut recording = begin_elsewhere(below);
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    recording.writer = RecordingWriter::append(BufWriter::new(full));
+    recording
+}
+
+/// A recording whose files are elsewhere, but whose note is in the folder.
+fn begin_elsewhere(below: &tempfile::TempDir) -> Recording {
+    let elsewhere = tempfile::tempdir().unwrap();
+    let mut recording = begin(&elsewhere);
+    recording.folder = folder(below);
+    recording.note(Progress::Open, "").write(&recording.folder).unwrap();
+    recording
+}
+
+#[test]
+fn a_full_disk_ends_the_recording_with_a_reason_and_not_the_monitor() {
+    let below = tempfile::tempdir().unwrap();
+    let folder = folder(&below);
+    let mut recording = on_a_full_disk(&below);
+    let error = taken(&mut recording, 0, 100, STREAM).unwrap_err();
+    assert!(error.to_string().contains("samples.bin: No space left"), "{error}");
+    give_up(&folder, STREAM, &error).unwrap();
+    assert_eq!(RecordingState::of(&folder, STREAM), RecordingState::Failed(error.to_string()));
+    // What is small enough for the buffer is told at the end.
+    let mut recording = on_a_full_disk(&below);
+    taken(&mut recording, 0, 1, STREAM).unwrap();
+    assert!(recording.finish().unwrap_err().to_string().contains("samples.bin: No space left"));
+}
+
+#[test]
+fn a_vanished_folder_ends_the_recording_and_nobody_waits_for_it() {
+    let below = tempfile::tempdir().unwrap();
+    let place = RunFolder::create_at(&below.path().join("run")).unwrap();
+    let mut recording = Recording::begin(STREAM, place.clone(), 0).unwrap();
+    take(&mut recording, 0, 100, STREAM);
+    std::fs::remove_dir_all(place.path()).unwrap();
+    let error = recording.finish().unwrap_err();
+    assert!(error.to_string().contains("run/monitor.json: No such file"), "{error}");
+    give_up(&place, STREAM, &error).unwrap();
+    assert_eq!(RecordingState::of(&place, STREAM), RecordingState::Absent);
+    assert!(!place.path().exists());
+    let error = Recording::begin(STREAM, place, 0).err().unwrap();
+    assert!(error.to_string().contains("run/monitor.json: No such file"), "{error}");
+}
+
+#[test]
+fn where_the_note_cannot_be_written_only_one_that_says_open_is_waited_for() {
+    let below = tempfile::tempdir().unwrap();
+    let folder = folder(&below);
+    let source = io::ErrorKind::StorageFull.into();
+    let reason = FileError { path: "samples.bin".into(), source };
+    // Over a folder of its name no file can be renamed, and it cannot be written into.
+    std::fs::create_dir(folder.file(run_folder::WATCH)).unwrap();
+    give_up(&folder, STREAM, &reason).unwrap();
+    assert_eq!(RecordingState::of(&folder, STREAM), RecordingState::Absent);
+    std::fs::remove_dir(folder.file(run_folder::WATCH)).unwrap();
+    drop(begin(&below));
+    give_up(&folder, STREAM, &reason).unwrap();
+    assert!(matches!(RecordingState::of(&folder, STREAM), RecordingState::Failed(_)));
+}
