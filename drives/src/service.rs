@@ -57,7 +57,7 @@ pub fn run(
     let mut cycle = ServiceCycle::open(domain, port, options)?;
     // What was refused is in the facts, which travel with the reports to the summary.
     let realtime = thread::enter_realtime(&options.realtime);
-    let _core = realtime.claim_core().map_err(std::io::Error::other)?;
+    let _core = realtime.claim_core()?;
     let result = cycle.keep_running(realtime.spin_margin(), realtime.facts);
     cycle.bridge.release();
     result

@@ -130,7 +130,8 @@ impl Service {
             }
             return Ok(());
         };
-        let folder = RunFolder::create_at(Path::new(folder))?;
+        let folder = RunFolder::create_at(Path::new(folder))
+            .map_err(|source| ServiceError::io(folder, source))?;
         // A restarted monitor is offered the newest job again, even one that is long over.
         let finished = self.controller.is_final == 1 && self.controller.stream >= offer.stream;
         if finished || WatchNote::read(&folder).is_some_and(|note| note.stream == offer.stream) {
@@ -171,21 +172,26 @@ impl Service {
         let is_final = self.controller.is_final == 1 && self.controller.stream == stream;
         ending.controller = is_final.then_some(self.controller);
         ending.drives = self.drives;
-        conclusion::conclude(&folder, machine, &ending, began)?;
-        Ok(())
+        conclusion::conclude(&folder, machine, &ending, began)
+            .map(drop)
+            .map_err(|source| ServiceError::io(folder.path(), source))
     }
 }
 
 impl Recording {
     fn begin(stream: u64, folder: RunFolder, overruns_before: u64) -> Result<Self, ServiceError> {
-        let samples = BufWriter::new(File::create(folder.file(run_folder::SAMPLES))?);
-        let log = BufWriter::new(File::create(folder.file(run_folder::LATENCY))?);
+        let create = |name: &str| {
+            File::create(folder.file(name)).map(BufWriter::new).map_err(failed(&folder, name))
+        };
+        let samples = create(run_folder::SAMPLES)?;
+        let log = create(run_folder::LATENCY)?;
         Ok(Self {
             stream,
             stage: MonitorStage::new(),
             outputs: Outputs::default(),
-            writer: RecordingWriter::new(samples)?,
-            log: IntervalLog::new(log, SystemTime::now())?,
+            writer: RecordingWriter::new(samples).map_err(failed(&folder, run_folder::SAMPLES))?,
+            log: IntervalLog::new(log, SystemTime::now())
+                .map_err(failed(&folder, run_folder::LATENCY))?,
             began: Instant::now(),
             logged: Duration::ZERO,
             records: 0,
@@ -212,14 +218,16 @@ impl Recording {
         if let Some(record) = self.outputs.records.last() {
             self.newest = record.feedback.cycle.0;
         }
-        self.writer.write(&self.outputs.records)?;
-        Ok(())
+        let written = self.writer.write(&self.outputs.records);
+        written.map_err(failed(&self.folder, run_folder::SAMPLES))
     }
 
     fn log_interval(&mut self) -> Result<(), ServiceError> {
         let now = self.began.elapsed();
         let duration = now - self.logged;
-        self.stage.histograms_mut().write_interval(&mut self.log, self.logged, duration)?;
+        let written =
+            self.stage.histograms_mut().write_interval(&mut self.log, self.logged, duration);
+        written.map_err(failed(&self.folder, run_folder::LATENCY))?;
         self.logged = now;
         Ok(())
     }
@@ -238,13 +246,20 @@ impl Recording {
         self.stage.finish(&mut self.outputs);
         self.write()?;
         self.log_interval()?;
-        self.writer.finish()?.flush()?;
-        self.log.finish()?.flush()?;
+        let written = self.writer.finish().and_then(|mut file| file.flush());
+        written.map_err(failed(&self.folder, run_folder::SAMPLES))?;
+        let written = self.log.finish().and_then(|mut file| file.flush());
+        written.map_err(failed(&self.folder, run_folder::LATENCY))?;
         let note =
             WatchNote { stream: self.stream, records: self.records, lost: self.stage.lost() };
-        note.write(&self.folder)?;
-        Ok(())
+        note.write(&self.folder).map_err(|source| ServiceError::io(self.folder.path(), source))
     }
+}
+
+/// What failed about one of the run folder's files.
+fn failed(folder: &RunFolder, name: &str) -> impl FnOnce(std::io::Error) -> ServiceError {
+    let path = folder.file(name);
+    |source| ServiceError::io(path, source)
 }
 
 #[cfg(test)]

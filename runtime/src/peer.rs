@@ -16,6 +16,7 @@ use crossbeam::queue::ArrayQueue;
 use crate::domain::{Domain, Role};
 use crate::instance::Instance;
 use crate::membership;
+use crate::service::ServiceError;
 
 /// How often the searching thread of [`Peers`] looks for a peer that is missing.
 const SEARCH_PERIOD: Duration = Duration::from_millis(20);
@@ -126,7 +127,10 @@ pub struct Peers {
 impl Peers {
     /// Starts watching the processes with these roles in the domain. Call it before the thread
     /// becomes real-time.
-    pub fn watch(domain: &Domain, roles: &[Role]) -> io::Result<Self> {
+    ///
+    /// # Errors
+    /// [`ServiceError::Thread`] when the searching thread could not be started.
+    pub fn watch(domain: &Domain, roles: &[Role]) -> Result<Self, ServiceError> {
         let instance = domain.instance().clone();
         let stop = Arc::new(AtomicBool::new(false));
         let mut searches = Vec::new();
@@ -152,7 +156,10 @@ impl Peers {
                 std::thread::park_timeout(SEARCH_PERIOD);
             }
         };
-        let thread = std::thread::Builder::new().name("peers".into()).spawn(search)?;
+        let thread = std::thread::Builder::new()
+            .name("peers".into())
+            .spawn(search)
+            .map_err(|source| ServiceError::thread("peers", source))?;
         Ok(Self { watched, stop, thread: Some(thread) })
     }
 

@@ -48,10 +48,7 @@ pub fn install() -> io::Result<()> {
 
 /// Sets the action of a signal, if one is given, and tells the one before. Handlers given here
 /// must be async-signal-safe.
-fn exchange(
-    signal: libc::c_int,
-    action: Option<&libc::sigaction>,
-) -> io::Result<libc::sigaction> {
+fn exchange(signal: libc::c_int, action: Option<&libc::sigaction>) -> io::Result<libc::sigaction> {
     let new = action.map_or(std::ptr::null(), std::ptr::from_ref);
     // SAFETY: all zeros is a valid sigaction, which the kernel overwrites.
     #[allow(unsafe_code)]

@@ -5,8 +5,8 @@ use crate::arguments::{DrivesArguments, DrivesKind};
 use crate::exit::Failure;
 use crate::inputs::MachineSource;
 use drives::Deadlines;
-use runtime::Instance;
 use runtime::thread::{Placement, RealtimeOptions, last_core};
+use runtime::{Instance, ServiceError};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -62,17 +62,23 @@ impl Configuration {
     /// Writes it into the domain's root.
     ///
     /// # Errors
-    /// Whatever the operating system reports.
-    pub fn write(&self, instance: &Instance) -> std::io::Result<()> {
-        std::fs::write(path(instance), serde_json::to_vec(self)?)
+    /// Names the file and what the operating system reports.
+    pub fn write(&self, instance: &Instance) -> Result<(), ServiceError> {
+        let path = path(instance);
+        let text = serde_json::to_vec(self).map_err(std::io::Error::other);
+        text.and_then(|text| std::fs::write(&path, text))
+            .map_err(|source| ServiceError::io(path, source))
     }
 
     /// Reads what the domain's holder wrote.
     ///
     /// # Errors
-    /// Whatever the operating system reports.
-    pub fn read(instance: &Instance) -> std::io::Result<Self> {
-        Ok(serde_json::from_slice(&std::fs::read(path(instance))?)?)
+    /// Names the file and what the operating system reports, or what is wrong in it.
+    pub fn read(instance: &Instance) -> Result<Self, ServiceError> {
+        let path = path(instance);
+        let text = std::fs::read(&path);
+        text.and_then(|text| Ok(serde_json::from_slice(&text)?))
+            .map_err(|source| ServiceError::io(path, source))
     }
 
     /// Whether the clock may slip.

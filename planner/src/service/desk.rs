@@ -9,6 +9,7 @@ use machine::kinematics::{Joints, KinematicsError};
 use machine::transmission::rest;
 use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea};
 use nalgebra::Vector3;
+use runtime::ServiceError;
 use signals::axis::axis_array;
 use signals::{AxisArray, run_folder};
 use std::path::Path;
@@ -44,8 +45,11 @@ pub(super) fn plan_request(
     standing: Option<&AxisArray>,
     abandoned: &AtomicBool,
 ) -> Result<Plan, Refusal> {
-    let text = std::fs::read(folder.join(run_folder::REQUEST)).map_err(Refusal::internal)?;
-    let request: JobRequest = serde_json::from_slice(&text).map_err(Refusal::internal)?;
+    let path = folder.join(run_folder::REQUEST);
+    let text = std::fs::read(&path)
+        .map_err(|source| Refusal::internal(ServiceError::io(&path, source)))?;
+    let request: JobRequest = serde_json::from_slice(&text)
+        .map_err(|error| Refusal::internal(format!("{path:?}: {error}")))?;
     let mut job = request.read(machine)?;
     if let Some(standing) = standing {
         approach(&mut job, machine, standing).map_err(Refusal::internal)?;
@@ -66,9 +70,13 @@ pub(super) fn write_refusal(folder: &Path, refusal: &Refusal) {
     }
 }
 
-fn write_plan(folder: &Path, plan: &Plan) -> std::io::Result<()> {
+fn write_plan(folder: &Path, plan: &Plan) -> Result<(), ServiceError> {
     let write = |name: &str, content: serde_json::Result<Vec<u8>>| {
-        std::fs::write(folder.join(name), content.map_err(std::io::Error::other)?)
+        let path = folder.join(name);
+        let content = content.map_err(std::io::Error::other);
+        content
+            .and_then(|content| std::fs::write(&path, content))
+            .map_err(|source| ServiceError::io(path, source))
     };
     write(run_folder::ARTWORK, serde_json::to_vec(&plan.artwork))?;
     write(run_folder::PLAN, serde_json::to_vec_pretty(&plan.facts))
