@@ -22,6 +22,7 @@ mod lock;
 mod membership;
 pub mod operator;
 pub mod peer;
+pub mod room;
 pub mod service;
 pub mod signal;
 pub mod socket;

@@ -8,6 +8,9 @@ use drives::Deadlines;
 use runtime::thread::{Placement, RealtimeOptions, last_core};
 use runtime::{Instance, ServiceError};
 use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::Write;
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::PathBuf;
 
 const FILE: &str = "configuration.json";
@@ -66,8 +69,11 @@ impl Configuration {
     pub fn write(&self, instance: &Instance) -> Result<(), ServiceError> {
         let path = path(instance);
         let text = serde_json::to_vec(self).map_err(std::io::Error::other);
-        text.and_then(|text| std::fs::write(&path, text))
-            .map_err(|source| ServiceError::io(path, source))
+        let create = |text: Vec<u8>| {
+            let mut file = File::options();
+            file.write(true).create(true).truncate(true).mode(0o600).open(&path)?.write_all(&text)
+        };
+        text.and_then(create).map_err(|source| ServiceError::io(path, source))
     }
 
     /// Reads what the domain's holder wrote.

@@ -91,6 +91,9 @@ impl Pipeline {
         configuration: Configuration,
         starter: Starter,
     ) -> Result<Self, Failure> {
+        for warning in instance.warnings() {
+            eprintln!("graver: {warning}");
+        }
         let domain = Domain::create(instance).map_err(Failure::service)?;
         configuration.write(instance).map_err(Failure::service)?;
         let ears = Ears {
