@@ -17,6 +17,7 @@ use runtime::thread::{self, RealtimeOptions};
 use runtime::wake::{Listener, Notifier, Wake};
 use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, signal};
 use signals::feedback::status;
+use signals::report::refused;
 use signals::time::CYCLE_PERIOD;
 use signals::{Command, DrivesReport, FaultCode, Feedback, Nanoseconds, RealtimeFacts};
 
@@ -56,8 +57,15 @@ pub fn run(
 ) -> Result<(), ServiceError> {
     let mut cycle = ServiceCycle::open(domain, port, options)?;
     // What was refused is in the facts, which travel with the reports to the summary.
-    let realtime = thread::enter_realtime(&options.realtime);
-    let _core = realtime.claim_core().map_err(std::io::Error::other)?;
+    let mut realtime = thread::enter_realtime(&options.realtime);
+    let core = realtime.claim_core()?;
+    if core.as_ref().is_some_and(|core| core.squatter().is_some()) {
+        // A person who starts drives by hand has no summary to look at.
+        let facts = RealtimeFacts { refused: refused::CLAIM, ..realtime.facts };
+        thread::missing(&[("drives", facts)])
+            .iter()
+            .for_each(|warning| eprintln!("graver: drives: {warning}"));
+    }
     let result = cycle.keep_running(realtime.spin_margin(), realtime.facts);
     cycle.bridge.release();
     result

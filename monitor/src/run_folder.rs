@@ -1,9 +1,12 @@
 //! The run folder: `runs/DATE-TIME-JOB`; [`signals::run_folder`] names the files in it.
+//!
+//! A folder made here is its user's alone. One that was there before keeps its mode.
 
 use serde::Serialize;
 use signals::run_folder;
 use std::fs;
 use std::io;
+use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -62,7 +65,20 @@ impl RunFolder {
     /// # Errors
     /// What the operating system reports, with the path.
     pub fn create_at(path: &Path) -> Result<Self, FileError> {
-        fs::create_dir_all(path).map_err(FileError::at(path))?;
+        let create = || {
+            if path.is_dir() {
+                return Ok(());
+            }
+            path.parent().map_or(Ok(()), fs::create_dir_all)?;
+            match create_private(path) {
+                // Somebody else made it just now.
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && path.is_dir() => {
+                    Ok(())
+                }
+                other => other,
+            }
+        };
+        create().map_err(FileError::at(path))?;
         Ok(Self { path: path.to_owned() })
     }
 
@@ -83,7 +99,7 @@ impl RunFolder {
         let mut path = runs.join(name);
         let mut number = 1;
         loop {
-            match fs::create_dir(&path) {
+            match create_private(&path) {
                 Ok(()) => return Ok(Self { path }),
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
                     number += 1;
@@ -172,6 +188,12 @@ impl RunFolder {
     }
 }
 
+/// Creates a directory that is its user's alone, whatever the process's mask takes away.
+fn create_private(path: &Path) -> io::Result<()> {
+    fs::DirBuilder::new().mode(0o700).create(path)?;
+    fs::set_permissions(path, fs::Permissions::from_mode(0o700))
+}
+
 /// A job's name as part of a file name: letters, digits, points, dashes.
 fn file_name(job: &str) -> String {
     let mut name = String::new();
@@ -214,6 +236,29 @@ mod tests {
         second.write(run_folder::SUMMARY, "{}").unwrap();
         assert_eq!(fs::read_to_string(second.file(run_folder::SUMMARY)).unwrap(), "{}");
         assert_eq!(fs::read_dir(second.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_new_folder_is_its_users_alone_and_one_that_was_there_keeps_its_mode() {
+        let below = tempfile::tempdir().unwrap();
+        let mode = |folder: &Path| fs::metadata(folder).unwrap().permissions().mode() & 0o777;
+        let dated = RunFolder::create_below(below.path(), "letters").unwrap();
+        assert_eq!(mode(dated.path()), 0o700);
+        let named = below.path().join("archive/one");
+        assert_eq!(mode(RunFolder::create_at(&named).unwrap().path()), 0o700);
+
+        fs::set_permissions(&named, fs::Permissions::from_mode(0o755)).unwrap();
+        assert_eq!(mode(RunFolder::create_at(&named).unwrap().path()), 0o755);
+    }
+
+    #[test]
+    fn a_file_in_the_place_of_a_folder_is_an_error() {
+        let below = tempfile::tempdir().unwrap();
+        let place = below.path().join("notes.txt");
+        fs::write(&place, "mine").unwrap();
+        let error = RunFolder::create_at(&place).unwrap_err();
+        assert_eq!(error.source.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(fs::read_to_string(&place).unwrap(), "mine");
     }
 
     #[test]

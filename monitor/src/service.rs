@@ -209,8 +209,8 @@ impl Service {
 fn refuse(folder: &RunFolder, stream: u64, error: &FileError) -> Result<(), ServiceError> {
     tell(&format!("monitor: this job is not recorded any further: {error}"));
     // Where not even that can be written, the end of this process says it.
-    recording::give_up(folder, stream, error).map_err(std::io::Error::from)?;
-    Ok(())
+    recording::give_up(folder, stream, error)
+        .map_err(|FileError { path, source }| ServiceError::io(path, source))
 }
 
 #[cfg(test)]

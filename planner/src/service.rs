@@ -243,7 +243,7 @@ impl Service {
                     Err(TryRecvError::Disconnected) => {
                         let (sent, all) = (self.report.sent, self.report.samples);
                         let message = format!("sampling ended after {sent} of {all} setpoints");
-                        return Err(std::io::Error::other(message).into());
+                        return Err(ServiceError::Work(message));
                     }
                 };
             setpoint.published = clock::now();
@@ -279,6 +279,7 @@ impl Service {
 }
 
 /// Starts a thread that ends by itself when nobody listens to it.
-fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
-    std::thread::Builder::new().name(name.to_owned()).spawn(work).map(drop)
+fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> Result<(), ServiceError> {
+    let thread = std::thread::Builder::new().name(name.to_owned()).spawn(work);
+    thread.map(drop).map_err(|source| ServiceError::thread(name, source))
 }

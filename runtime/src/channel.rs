@@ -10,8 +10,10 @@ use std::marker::PhantomData;
 use iceoryx2::node::Node;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{
-    AttributeSpecifier, AttributeVerifier, BackpressureStrategy, ZeroCopySend, ipc,
+    AttributeSpecifier, AttributeVerifier, BackpressureStrategy, CallbackProgression, ZeroCopySend,
+    ipc,
 };
+use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use signals::{
     Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress, Sample,
@@ -19,6 +21,7 @@ use signals::{
 };
 
 use crate::domain::{Domain, Keep};
+use crate::room::{RoomError, need};
 
 /// How long a reader of [`Reading::Every`] may be away from a 1 kHz channel without a loss, in
 /// samples.
@@ -29,6 +32,9 @@ pub const SETPOINTS_UNDER_WAY: usize = 2048;
 
 /// Samples of a status channel that wait for a reader who looks a few times a second.
 const STATUS_DEPTH: usize = 64;
+
+/// Samples that a reader can have in its hands at once.
+pub(crate) const BORROWED: usize = 2;
 
 /// How a channel treats a reader that does not keep up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,16 +60,22 @@ pub trait Channel: Sample {
     const QUALITY: Quality;
     /// How many readers there can be.
     const READERS: usize = 4;
+    /// How many of them can be of [`Reading::Every`]; the publisher has memory for no more.
+    const DEEP_READERS: usize = Self::READERS;
 }
 
 impl Channel for Feedback {
     const SERVICE: &'static str = "feedback";
     const QUALITY: Quality = Quality::Newest { depth: DEEP };
+    // The monitor, and who measures beside it.
+    const DEEP_READERS: usize = 2;
 }
 
 impl Channel for Command {
     const SERVICE: &'static str = "commands";
     const QUALITY: Quality = Quality::Newest { depth: DEEP };
+    // As of feedback.
+    const DEEP_READERS: usize = 2;
 }
 
 impl Channel for Setpoint {
@@ -120,6 +132,17 @@ pub enum ChannelError {
         /// What iceoryx2 said.
         reason: String,
     },
+    /// All readers of every sample that the channel has memory for are there.
+    #[error("channel {channel:?} has {readers} readers of every sample already, and no more fit")]
+    Crowded {
+        /// The channel.
+        channel: &'static str,
+        /// How many there can be.
+        readers: usize,
+    },
+    /// There is no room for it in shared memory.
+    #[error(transparent)]
+    Room(#[from] RoomError),
     /// The channel went away between joining and opening.
     #[error("channel {channel:?} is gone: the holder of the domain has ended")]
     Gone {
@@ -160,7 +183,7 @@ unsafe impl<T: Sample> ZeroCopySend for Wire<T> {
 /// The publisher's count of samples, from 1, beside each sample.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(transparent)]
-struct Serial(u64);
+pub(crate) struct Serial(u64);
 
 // SAFETY: a transparent u64.
 #[allow(unsafe_code)]
@@ -192,12 +215,20 @@ macro_rules! attribute {
     }};
 }
 
+/// How many samples a late joiner gets.
+pub(crate) const fn history<T: Channel>() -> usize {
+    match T::QUALITY {
+        Quality::Newest { .. } => 1,
+        Quality::Complete { .. } => 0,
+    }
+}
+
 pub(crate) fn create<T: Channel>(
     node: &Node<ipc::Service>,
 ) -> Result<Box<dyn Any + Send + Sync>, ChannelError> {
-    let (overflow, history, depth) = match T::QUALITY {
-        Quality::Newest { depth } => (true, 1, depth),
-        Quality::Complete { depth } => (false, 0, depth),
+    let (overflow, depth) = match T::QUALITY {
+        Quality::Newest { depth } => (true, depth),
+        Quality::Complete { depth } => (false, depth),
     };
     let name = T::SERVICE.try_into().map_err(refused::<T>)?;
     let factory = node
@@ -205,9 +236,9 @@ pub(crate) fn create<T: Channel>(
         .publish_subscribe::<Wire<T>>()
         .user_header::<Serial>()
         .enable_safe_overflow(overflow)
-        .history_size(history)
+        .history_size(history::<T>())
         .subscriber_max_buffer_size(depth)
-        .subscriber_max_borrowed_samples(2)
+        .subscriber_max_borrowed_samples(BORROWED)
         .max_publishers(1)
         .max_subscribers(T::READERS)
         .max_nodes(16)
@@ -234,6 +265,29 @@ fn open<T: Channel>(domain: &Domain) -> Result<Factory<T>, ChannelError> {
         })
 }
 
+/// Whether one more reader of every sample fits; those of dead processes do not count.
+fn admit_deep_reader<T: Channel>(
+    domain: &Domain,
+    factory: &Factory<T>,
+) -> Result<(), ChannelError> {
+    let readers = || {
+        let mut deep = 0;
+        factory.dynamic_config().list_subscribers(|subscriber| {
+            deep += usize::from(subscriber.buffer_size > 1);
+            CallbackProgression::Continue
+        });
+        deep
+    };
+    if readers() < T::DEEP_READERS {
+        return Ok(());
+    }
+    domain.clean();
+    match readers() {
+        deep if deep < T::DEEP_READERS => Ok(()),
+        readers => Err(ChannelError::Crowded { channel: T::SERVICE, readers }),
+    }
+}
+
 /// The writing end of a channel.
 #[derive(Debug)]
 pub struct Publisher<T: Channel> {
@@ -245,13 +299,16 @@ pub struct Publisher<T: Channel> {
 impl<T: Channel> Publisher<T> {
     pub(crate) fn open(domain: &Domain) -> Result<Self, ChannelError> {
         let factory = open::<T>(domain)?;
-        let port = factory
+        let builder = factory
             .publisher_builder()
             .max_loaned_samples(1)
+            // iceoryx2 would take every reader for one of every sample.
+            .override_sample_preallocation(|_| need::samples::<T>())
             // The default would wait for a reader that stands still.
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(refused::<T>)?;
+            .backpressure_strategy(BackpressureStrategy::DiscardData);
+        let port = domain
+            .room()
+            .open(need::publisher::<T>(), || builder.create().map_err(refused::<T>))?;
         Ok(Self { port, serial: 0, _keep: domain.keep() })
     }
 
@@ -299,20 +356,21 @@ pub struct Subscriber<T: Channel> {
 impl<T: Channel> Subscriber<T> {
     pub(crate) fn open(domain: &Domain, reading: Reading) -> Result<Self, ChannelError> {
         let factory = open::<T>(domain)?;
-        let (depth, history) = match T::QUALITY {
-            Quality::Newest { depth } => (depth, 1),
-            Quality::Complete { depth } => (depth, 0),
+        let depth = match T::QUALITY {
+            Quality::Newest { depth } | Quality::Complete { depth } => depth,
         };
         let size = match reading {
             Reading::Newest => 1,
             Reading::Every => depth,
         };
-        let port = factory
-            .subscriber_builder()
-            .buffer_size(size)
-            .history_request(history)
-            .create()
-            .map_err(refused::<T>)?;
+        let builder =
+            factory.subscriber_builder().buffer_size(size).history_request(history::<T>());
+        let port = domain.room().open(need::subscriber::<T>(size), || {
+            if size > 1 {
+                admit_deep_reader(domain, &factory)?;
+            }
+            builder.create().map_err(refused::<T>)
+        })?;
         let keep = domain.keep();
         Ok(Self { port, origin: None, serial: 0, lost: 0, _sample: PhantomData, _keep: keep })
     }

@@ -22,10 +22,11 @@ use signals::{
 };
 
 use crate::channel::{self, Channel, ChannelError, Publisher, Reading, Subscriber};
-use crate::instance::Instance;
+use crate::instance::{Instance, SHARED_MEMORY};
 use crate::membership::{self, Membership};
 use crate::operator;
 use crate::peer::Peer;
+use crate::room::{self, Room, RoomError, need};
 use crate::wake::{self, Listener, Notifier, Wake};
 
 /// How long a service waits for its domain to appear: units start at the same time.
@@ -111,14 +112,17 @@ pub enum DomainError {
         /// The process that has it; 0 if it could not be told.
         pid: i32,
     },
-    /// The run directory belongs to somebody else.
-    #[error(
-        "{directory:?} belongs to another user; set XDG_RUNTIME_DIR to a directory of your own"
-    )]
+    /// Somebody else has taken the name of the run directory.
+    #[error("{directory:?} {what}; start again, or set XDG_RUNTIME_DIR to a directory of your own")]
     Foreign {
         /// The directory.
         directory: PathBuf,
+        /// What stands there, in words that go on after its name.
+        what: String,
     },
+    /// There is no room in shared memory.
+    #[error(transparent)]
+    Room(#[from] RoomError),
     /// The operating system refused.
     #[error("{path:?}: {source}")]
     Io {
@@ -156,26 +160,23 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Takes the instance, wipes what the dead left in it, and creates every channel.
+    /// Takes the instance, wipes what the dead left in it, takes the shared memory that the whole
+    /// pipeline needs, and creates every channel.
     ///
     /// # Errors
-    /// [`DomainError::InUse`] with a pid while anybody in the instance is alive.
+    /// [`DomainError::InUse`] with a pid while anybody in the instance is alive;
+    /// [`DomainError::Room`] with what is needed and what is free where the pipeline does not fit.
+    /// Nothing is left behind then.
     pub fn create(instance: &Instance) -> Result<Self, DomainError> {
         let membership = Arc::new(Membership::found(instance)?);
-        let node = create_node(instance, Role::Domain)?;
-        let held = vec![
-            channel::create::<Feedback>(&node)?,
-            channel::create::<MotorCommand>(&node)?,
-            channel::create::<Setpoint>(&node)?,
-            channel::create::<Progress>(&node)?,
-            channel::create::<ControllerReport>(&node)?,
-            channel::create::<DrivesReport>(&node)?,
-            channel::create::<PlannerReport>(&node)?,
-            channel::create::<JobOffer>(&node)?,
-            wake::create(&node, Wake::Feedback)?,
-            wake::create(&node, Wake::Command)?,
-            operator::create(&node)?,
-        ];
+        membership.room().found()?;
+        let create = || -> Result<_, DomainError> {
+            let node = create_node(&membership, Role::Domain)?;
+            membership.close_to_others()?;
+            let held = create_services(&node)?;
+            Ok((node, held))
+        };
+        let (node, held) = membership.room().open(need::holder() + need::node(), create)?;
         membership.open()?;
         Ok(Self { held, node: Rc::new(node), role: Role::Domain, membership })
     }
@@ -206,7 +207,8 @@ impl Domain {
     }
 
     fn with_membership(membership: Arc<Membership>, role: Role) -> Result<Self, DomainError> {
-        let node = create_node(membership.instance(), role)?;
+        let create = || create_node(&membership, role);
+        let node = membership.room().open(need::node(), create)?;
         Ok(Self { held: Vec::new(), node: Rc::new(node), role, membership })
     }
 
@@ -257,6 +259,24 @@ impl Domain {
         self.node.blocking_cleanup_dead_nodes(Duration::from_millis(500));
     }
 
+    /// Makes sure that every segment of the domain has all its pages, and puts what is left of the
+    /// domain's room back into its reserve, for those who join later.
+    ///
+    /// Ports have their pages when they are open, so this is a second look: for the holder, when a
+    /// service has come up and before the motors are powered, and after [`Self::clean`]. Never in
+    /// a real-time loop.
+    ///
+    /// # Errors
+    /// [`DomainError::Room`] with what is lacking. A reserve that somebody else's memory keeps
+    /// short is none: all that is open is whole.
+    pub fn allocate(&self) -> Result<(), DomainError> {
+        Ok(self.room().allocate()?)
+    }
+
+    pub(crate) fn room(&self) -> &Room {
+        self.membership.room()
+    }
+
     pub(crate) fn node(&self) -> &Node<ipc::Service> {
         &self.node
     }
@@ -304,14 +324,36 @@ pub(crate) struct Keep {
     _membership: Arc<Membership>,
 }
 
-fn create_node(instance: &Instance, role: Role) -> Result<Node<ipc::Service>, DomainError> {
+fn create_services(
+    node: &Node<ipc::Service>,
+) -> Result<Vec<Box<dyn Any + Send + Sync>>, ChannelError> {
+    Ok(vec![
+        channel::create::<Feedback>(node)?,
+        channel::create::<MotorCommand>(node)?,
+        channel::create::<Setpoint>(node)?,
+        channel::create::<Progress>(node)?,
+        channel::create::<ControllerReport>(node)?,
+        channel::create::<DrivesReport>(node)?,
+        channel::create::<PlannerReport>(node)?,
+        channel::create::<JobOffer>(node)?,
+        wake::create(node, Wake::Feedback)?,
+        wake::create(node, Wake::Command)?,
+        operator::create(node)?,
+    ])
+}
+
+fn create_node(membership: &Membership, role: Role) -> Result<Node<ipc::Service>, DomainError> {
     static QUIET: Once = Once::new();
     // Its failures come back as errors; printed as well they would break `--json` users' logs.
     QUIET.call_once(|| set_log_level(LogLevel::Fatal));
 
-    let failed = |reason: String| DomainError::Node { instance: instance.name().into(), reason };
+    let instance = membership.instance();
+    let failed = |reason: String| {
+        let hint = room::hint(&[Path::new(SHARED_MEMORY), &instance.root()]);
+        DomainError::Node { instance: instance.name().into(), reason: reason + &hint }
+    };
     let mut config = Config::default();
-    config.global.prefix = FileName::new(instance.prefix().as_bytes())
+    config.global.prefix = FileName::new(membership.prefix().as_bytes())
         .map_err(|error| failed(format!("{error:?}")))?;
     let root = instance.root();
     let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())

@@ -1,6 +1,10 @@
 //! Being in a domain: the lock that says so, the file that names the member, and the clean-up by
 //! the last one out.
 //!
+//! The last one out or the next start wipes by what all domains of the instance have in common;
+//! the part of the names that is drawn anew for each domain stands in the file that says that the
+//! domain is ready.
+//!
 //! Every process in a domain holds the lock file shared, each through its own open file
 //! description. To own the domain alone, to wipe it, is to hold the lock exclusively; that can
 //! only succeed when nobody is alive. A leaving member first lets go and then tries to be alone:
@@ -12,15 +16,16 @@
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, Write};
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd, RawFd};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::domain::{DomainError, Role};
-use crate::instance::{Instance, SHARED_MEMORY, user};
+use crate::instance::{Instance, Nonce, Place, create_private, look};
 use crate::lock::{Hold, is_locked, try_lock};
+use crate::room::{self, Room, need};
 
 /// How long a lock in somebody else's hands is tried again: a process that leaves, or a child
 /// between fork and exec, has it for an instant.
@@ -33,6 +38,8 @@ const RETRY: Duration = Duration::from_millis(5);
 #[derive(Debug)]
 pub(crate) struct Membership {
     instance: Instance,
+    nonce: Nonce,
+    room: Room,
     lock: File,
     /// Locked as long as this process has its role; `None` for observers.
     role: Option<File>,
@@ -42,16 +49,18 @@ impl Membership {
     /// Takes the domain for this process alone and wipes what the dead left.
     pub(crate) fn found(instance: &Instance) -> Result<Self, DomainError> {
         let started = Instant::now();
+        let lock_path = instance.lock_path();
         loop {
-            match open_lock(instance, Hold::Exclusive)? {
-                Some(mut lock) => {
-                    wipe(instance)?;
-                    let path = instance.lock_path();
-                    write_pid(&mut lock).map_err(|source| DomainError::io(&path, source))?;
-                    let members = members(instance);
-                    create_private(&members).map_err(|source| DomainError::io(&members, source))?;
-                    let role = take_role(instance, Role::Domain)?;
-                    return Ok(Self { instance: instance.clone(), lock, role });
+            match open_lock(instance, Hold::Exclusive)
+                .map_err(|error| with_room(instance, error))?
+            {
+                Some(lock) => {
+                    let drawn = Nonce::draw();
+                    let nonce = drawn.map_err(|source| DomainError::io(&lock_path, source))?;
+                    // From here on a failure leaves the domain, and with that nothing behind.
+                    let mut membership = Self::new(instance, nonce, lock);
+                    membership.set_up().map_err(|error| with_room(instance, error))?;
+                    return Ok(membership);
                 }
                 None if started.elapsed() < PATIENCE => std::thread::sleep(RETRY),
                 None => return Err(in_use(instance)),
@@ -59,10 +68,36 @@ impl Membership {
         }
     }
 
+    fn new(instance: &Instance, nonce: Nonce, lock: File) -> Self {
+        let room = Room::new(instance.domain_prefix(&nonce), instance.root());
+        Self { instance: instance.clone(), nonce, room, lock, role: None }
+    }
+
+    /// Wipes what the dead left, and says who is here.
+    fn set_up(&mut self) -> Result<(), DomainError> {
+        wipe(&self.instance)?;
+        let path = self.instance.lock_path();
+        write_pid(&mut self.lock).map_err(|source| DomainError::io(&path, source))?;
+        for directory in [self.instance.root(), members(&self.instance)] {
+            create_private(&directory).map_err(|source| DomainError::io(&directory, source))?;
+        }
+        self.role = take_role(&self.instance, Role::Domain)?;
+        Ok(())
+    }
+
+    /// Closes to others what of the domain's memory they could open; before anybody is in.
+    pub(crate) fn close_to_others(&self) -> Result<(), DomainError> {
+        Ok(room::close_to_others(&self.prefix())?)
+    }
+
     /// Lets others in; the domain must be complete.
     pub(crate) fn open(&self) -> Result<(), DomainError> {
         let ready = ready(&self.instance);
-        File::create(&ready).map_err(|source| DomainError::io(&ready, source))?;
+        let told = private_file()
+            .create_new(true)
+            .open(&ready)
+            .and_then(|mut file| file.write_all(self.nonce.text().as_bytes()));
+        told.map_err(|source| DomainError::io(&ready, source))?;
         let path = self.instance.lock_path();
         match try_lock(&self.lock, Hold::Shared) {
             Ok(true) => Ok(()),
@@ -98,9 +133,15 @@ impl Membership {
             return Err(absent());
         }
         let Some(lock) = open_existing_lock(instance)? else { return Err(absent()) };
-        // From here on nobody can wipe the domain; dropping this leaves it properly.
-        let mut membership = Self { instance: instance.clone(), lock, role: None };
-        if !ready(instance).exists() || member_pid(instance, Role::Domain).is_none() {
+        // From here on nobody can wipe the domain.
+        let told = fs::read_to_string(ready(instance)).ok();
+        let Some(nonce) = told.as_deref().and_then(Nonce::told) else {
+            leave(instance, &lock);
+            return Err(absent());
+        };
+        // Dropping this leaves the domain properly.
+        let mut membership = Self::new(instance, nonce, lock);
+        if member_pid(instance, Role::Domain).is_none() {
             return Err(absent());
         }
         membership.role = take_role(instance, role)?;
@@ -112,22 +153,55 @@ impl Membership {
     pub(crate) fn instance(&self) -> &Instance {
         &self.instance
     }
+
+    /// What the names of the domain's shared memory begin with.
+    pub(crate) fn prefix(&self) -> String {
+        self.instance.domain_prefix(&self.nonce)
+    }
+
+    /// The domain's room in shared memory.
+    pub(crate) fn room(&self) -> &Room {
+        &self.room
+    }
 }
 
 impl Drop for Membership {
     fn drop(&mut self) {
         self.role = None;
-        // Explicitly, not by closing: a child between fork and exec may share the description.
-        let released = try_lock(&self.lock, Hold::Released);
-        if released.is_ok() && matches!(try_lock(&self.lock, Hold::Exclusive), Ok(true)) {
-            if is_current(&self.lock, &self.instance) {
-                // Whatever cannot be removed now is removed by the next start.
-                let _ = wipe(&self.instance);
-                let _ = fs::remove_file(self.instance.lock_path());
-                let _ = fs::remove_dir(self.instance.base());
-            }
-            let _ = try_lock(&self.lock, Hold::Released);
+        leave(&self.instance, &self.lock);
+    }
+}
+
+/// Lets the lock go; the last one out removes what is left.
+fn leave(instance: &Instance, lock: &File) {
+    // Explicitly, not by closing: a child between fork and exec may share the description.
+    let released = try_lock(lock, Hold::Released);
+    if released.is_ok() && is_last(instance, lock) {
+        if is_current(lock, instance) {
+            // Whatever cannot be removed now is removed by the next start.
+            let _ = wipe(instance);
+            let _ = fs::remove_file(instance.lock_path());
+            let _ = fs::remove_dir(instance.base());
         }
+        let _ = try_lock(lock, Hold::Released);
+    }
+}
+
+/// Whether nobody else is in the domain; the lock is exclusive then. Where no member is to be seen,
+/// it may be a child between fork and exec that holds the lock for an instant.
+fn is_last(instance: &Instance, lock: &File) -> bool {
+    let started = Instant::now();
+    loop {
+        match try_lock(lock, Hold::Exclusive) {
+            Ok(true) => return true,
+            Err(_) => return false,
+            Ok(false) => {}
+        }
+        let member = Role::NAMED.iter().any(|role| member_pid(instance, *role).is_some());
+        if member || started.elapsed() >= PATIENCE {
+            return false;
+        }
+        std::thread::sleep(RETRY);
     }
 }
 
@@ -236,9 +310,8 @@ fn open_lock(instance: &Instance, hold: Hold) -> Result<Option<File>, DomainErro
     for _ in 0..100 {
         let base = instance.base();
         create_private(base).map_err(|source| DomainError::io(base, source))?;
-        let owner = fs::metadata(base).map(|metadata| metadata.uid());
-        if owner.as_ref().is_ok_and(|owner| *owner != user()) {
-            return Err(DomainError::Foreign { directory: base.into() });
+        if let Place::Taken(what) = look(base).map_err(|source| DomainError::io(base, source))? {
+            return Err(DomainError::Foreign { directory: base.into(), what });
         }
         match private_file().create(true).open(&path) {
             Ok(file) => match lock_current(instance, file, hold)? {
@@ -300,30 +373,23 @@ fn wipe(instance: &Instance) -> Result<(), DomainError> {
         }
         _ => {}
     }
-    let prefix = instance.prefix();
-    let directory = Path::new(SHARED_MEMORY);
-    let entries = fs::read_dir(directory).map_err(|source| DomainError::io(directory, source))?;
-    for entry in entries.flatten() {
-        if entry.file_name().to_string_lossy().starts_with(&prefix) {
-            match fs::remove_file(entry.path()) {
-                Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                    return Err(DomainError::io(&entry.path(), source));
-                }
-                _ => {}
-            }
+    Ok(room::wipe(&instance.prefix())?)
+}
+
+/// What a domain that finds no room for its first small files needs in all.
+fn with_room(instance: &Instance, error: DomainError) -> DomainError {
+    match error {
+        DomainError::Io { source, .. } if room::is_full(&source) => {
+            room::failed(instance.base(), &source, need::pipeline()).into()
         }
+        other => other,
     }
-    Ok(())
 }
 
 fn private_file() -> OpenOptions {
     let mut options = OpenOptions::new();
-    options.read(true).write(true).mode(0o600);
+    options.read(true).write(true).mode(0o600).custom_flags(libc::O_NOFOLLOW);
     options
-}
-
-fn create_private(directory: &Path) -> io::Result<()> {
-    fs::DirBuilder::new().recursive(true).mode(0o700).create(directory)
 }
 
 fn members(instance: &Instance) -> PathBuf {

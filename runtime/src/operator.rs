@@ -23,6 +23,7 @@ use signals::{OperatorReply, OperatorRequest, OperatorVerb, Sample};
 
 use crate::channel::{ChannelError, Wire};
 use crate::domain::{Domain, DomainError, Entry};
+use crate::room::need;
 
 const SERVICE: &str = "operator-requests";
 
@@ -164,11 +165,10 @@ fn answer_requests(
 ) {
     let set_up = || {
         let domain = entry.enter()?;
-        let server = open(&domain)?
-            .server_builder()
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(refused)?;
+        let factory = open(&domain)?;
+        let builder =
+            factory.server_builder().backpressure_strategy(BackpressureStrategy::DiscardData);
+        let server = domain.room().open(need::operator(), || builder.create().map_err(refused))?;
         Ok((domain, server))
     };
     let (domain, server) = match set_up() {
@@ -262,11 +262,10 @@ impl Drop for OperatorLink {
 fn ask(entry: &Entry, ready: &Sender<Result<(), DomainError>>, questions: &Receiver<Question>) {
     let set_up = || {
         let domain = entry.enter()?;
-        let client = open(&domain)?
-            .client_builder()
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(refused)?;
+        let factory = open(&domain)?;
+        let builder =
+            factory.client_builder().backpressure_strategy(BackpressureStrategy::DiscardData);
+        let client = domain.room().open(need::operator(), || builder.create().map_err(refused))?;
         Ok((domain, client))
     };
     let (domain, client) = match set_up() {

@@ -18,6 +18,7 @@ use crate::clock;
 use crate::domain::{Domain, Role};
 use crate::instance::Instance;
 use crate::membership;
+use crate::service::ServiceError;
 
 /// A year: longer than anybody waits [ns].
 const LONG: i64 = 31_536_000_000_000_000;
@@ -150,7 +151,10 @@ pub struct Peers {
 impl Peers {
     /// Starts watching the processes with these roles in the domain. Call it before the thread
     /// becomes real-time.
-    pub fn watch(domain: &Domain, roles: &[Role]) -> io::Result<Self> {
+    ///
+    /// # Errors
+    /// [`ServiceError::Thread`] when the searching thread could not be started.
+    pub fn watch(domain: &Domain, roles: &[Role]) -> Result<Self, ServiceError> {
         let instance = domain.instance().clone();
         let stop = Arc::new(AtomicBool::new(false));
         let mut searches = Vec::new();
@@ -176,7 +180,10 @@ impl Peers {
                 std::thread::park_timeout(SEARCH_PERIOD);
             }
         };
-        let thread = std::thread::Builder::new().name("peers".into()).spawn(search)?;
+        let thread = std::thread::Builder::new()
+            .name("peers".into())
+            .spawn(search)
+            .map_err(|source| ServiceError::thread("peers", source))?;
         Ok(Self { watched, stop, thread: Some(thread) })
     }
 

@@ -3,6 +3,12 @@
 //!
 //! SIGPIPE stays ignored, as Rust's runtime leaves it: a reader that goes away is an error of the
 //! write.
+//!
+//! SIGBUS is what a full /dev/shm raises where a page of shared memory is touched for the first
+//! time. Ports have all their pages before they are used ([`crate::room`]); it can only strike who
+//! is opening one while somebody else takes the memory under its hands. That process ends, after a
+//! word about the cause; nobody has connected to it yet. Going on with a page of zeros instead would
+//! not be sound: iceoryx2 0.10 follows pointers that lie in those pages.
 
 use std::io;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
@@ -26,7 +32,7 @@ extern "C" fn note(signal: libc::c_int) {
 
 /// Makes SIGINT, SIGTERM and SIGHUP set the flag instead of ending the process. System calls that
 /// wait come back with `EINTR`, so that loops look at the flag at once. A SIGHUP that is ignored
-/// already, as under `nohup`, stays ignored.
+/// already, as under `nohup`, stays ignored. SIGBUS ends the process still, but says why.
 ///
 /// # Errors
 /// Names the signal whose handler the operating system refused.
@@ -43,7 +49,26 @@ pub fn install() -> io::Result<()> {
         action.sa_sigaction = handler as libc::sighandler_t;
         exchange(signal, Some(&action)).map_err(|source| refused(signal, &source))?;
     }
-    Ok(())
+    let handler: extern "C" fn(libc::c_int) = explain;
+    // SAFETY: all zeros is a valid sigaction (empty mask), completed below.
+    #[allow(unsafe_code)]
+    let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
+    action.sa_sigaction = handler as libc::sighandler_t;
+    let set = exchange(libc::SIGBUS, Some(&action));
+    set.map(drop).map_err(|source| refused(libc::SIGBUS, &source))
+}
+
+extern "C" fn explain(signal: libc::c_int) {
+    const CAUSE: &[u8] = b"graver: the operating system had no page of memory to give (SIGBUS): \
+                           /dev/shm is full; see `df /dev/shm`\n";
+    // SAFETY: write, signal and raise are async-signal-safe. With the default action back, the
+    // raised signal ends the process when this handler returns.
+    #[allow(unsafe_code)]
+    unsafe {
+        libc::write(libc::STDERR_FILENO, CAUSE.as_ptr().cast(), CAUSE.len());
+        libc::signal(signal, libc::SIG_DFL);
+        libc::raise(signal);
+    }
 }
 
 /// Sets the action of a signal, if one is given, and tells the one before. Handlers given here

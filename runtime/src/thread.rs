@@ -76,12 +76,19 @@ impl Realtime {
     }
 
     /// Claims the core for this pipeline, if the thread really has a real-time priority on one;
-    /// for drives, whose controller shares the core.
-    pub fn claim_core(&self) -> Result<Option<CoreLock>, CoreError> {
-        match usize::try_from(self.facts.core) {
-            Ok(core) if self.facts.fifo == 1 => CoreLock::claim(core).map(Some),
-            _ => Ok(None),
+    /// for drives, whose controller shares the core. Somebody who holds the core's name for nothing
+    /// is noted in the facts.
+    pub fn claim_core(&mut self) -> Result<Option<CoreLock>, CoreError> {
+        let claim = match usize::try_from(self.facts.core) {
+            Ok(core) if self.facts.fifo == 1 => CoreLock::claim(core)?,
+            _ => return Ok(None),
+        };
+        if let Some(squatter) = claim.squatter() {
+            self.facts.refused |= refused::CLAIM;
+            self.facts.claim_pid = squatter.pid.unsigned_abs();
+            self.facts.claim_user = squatter.user;
         }
+        Ok(Some(claim))
     }
 }
 
@@ -260,7 +267,8 @@ mod tests {
     #[test]
     fn a_thread_that_asks_for_nothing_is_refused_nothing() {
         let placement = Placement::Automatic;
-        let realtime = entered(RealtimeOptions { priority: None, placement, lock_memory: false });
+        let mut realtime =
+            entered(RealtimeOptions { priority: None, placement, lock_memory: false });
         assert_eq!(realtime.facts, RealtimeFacts { core: -1, ..RealtimeFacts::default() });
         assert!(realtime.claim_core().unwrap().is_none());
         assert_eq!(realtime.spin_margin(), Nanoseconds(0));

@@ -13,6 +13,7 @@ use iceoryx2::prelude::{FileDescriptorBased, ipc};
 use crate::channel::ChannelError;
 use crate::clock;
 use crate::domain::{Domain, Keep};
+use crate::room::need;
 use signals::Nanoseconds;
 
 /// The two wake events of a pipeline.
@@ -72,7 +73,9 @@ pub struct Notifier {
 impl Notifier {
     pub(crate) fn open(domain: &Domain, wake: Wake) -> Result<Self, ChannelError> {
         let factory = open(domain, wake)?;
-        let port = factory.notifier_builder().create().map_err(|error| refused(wake, error))?;
+        let builder = factory.notifier_builder();
+        let create = || builder.create().map_err(|error| refused(wake, error));
+        let port = domain.room().open(0, create)?;
         Ok(Self { port, wake, _keep: domain.keep() })
     }
 
@@ -97,7 +100,9 @@ pub struct Listener {
 impl Listener {
     pub(crate) fn open(domain: &Domain, wake: Wake) -> Result<Self, ChannelError> {
         let factory = open(domain, wake)?;
-        let port = factory.listener_builder().create().map_err(|error| refused(wake, error))?;
+        let builder = factory.listener_builder();
+        let create = || builder.create().map_err(|error| refused(wake, error));
+        let port = domain.room().open(need::wake(), create)?;
         Ok(Self { port, wake, _keep: domain.keep() })
     }
 

@@ -3,7 +3,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::process::Command;
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Command, Output};
 
 use runtime::peer::Peer;
 use runtime::signal::{self, Termination};
@@ -11,15 +12,19 @@ use runtime::signal::{self, Termination};
 const SCRIPT: &str = "GRAVER_TEST_SIGNALS";
 
 /// Runs the script in a process of its own, started by a shell that has set `trap`.
-fn check(script: &str, trap: &str) {
-    let status = Command::new("sh")
+fn play(script: &str, trap: &str) -> Output {
+    Command::new("sh")
         .args(["-c", &format!("{trap}\nexec \"$0\" \"$@\"")])
         .arg(std::env::current_exe().unwrap())
         .args(["--exact", "signalled_process", "--nocapture", "--test-threads=1"])
         .env(SCRIPT, script)
-        .status()
-        .unwrap();
-    assert!(status.success(), "{script}: {status}");
+        .output()
+        .unwrap()
+}
+
+fn check(script: &str, trap: &str) {
+    let output = play(script, trap);
+    assert!(output.status.success(), "{script}: {output:?}");
 }
 
 /// In a child: plays its script. Without the environment it is an empty test.
@@ -48,6 +53,13 @@ fn signalled_process() {
             own.signal(libc::SIGPIPE).unwrap();
             own.signal(libc::SIGTERM).unwrap();
             assert_eq!(told(1).signal, libc::SIGTERM);
+        }
+        "bus" => {
+            signal::install().unwrap();
+            own.signal(libc::SIGBUS).unwrap();
+            loop {
+                std::thread::yield_now();
+            }
         }
         other => panic!("{other}"),
     }
@@ -85,4 +97,12 @@ fn a_hang_up_that_is_ignored_stays_ignored() {
 #[test]
 fn a_reader_that_went_away_is_no_request_to_end() {
     check("pipe", "");
+}
+
+#[test]
+fn a_page_that_cannot_be_had_ends_the_process_with_a_word_about_the_cause() {
+    let output = play("bus", "ulimit -c 0");
+    assert_eq!(output.status.signal(), Some(libc::SIGBUS));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("/dev/shm is full; see `df /dev/shm`"), "{said}");
 }

@@ -10,11 +10,13 @@ pub mod refused {
     pub const MEMORY: u32 = 1 << 1;
     /// Pinning to the CPU asked for.
     pub const CORE: u32 = 1 << 2;
+    /// The name that claims the CPU: somebody holds it who has no real-time thread there.
+    pub const CLAIM: u32 = 1 << 3;
 }
 
 sample! {
     /// Facts of a stage's real-time set-up: what its thread got, and what it asked for in vain.
-    RealtimeFacts = "graver.RealtimeFacts.v2" {
+    RealtimeFacts = "graver.RealtimeFacts.v3" {
         /// 1 when the thread runs under SCHED_FIFO, 0 otherwise.
         fifo: u32,
         /// Its priority, 0 without SCHED_FIFO.
@@ -40,6 +42,11 @@ sample! {
         memory_limit: u64,
         /// What it has to lock [bytes], when locking was refused.
         memory_needed: u64,
+        /// The process that holds the name of the CPU, when the claim was refused; 0 when it could
+        /// not be told.
+        claim_pid: u32,
+        /// Its user; `u32::MAX` when it could not be told.
+        claim_user: u32,
     }
 }
 

@@ -5,9 +5,12 @@ use crate::arguments::{DrivesArguments, DrivesKind};
 use crate::exit::Failure;
 use crate::inputs::MachineSource;
 use drives::Deadlines;
-use runtime::Instance;
 use runtime::thread::{Placement, RealtimeOptions, last_core};
+use runtime::{Instance, ServiceError};
 use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::Write;
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::PathBuf;
 
 const FILE: &str = "configuration.json";
@@ -65,9 +68,12 @@ impl Configuration {
     /// A file that cannot be written.
     pub fn write(&self, instance: &Instance) -> Result<(), Failure> {
         let path = path(instance);
-        let text = serde_json::to_vec(self).map_err(Failure::service)?;
-        std::fs::write(&path, text)
-            .map_err(|error| Failure::service(format!("{}: {error}", path.display())))
+        let text = serde_json::to_vec(self).map_err(std::io::Error::other);
+        let create = |text: Vec<u8>| {
+            let mut file = File::options();
+            file.write(true).create(true).truncate(true).mode(0o600).open(&path)?.write_all(&text)
+        };
+        text.and_then(create).map_err(|source| Failure::service(ServiceError::io(path, source)))
     }
 
     /// Reads what the domain's holder wrote.
@@ -76,11 +82,9 @@ impl Configuration {
     /// A file that cannot be read.
     pub fn read(instance: &Instance) -> Result<Self, Failure> {
         let path = path(instance);
-        let failed = |error: &dyn std::fmt::Display| {
-            Failure::service(format!("{}: {error}", path.display()))
-        };
-        let text = std::fs::read(&path).map_err(|error| failed(&error))?;
-        serde_json::from_slice(&text).map_err(|error| failed(&error))
+        let text = std::fs::read(&path);
+        text.and_then(|text| Ok(serde_json::from_slice(&text)?))
+            .map_err(|source| Failure::service(ServiceError::io(path, source)))
     }
 
     /// Whether the clock may slip.

@@ -21,7 +21,7 @@ use power_up::PowerUp;
 use runtime::domain::Role;
 use runtime::operator::{OperatorError, OperatorLink};
 use runtime::peer::Peer;
-use runtime::{Domain, Instance, Publisher, Reading, Subscriber, message};
+use runtime::{Domain, DomainError, Instance, Publisher, Reading, Subscriber, message};
 use services::{Ended, Remedy, Services};
 use signals::{
     ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorReply, OperatorVerb,
@@ -106,6 +106,9 @@ impl Pipeline {
         configuration: &Configuration,
         starter: Starter,
     ) -> Result<Self, Failure> {
+        for warning in instance.warnings() {
+            message::tell(&warning);
+        }
         let machine = configuration.source.machine()?;
         let domain = Domain::create(instance).map_err(Failure::service)?;
         configuration.write(instance)?;
@@ -244,6 +247,14 @@ impl Pipeline {
     /// Whether a process with this role lives in the domain.
     pub fn has(&self, role: Role) -> bool {
         self.peer(role).is_some()
+    }
+
+    /// Makes sure that all shared memory of the domain is there, so that none can lack in a cycle.
+    ///
+    /// # Errors
+    /// What is lacking.
+    pub fn allocate(&self) -> Result<(), DomainError> {
+        self.domain.allocate()
     }
 
     /// The domain's own directory.

@@ -1,6 +1,7 @@
 //! From processes that were just started to motors that are powered and wait for a job.
 
 use super::Pipeline;
+use runtime::DomainError;
 use runtime::domain::Role;
 use signals::{ControllerState, Fault, OperatorVerb};
 use std::time::{Duration, Instant};
@@ -12,8 +13,11 @@ const START_PATIENCE: Duration = Duration::from_secs(30);
 const POWER_PATIENCE: Duration = Duration::from_secs(10);
 
 /// Why the motors are not powered.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum NotReady {
+    /// There is too little shared memory.
+    #[error(transparent)]
+    Memory(#[from] DomainError),
     /// A service does not say anything.
     #[error("the {0} did not come up within {seconds} s", seconds = START_PATIENCE.as_secs())]
     Silent(Role),
@@ -62,7 +66,10 @@ impl PowerUp {
             // A controller that powers the motors sooner meets drives that know nobody yet, and
             // they stop for good.
             Step::Services => match silent(pipeline) {
-                None => *self = Self { since: Instant::now(), step: Step::Motors { asked: false } },
+                None => {
+                    pipeline.allocate()?;
+                    *self = Self { since: Instant::now(), step: Step::Motors { asked: false } };
+                }
                 Some(role) if self.since.elapsed() > START_PATIENCE => {
                     return Err(NotReady::Silent(role));
                 }

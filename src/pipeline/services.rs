@@ -1,9 +1,9 @@
 //! The four services as child processes: started, watched, stopped in order.
 
 use crate::exit::Failure;
-use runtime::Domain;
 use runtime::child::ChildProcess;
 use runtime::domain::Role;
+use runtime::{Domain, message};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::Command;
@@ -100,6 +100,9 @@ impl Services {
             let pid = child.pid();
             service.child = None;
             domain.clean();
+            if let Err(error) = domain.allocate() {
+                message::tell(&error.to_string());
+            }
             let remedy = match (service.role, service.restarts) {
                 (Role::Monitor, 0) => service.restart(domain),
                 (Role::Monitor, _) => Remedy::None,

@@ -9,11 +9,10 @@ use machine::kinematics::{Joints, KinematicsError};
 use machine::transmission::rest;
 use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea};
 use nalgebra::Vector3;
-use runtime::message;
+use runtime::{ServiceError, message};
 use signals::axis::axis_array;
 use signals::{AxisArray, run_folder};
 use std::fmt::Display;
-use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,13 +68,13 @@ pub(super) fn write_refusal(folder: &Path, spare: &Path, refusal: &Refusal) {
     }
 }
 
-fn write_plan(folder: &Path, plan: &Plan) -> io::Result<()> {
+fn write_plan(folder: &Path, plan: &Plan) -> Result<(), ServiceError> {
     let write = |name: &str, content: serde_json::Result<Vec<u8>>| {
         let path = folder.join(name);
-        let written =
-            content.map_err(io::Error::other).and_then(|text| std::fs::write(&path, text));
-        written
-            .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+        let content = content.map_err(std::io::Error::other);
+        content
+            .and_then(|content| std::fs::write(&path, content))
+            .map_err(|source| ServiceError::io(path, source))
     };
     write(run_folder::ARTWORK, serde_json::to_vec(&plan.artwork))?;
     write(run_folder::PLAN, serde_json::to_vec_pretty(&plan.facts))

@@ -27,6 +27,10 @@ pub fn missing(threads: &[(&str, RealtimeFacts)]) -> Vec<String> {
         let detail = format!("{name} to CPU {asked} (it may use CPUs up to {last})");
         (facts.refused & refused::CORE != 0).then_some(detail)
     });
+    let claim = list(&|_, facts| {
+        let detail = squatted(facts.core, facts.claim_pid, facts.claim_user);
+        (facts.refused & refused::CLAIM != 0).then_some(detail)
+    });
     [
         unasked.map(|who| {
             format!(
@@ -54,10 +58,26 @@ pub fn missing(threads: &[(&str, RealtimeFacts)]) -> Vec<String> {
                  the unit's CPUAffinity"
             )
         }),
+        claim.map(|who| {
+            format!(
+                "{who} without a real-time thread on it: another pipeline there is noticed all the \
+                 same; have that process ended"
+            )
+        }),
     ]
     .into_iter()
     .flatten()
     .collect()
+}
+
+/// Who holds the name that claims a CPU.
+fn squatted(core: i32, pid: u32, user: u32) -> String {
+    let who = match (pid, user) {
+        (0, u32::MAX) => "a process that does not say who it is".to_owned(),
+        (0, user) => format!("a process of user {user}"),
+        (pid, user) => format!("pid {pid} of user {user}"),
+    };
+    format!("the claim on CPU {core} is held by {who}")
 }
 
 fn memory_reason(facts: &RealtimeFacts) -> String {
@@ -98,6 +118,8 @@ mod tests {
         last_core: 0,
         memory_limit: 0,
         memory_needed: 0,
+        claim_pid: 0,
+        claim_user: 0,
     };
 
     fn check(threads: &[(&str, RealtimeFacts)], expect: &[&str]) {
@@ -142,6 +164,21 @@ mod tests {
         check(
             &[("controller", GOOD), ("drives", lost)],
             &["not pinned: drives to CPU 9 (it may use CPUs up to 3): expect more latency"],
+        );
+    }
+
+    #[test]
+    fn who_holds_the_name_of_a_cpu_is_said() {
+        let squatted = RealtimeFacts { refused: refused::CLAIM, claim_pid: 77, ..GOOD };
+        let known = RealtimeFacts { claim_user: 1001, ..squatted };
+        check(
+            &[("controller", GOOD), ("drives", known)],
+            &["the claim on CPU 1 is held by pid 77 of user 1001 without a real-time thread on it"],
+        );
+        let unknown = RealtimeFacts { claim_pid: 0, claim_user: u32::MAX, ..squatted };
+        check(
+            &[("drives", unknown)],
+            &["the claim on CPU 1 is held by a process that does not say who it is without"],
         );
     }
 
