@@ -363,7 +363,7 @@ impl<'a> Judge<'a> {
         if light.stroke < unseen.from.stroke {
             return;
         }
-        let found = self.find(interval, light);
+        let found = self.find(unseen, interval, light);
         let place = Place { stroke: light.stroke, at: found.map_or(0.0, |foot| foot.at) };
         let place = if found.is_some() { place } else { place.next_stroke() };
         if let Some(state) = self.strokes.get_mut(shape) {
@@ -376,7 +376,7 @@ impl<'a> Judge<'a> {
 
     /// Where along its stroke the first light after a gap is. `None` where the line comes by more
     /// than once and nothing says which passage it is.
-    fn find(&mut self, interval: &Interval, light: FirstLight) -> Option<Foot> {
+    fn find(&mut self, unseen: &Unseen, interval: &Interval, light: FirstLight) -> Option<Foot> {
         let index = self.stroke_index(light.stroke)?;
         self.load_line(index);
         let (_, line) = self.line.as_ref()?;
@@ -391,6 +391,16 @@ impl<'a> Judge<'a> {
         let mut passages = line.passages(&point, tolerance);
         if passages.len() > 1 && passages.iter().any(ahead) {
             passages.retain(ahead);
+        }
+        // Light comes again where it ended, and went on from there as fast as it can at most.
+        let farthest = self.farthest(unseen.from, unseen.cycles);
+        let possible = |passage: &Passage| {
+            let place = |at| Place { stroke: light.stroke, at };
+            unseen.from.is_before(place(passage.foot.at + REACH))
+                && place(passage.foot.at - REACH).is_before(farthest)
+        };
+        if passages.len() > 1 && passages.iter().any(possible) {
+            passages.retain(possible);
         }
         let followed = self.strokes.get(index)?.followed;
         // What begins in a recorded cycle, on a stroke not met before, begins at its start.
@@ -450,16 +460,22 @@ impl<'a> Judge<'a> {
             }
         };
         let completed = report.is_some_and(|report| report.completed == 1);
-        let bound = cycles.zip(self.fastest).filter(|_| !completed);
-        let to = match bound {
+        let bound = cycles.filter(|_| !completed);
+        let to = self.farthest(from, bound);
+        self.hide(from, to);
+        let bounded = bound.and(self.fastest).is_some();
+        !bounded && !completed && from.is_before(to)
+    }
+
+    /// How far the job can have come from a place in so many cycles; `None` is any number.
+    fn farthest(&self, from: Place, cycles: Option<u64>) -> Place {
+        match cycles.zip(self.fastest) {
             Some((cycles, speed)) => {
                 let time = cycles as f64 * CYCLE_TIME;
                 from.after(speed * FASTEST_RATE * time, self.artwork)
             }
             None => Place::end(self.artwork),
-        };
-        self.hide(from, to);
-        bound.is_none() && !completed && from.is_before(to)
+        }
     }
 
     fn interval(&mut self, interval: &Interval) {

@@ -1,6 +1,8 @@
 //! The judge on synthetic recordings, with numbers worked out by hand.
 #![allow(clippy::unwrap_used)]
 
+mod gaps;
+
 use super::*;
 use signals::artwork::Stroke;
 use signals::feedback::status;
