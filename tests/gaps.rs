@@ -9,7 +9,7 @@ use drives::PlantOptions;
 use graver::simulation::simulate;
 use machine::Machine;
 use monitor::marks::tool_path::LitSpans;
-use monitor::marks::{Judge, Judgement};
+use monitor::marks::{Judge, Judgement, StreamEnd};
 use monitor::recording::CycleRecord;
 use planner::Job;
 use signals::ControllerReport;
@@ -46,7 +46,7 @@ impl Recorded {
                 judge.push(record);
             }
         }
-        judge.finish(Some(&self.report)).unwrap()
+        judge.finish(StreamEnd::Reported(&self.report)).unwrap()
     }
 
     /// Length that was lit in the cycles of which not both ends are kept [m].

@@ -30,7 +30,7 @@ fn judged(
     cut(records, gaps).iter().for_each(|record| judge.push(record));
     let last_cycle = Cycle(records.last().unwrap().feedback.cycle.0 - LIGHT_LAG);
     let completed = ControllerReport { completed: 1, last_cycle, ..ControllerReport::default() };
-    judge.finish(Some(&completed))
+    judge.finish(StreamEnd::Reported(&completed))
 }
 
 /// Asserts what is unrecorded without the records in these gaps, and that nothing of the rest is
@@ -180,7 +180,7 @@ fn where_the_job_was_broken_off_only_what_may_have_been_marked_is_hidden() {
         let zero = FIRST as i64 + (START / CYCLE_TIME).round() as i64;
         let last_cycle = Cycle((zero + last) as u64);
         let stopped = ControllerReport { last_cycle, ..ControllerReport::default() };
-        let judgement = judge.finish(Some(&stopped)).unwrap();
+        let judgement = judge.finish(StreamEnd::Reported(&stopped)).unwrap();
         let Marks { missing, unrecorded, strokes_lost, .. } = judgement.marks;
         near(judgement.marks.length + missing + unrecorded, art.length(), ROUNDING, "sum");
         ((missing / STEP).round(), (unrecorded / STEP).round(), strokes_lost, judgement.open_end)
@@ -205,15 +205,18 @@ fn where_the_job_was_broken_off_only_what_may_have_been_marked_is_hidden() {
 fn without_a_report_the_watchdog_says_that_no_light_follows() {
     let (art, records) = three();
     let mut kept = cut(&records, &[31..500]);
-    let judge = |kept: &[CycleRecord]| {
-        let mut judge = Judge::new(&art);
+    let judge = |kept: &[CycleRecord], end: StreamEnd<'_>| {
+        let mut judge = Judge::new(&art).with_fastest(SPEED);
         kept.iter().for_each(|record| judge.push(record));
-        let judgement = judge.finish(None).unwrap();
-        (judgement.marks.unrecorded > 0.0, judgement.marks.strokes_lost, judgement.open_end)
+        let judgement = judge.finish(end).unwrap();
+        let steps = (judgement.marks.unrecorded / STEP).round();
+        (steps, judgement.marks.strokes_lost, judgement.open_end)
     };
-    assert_eq!(judge(&kept), (true, 0, true));
+    assert_eq!(judge(&kept, StreamEnd::Unknown), (90.0, 0, true));
+    // Drives died: what it had been told fell for two cycles more, at most at twice the speed.
+    assert_eq!(judge(&kept, StreamEnd::Silenced), (4.0, 2, false));
     kept.last_mut().unwrap().feedback.status |= status::STOPPED_ALONE;
-    assert_eq!(judge(&kept), (false, 2, false));
+    assert_eq!(judge(&kept, StreamEnd::Unknown), (0.0, 2, false));
 }
 
 #[test]
