@@ -91,16 +91,22 @@ impl Aftermath {
     }
 }
 
+/// Asserts that every length of the job is marked, missing or unrecorded, and none of it twice.
+fn assert_balanced(summary: &Value, what: &str) {
+    let marks = |key: &str| number(summary, &format!("/marks/{key}"));
+    let sum = marks("length") + marks("missing") + marks("unrecorded") - marks("double");
+    // Each stroke end may be off by the accuracy of a stroke end.
+    let ends = 2.0 * 20e-6 * number(summary, "/job/strokes");
+    let length = number(summary, "/job/length");
+    assert!((sum - length).abs() <= ends, "{what}: {sum} of {length}: {}", summary["marks"]);
+}
+
 /// Asserts that marks of a run that was cut short say that something is missing, and that what was
 /// marked lies where it should.
 fn assert_true_marks(summary: &Value, what: &str) {
-    let marked = number(summary, "/marks/length");
     let missing = number(summary, "/marks/missing");
-    let length = number(summary, "/job/length");
     assert!(missing > 1e-3, "{what}: only {missing} m missing");
-    // Each stroke end may be off by the accuracy of a stroke end.
-    let ends = 20e-6 * number(summary, "/job/strokes");
-    assert!((marked + missing - length).abs() <= 2.0 * ends, "{what}: {marked} + {missing}");
+    assert_balanced(summary, what);
     assert!(number(summary, "/marks/error_max") <= 20e-6, "{what}: {summary:#}");
     assert_eq!(number(summary, "/marks/stray"), 0.0, "{what}");
 }
@@ -209,15 +215,64 @@ fn without_a_monitor_the_marks_are_unharmed() {
         let warnings = summary["warnings"].to_string();
         assert!(warnings.contains("monitor") && warnings.contains("signal 9"), "{warnings}");
         assert!(ended.error.contains("monitor"), "{}", ended.error);
-        if !summary["marks"].is_null() {
-            // A judgement of the whole job can only be of all its marks.
-            assert!(number(&summary, "/marks/missing") < 1e-4, "{summary:#}");
-            assert!(number(&summary, "/marks/double") < 1e-4, "{summary:#}");
-        }
+        assert_completed_around_a_gap(&summary);
         let simulated = place.graver(&["simulate", job.to_str().unwrap(), "--json"]).json(0);
         assert_eq!(summary["digest"], simulated["digest"]);
         place.assert_nothing_left(&[]);
         assert_starts_clean(&place);
+    }
+}
+
+/// Asserts what is judged of a completed job while whose monitor was dead for a time.
+fn assert_completed_around_a_gap(summary: &Value) {
+    assert!(!summary["marks"].is_null(), "{summary:#}");
+    assert_balanced(summary, "completed");
+    for key in ["missing", "double"] {
+        assert!(number(summary, &format!("/marks/{key}")) < 1e-4, "{summary:#}");
+    }
+    assert!(number(summary, "/marks/error_max") <= 20e-6, "{summary:#}");
+    assert_eq!(
+        (&summary["marks"]["strokes_lost"], number(summary, "/marks/stray")),
+        (&0.into(), 0.0)
+    );
+    assert!(summary["recording"]["gaps"].as_u64() >= Some(1), "{summary:#}");
+    assert!(summary["recording"]["missing"].as_u64() >= Some(1), "{summary:#}");
+}
+
+/// Killed as soon as the job is offered, while it is planned, or while it is played: its successor
+/// records the rest of the same job.
+#[test]
+fn a_monitor_that_was_started_again_goes_on_with_the_recording() {
+    let mut random = Random(7);
+    for played in [None, None, Some(20), Some(20 + random.below(600))] {
+        let place = Place::new();
+        let job = place.file("lines.ngc", &lines(8));
+        let mut running = place.run(&job, RUN, &[]);
+        let status = place.await_status(&mut running, "a job", |status| {
+            status["job"].is_string() && status["played"].as_u64() >= played
+        });
+        let killed = service(&status, "monitor");
+        kill(&killed);
+        // In a hold the job waits, however slow the computer is.
+        place.await_played(&mut running, 20);
+        place.ask(&["hold"]).accepted();
+        place.await_status(&mut running, "a new monitor", |status| {
+            let pid = status["services"]["monitor"].as_i64();
+            pid.is_some_and(|pid| pid != i64::from(killed.pid()))
+        });
+        let size = || place.path(RUN).join("samples.bin").metadata().map_or(0, |file| file.len());
+        let before = size();
+        place.await_status(&mut running, "a recording that grows", |_| size() > before + 100_000);
+        place.ask(&["resume"]).accepted();
+        let summary = running.wait().json(0);
+        support::assert_valid("summary", &summary);
+        assert_eq!(summary["outcome"], "completed");
+        assert_completed_around_a_gap(&summary);
+        // All of the end is there.
+        support::assert_ends_dark_and_at_rest(&place.recording(RUN), 2);
+        let length = number(&summary, "/job/length");
+        assert!(number(&summary, "/marks/length") > 0.4 * length, "{summary:#}");
+        place.assert_nothing_left(&[]);
     }
 }
 

@@ -11,7 +11,7 @@ use drives::PlantOptions;
 use graver::simulation::simulate;
 use machine::{Machine, Override};
 use monitor::examination::{Clock, Examination};
-use monitor::marks::Marks;
+use monitor::marks::{Marks, StreamEnd};
 use planner::Job;
 use signals::ControllerReport;
 use signals::time::CYCLE_TIME;
@@ -67,7 +67,7 @@ fn run(machine: &Machine, plant: &Machine, job: &Path, changes: &[String], seed:
     assert_eq!(report.cycles, plan.facts.samples + 1);
     assert!(plan.facts.duration <= plan.facts.samples as f64 * CYCLE_TIME);
     Outcome {
-        marks: examination.finish(Some(&report)).marks.unwrap().marks,
+        marks: examination.finish(StreamEnd::Reported(&report)).marks.unwrap().marks,
         report,
         time: plan.facts.duration,
         axes: machine.axes.len(),

@@ -9,8 +9,9 @@ pub mod verdict;
 pub use crate::recording::note::{RecordingState, WatchNote};
 
 use crate::examination::{Clock, Examination, Findings};
-use crate::marks::{Judgement, Marks};
+use crate::marks::{Judgement, Marks, StreamEnd};
 use crate::recording::file::{RecordingError, RecordingReader};
+use crate::recording::note::Progress;
 use crate::report::Report;
 use crate::run_folder::RunFolder;
 use crate::summary::text::length;
@@ -23,7 +24,7 @@ use serde::Deserialize;
 use signals::artwork::Artwork;
 use signals::plan::PlanFacts;
 use signals::time::CYCLE_TIME;
-use signals::{ControllerReport, DrivesReport, Fault, RealtimeFacts, run_folder};
+use signals::{ControllerReport, DrivesReport, Fault, FaultCode, RealtimeFacts, run_folder};
 use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::time::Instant;
@@ -202,13 +203,21 @@ pub fn conclude(
     if ending.outcome != Some(Outcome::Refused) {
         let warnings = &mut ending.warnings;
         plan = read_json(folder, run_folder::PLAN, warnings).unwrap_or_default();
-        if let Some(note) = WatchNote::read(folder).filter(|note| !note.message.is_empty()) {
+        let note = WatchNote::read(folder).unwrap_or_default();
+        if !note.message.is_empty() {
             warnings.push(format!("the recording was broken off: {}", note.message));
         }
         // Nor was anything marked before there was an artwork.
         if let Some(planned) = read_json(folder, run_folder::ARTWORK, warnings) {
             artwork = planned;
-            findings = examine(folder, &artwork, plan.speed, ending.controller.as_ref())
+            let faults = [ending.latched, ending.drives.map(|it| it.fault).unwrap_or_default()];
+            let silenced = faults.iter().any(|fault| fault.code() == FaultCode::DrivesLost);
+            let end = match &ending.controller {
+                Some(report) => StreamEnd::Reported(report),
+                None if silenced && note.progress == Progress::Complete => StreamEnd::Silenced,
+                None => StreamEnd::Unknown,
+            };
+            findings = examine(folder, &artwork, plan.speed, end)
                 .map_err(|reason| warnings.push(format!("there is no recording: {reason}")))
                 .ok();
         }
@@ -261,7 +270,7 @@ fn examine(
     folder: &RunFolder,
     artwork: &Artwork,
     speed: f64,
-    report: Option<&ControllerReport>,
+    end: StreamEnd<'_>,
 ) -> Result<Findings, String> {
     let path = folder.file(run_folder::SAMPLES);
     let at = |error: RecordingError| format!("{}: {error}", path.display());
@@ -276,7 +285,7 @@ fn examine(
             Err(error) => return Err(at(error)),
         }
     }
-    Ok(examination.finish(report))
+    Ok(examination.finish(end))
 }
 
 /// A file of the planner; `None` when it was never written, or cannot be read: then with a warning.

@@ -3,7 +3,7 @@
 
 use crate::conclusion::LIGHT_LAG;
 use crate::latency::HopHistograms;
-use crate::marks::{Judge, Judgement, Unjudged};
+use crate::marks::{Judge, Judgement, StreamEnd, Unjudged};
 use crate::recording::CycleRecord;
 use crate::recording::continuity::{Continuity, Gap, Stamp, Succession};
 use crate::trace::Trace;
@@ -79,15 +79,14 @@ impl<'a> Examination<'a> {
         }
     }
 
-    /// Ends it. `report` is the controller's final one of the stream, if it came: it says where the
-    /// records of the stream should begin and end.
-    pub fn finish(mut self, report: Option<&ControllerReport>) -> Findings {
+    /// Ends it, with what is known of the end of the stream.
+    pub fn finish(mut self, end: StreamEnd<'_>) -> Findings {
         self.trace.finish();
-        if let Some(report) = report {
+        if let StreamEnd::Reported(report) = end {
             self.count_ends(report);
         }
         Findings {
-            marks: self.judge.finish(report),
+            marks: self.judge.finish(end),
             histograms: self.histograms,
             trace: self.trace,
             continuity: self.continuity,
@@ -132,7 +131,7 @@ mod tests {
                 last_cycle: Cycle(200 - LIGHT_LAG),
                 ..ControllerReport::default()
             };
-            let continuity = examination.finish(Some(&report)).continuity;
+            let continuity = examination.finish(StreamEnd::Reported(&report)).continuity;
             let found = (continuity.gaps, continuity.missing, continuity.longest);
             assert_eq!(found, expect, "{cycles:?}");
         };

@@ -88,6 +88,26 @@ pub struct Judgement {
     pub open_end: bool,
 }
 
+/// What is known of the end of a job's stream.
+#[derive(Debug, Clone, Copy)]
+pub enum StreamEnd<'a> {
+    /// The controller's final report says where the last light is told, and whether the job was
+    /// completed.
+    Reported(&'a ControllerReport),
+    /// Drives died, and the recording has all that it said: what it had been told to light still
+    /// fell, for some cycles, and no more.
+    Silenced,
+    /// Nobody says anything.
+    Unknown,
+}
+
+impl<'a> StreamEnd<'a> {
+    /// As the controller reports it, if it does.
+    pub fn of(report: Option<&'a ControllerReport>) -> Self {
+        report.map_or(Self::Unknown, Self::Reported)
+    }
+}
+
 /// Why there is no judgement at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Unjudged {
@@ -250,12 +270,11 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The judgement. `report` is the controller's final one of the stream: it says where the last
-    /// light is told, and whether the job was completed.
+    /// The judgement, with what is known of the end of the stream.
     ///
     /// # Errors
     /// [`Unjudged`] where there is nothing to judge.
-    pub fn finish(mut self, report: Option<&ControllerReport>) -> Result<Judgement, Unjudged> {
+    pub fn finish(mut self, end: StreamEnd<'_>) -> Result<Judgement, Unjudged> {
         if let Some(interval) = self.path.finish() {
             self.interval(&interval);
         }
@@ -264,7 +283,7 @@ impl<'a> Judge<'a> {
             return Err(Unjudged::Unrecorded);
         }
         let Some(newest) = self.newest else { return Err(Unjudged::ToolUnknown) };
-        let open_end = self.hide_the_end(&newest, report);
+        let open_end = self.hide_the_end(&newest, end);
         let (speed_min, speed_max) = self.sums.speed.or(self.sums.run_speed).unwrap_or((0.0, 0.0));
         let mut marks = Marks {
             length: self.sums.length,
@@ -363,7 +382,7 @@ impl<'a> Judge<'a> {
         if light.stroke < unseen.from.stroke {
             return;
         }
-        let found = self.find(interval, light);
+        let found = self.find(unseen, interval, light);
         let place = Place { stroke: light.stroke, at: found.map_or(0.0, |foot| foot.at) };
         let place = if found.is_some() { place } else { place.next_stroke() };
         if let Some(state) = self.strokes.get_mut(shape) {
@@ -376,7 +395,7 @@ impl<'a> Judge<'a> {
 
     /// Where along its stroke the first light after a gap is. `None` where the line comes by more
     /// than once and nothing says which passage it is.
-    fn find(&mut self, interval: &Interval, light: FirstLight) -> Option<Foot> {
+    fn find(&mut self, unseen: &Unseen, interval: &Interval, light: FirstLight) -> Option<Foot> {
         let index = self.stroke_index(light.stroke)?;
         self.load_line(index);
         let (_, line) = self.line.as_ref()?;
@@ -391,6 +410,16 @@ impl<'a> Judge<'a> {
         let mut passages = line.passages(&point, tolerance);
         if passages.len() > 1 && passages.iter().any(ahead) {
             passages.retain(ahead);
+        }
+        // Light comes again where it ended, and went on from there as fast as it can at most.
+        let farthest = self.farthest(unseen.from, unseen.cycles);
+        let possible = |passage: &Passage| {
+            let place = |at| Place { stroke: light.stroke, at };
+            unseen.from.is_before(place(passage.foot.at + REACH))
+                && place(passage.foot.at - REACH).is_before(farthest)
+        };
+        if passages.len() > 1 && passages.iter().any(possible) {
+            passages.retain(possible);
         }
         let followed = self.strokes.get(index)?.followed;
         // What begins in a recorded cycle, on a stroke not met before, begins at its start.
@@ -431,9 +460,14 @@ impl<'a> Judge<'a> {
 
     /// Hides what the job may still have marked after its last record, and in a gap after which
     /// nothing was lit; whether nobody can tell how far that was.
-    fn hide_the_end(&mut self, newest: &Moment, report: Option<&ControllerReport>) -> bool {
+    fn hide_the_end(&mut self, newest: &Moment, end: StreamEnd<'_>) -> bool {
         let last = newest.stamp.cycle;
-        let told = report.map(|report| report.last_cycle.0.saturating_add(LIGHT_LAG));
+        let (last_cycle, completed) = match end {
+            StreamEnd::Reported(report) => (Some(report.last_cycle.0), report.completed == 1),
+            StreamEnd::Silenced => (Some(last), false),
+            StreamEnd::Unknown => (None, false),
+        };
+        let told = last_cycle.map(|cycle| cycle.saturating_add(LIGHT_LAG));
         // Without a report nothing more is lit where drives has closed the gate by itself.
         let lacking = match told {
             Some(told) => told.saturating_sub(last),
@@ -449,17 +483,22 @@ impl<'a> Judge<'a> {
                 (unseen.from, cycles.map(|cycles| cycles + lacking))
             }
         };
-        let completed = report.is_some_and(|report| report.completed == 1);
-        let bound = cycles.zip(self.fastest).filter(|_| !completed);
-        let to = match bound {
+        let bound = cycles.filter(|_| !completed);
+        let to = self.farthest(from, bound);
+        self.hide(from, to);
+        let bounded = bound.and(self.fastest).is_some();
+        !bounded && !completed && from.is_before(to)
+    }
+
+    /// How far the job can have come from a place in so many cycles; `None` is any number.
+    fn farthest(&self, from: Place, cycles: Option<u64>) -> Place {
+        match cycles.zip(self.fastest) {
             Some((cycles, speed)) => {
                 let time = cycles as f64 * CYCLE_TIME;
                 from.after(speed * FASTEST_RATE * time, self.artwork)
             }
             None => Place::end(self.artwork),
-        };
-        self.hide(from, to);
-        bound.is_none() && !completed && from.is_before(to)
+        }
     }
 
     fn interval(&mut self, interval: &Interval) {

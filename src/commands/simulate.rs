@@ -8,6 +8,7 @@ use crate::{inputs, output};
 use drives::PlantOptions;
 use monitor::conclusion::{self, Ending};
 use monitor::examination::{Clock, Examination};
+use monitor::marks::StreamEnd;
 use monitor::recording::file::RecordingWriter;
 use monitor::run_folder::RunFolder;
 use signals::run_folder;
@@ -53,7 +54,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     }
 
     let examining = Instant::now();
-    let findings = examination.finish(Some(&simulated.controller));
+    let findings = examination.finish(StreamEnd::Reported(&simulated.controller));
     let time = simulated.controller.cycles as f64 * CYCLE_TIME;
     let ending = Ending {
         controller: Some(simulated.controller),

@@ -61,7 +61,7 @@ fn examined(cycles: impl Iterator<Item = u64>) -> Findings {
     let artwork = artwork();
     let mut examination = Examination::new(&artwork, Clock::Virtual).with_fastest(0.25);
     cycles.for_each(|cycle| examination.push(&record(cycle)));
-    examination.finish(Some(&report()))
+    examination.finish(StreamEnd::Reported(&report()))
 }
 
 fn report() -> ControllerReport {
@@ -197,7 +197,7 @@ fn nothing_recorded_or_an_end_that_nobody_knows_is_said() {
         let artwork = artwork();
         let mut examination = Examination::new(&artwork, Clock::Virtual);
         cycles.for_each(|cycle| examination.push(&record(cycle)));
-        summary_of(ending, Some(&examination.finish(ending.controller.as_ref())))
+        summary_of(ending, Some(&examination.finish(StreamEnd::of(ending.controller.as_ref()))))
     };
     let nothing = summary(&ended(report()), 0..0);
     assert_eq!(nothing.marks, None);

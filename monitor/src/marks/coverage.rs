@@ -4,6 +4,9 @@
 /// Movement back along the stroke that is not yet a second mark [m]: the tool's vibration.
 const VIBRATION: f64 = 1e-6;
 
+/// A hidden stretch shorter than this is no more than the tool's distance from its plan [m].
+const NOTABLE: f64 = 2e-5;
+
 /// The marked stretches of a stroke, by arc length.
 #[derive(Debug, Clone, Default)]
 pub struct Coverage {
@@ -69,19 +72,20 @@ impl Coverage {
 
     /// Whether it is certain that there was no light at all.
     pub fn is_lost(&self) -> bool {
-        self.stretches.is_empty() && self.leg.is_none() && self.hidden.is_empty()
+        self.stretches.is_empty() && self.leg.is_none() && !self.is_hidden()
     }
 
-    /// Whether any of it was passed while nobody recorded.
+    /// Whether more of it than the accuracy of an end was passed while nobody recorded, or all of a
+    /// dot.
     pub fn is_hidden(&self) -> bool {
-        !self.hidden.is_empty()
+        self.hidden.iter().any(|(from, to)| from == to || to - from > NOTABLE)
     }
 
     /// How a stroke of `length` [m] was covered. Call after [`Self::end`].
     pub fn extent(&self, length: f64) -> Extent {
         let known = || self.stretches.iter();
         let all = || known().chain(&self.hidden);
-        if self.is_lost() {
+        if all().next().is_none() {
             return Extent { missing: length, missing_ends: [length; 2], ..Extent::default() };
         }
         let low = all().fold(f64::INFINITY, |low, stretch| low.min(stretch.0));

@@ -1,6 +1,8 @@
 //! The judge on synthetic recordings, with numbers worked out by hand.
 #![allow(clippy::unwrap_used)]
 
+mod gaps;
+
 use super::*;
 use signals::artwork::Stroke;
 use signals::feedback::status;
@@ -14,7 +16,7 @@ fn judgement(artwork: &Artwork, records: &[CycleRecord]) -> Result<Judgement, Un
     records.iter().for_each(|record| judge.push(record));
     let last_cycle = Cycle(FIRST);
     let completed = ControllerReport { completed: 1, last_cycle, ..ControllerReport::default() };
-    judge.finish(Some(&completed))
+    judge.finish(StreamEnd::Reported(&completed))
 }
 
 /// The marks of a recording of which nothing is missing.

@@ -4,6 +4,7 @@
 use super::*;
 use crate::examination::{Clock, Examination};
 use crate::latency::IntervalLog;
+use crate::marks::StreamEnd;
 use crate::stage::{Inputs, MonitorStage, Outputs};
 use crate::summary::{JobSummary, MachineSummary, Outcome};
 use signals::artwork::Stroke;
@@ -104,7 +105,7 @@ fn the_page_shows_the_run_and_needs_no_network() {
     stage.finish(&mut outputs);
     assert_eq!((count, outputs.records.len(), stage.continuity().missing), (1000, 0, 0));
 
-    let findings = examination.finish(None);
+    let findings = examination.finish(StreamEnd::Unknown);
     let machine = MachineSummary {
         name: "sample <machine>".into(),
         mechanism: "corexy".into(),
@@ -156,7 +157,7 @@ fn the_page_shows_the_run_and_needs_no_network() {
 fn a_run_without_marks_has_a_report_too() {
     let summary = Summary::new(Outcome::Aborted, JobSummary::default(), MachineSummary::default());
     let artwork = Artwork::default();
-    let findings = Examination::new(&artwork, Clock::Virtual).finish(None);
+    let findings = Examination::new(&artwork, Clock::Virtual).finish(StreamEnd::Unknown);
     let report = Report {
         summary: &summary,
         artwork: &artwork,
