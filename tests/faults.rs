@@ -12,7 +12,8 @@ use runtime::peer::Peer;
 use serde_json::Value;
 use signals::Nanoseconds;
 use support::{
-    Ended, KILL, PATIENCE, Place, Random, TERMINATE, is_lit, lines, number, service, services,
+    CONTINUE, Ended, KILL, PATIENCE, Place, Random, STOP, TERMINATE, is_lit, lines, number,
+    service, services,
 };
 
 const RUN: &str = "run";
@@ -223,7 +224,8 @@ fn without_a_monitor_the_marks_are_unharmed() {
     }
 }
 
-/// Asserts what is judged of a completed job while whose monitor was dead for a time.
+/// Asserts what is judged of a completed job while whose monitor was dead for a time. What it missed
+/// in half a second its successor still gets, and the rest is told as a gap.
 fn assert_completed_around_a_gap(summary: &Value) {
     assert!(!summary["marks"].is_null(), "{summary:#}");
     assert_balanced(summary, "completed");
@@ -235,8 +237,30 @@ fn assert_completed_around_a_gap(summary: &Value) {
         (&summary["marks"]["strokes_lost"], number(summary, "/marks/stray")),
         (&0.into(), 0.0)
     );
+    let gaps = summary["recording"]["gaps"].as_u64().unwrap();
+    assert_eq!(gaps == 0, summary["recording"]["missing"] == 0, "{summary:#}");
+    if gaps == 0 {
+        assert_eq!(number(summary, "/marks/unrecorded"), 0.0, "{summary:#}");
+    }
+}
+
+#[test]
+fn what_passes_while_nobody_can_record_is_told_as_a_gap() {
+    let place = Place::new();
+    let job = place.file("lines.ngc", &lines(8));
+    let mut running = place.run(&job, RUN, &[]);
+    let status = place.await_played(&mut running, 100);
+    // A supervisor that is stopped starts no successor.
+    running.signal(STOP);
+    kill(&service(&status, "monitor"));
+    std::thread::sleep(std::time::Duration::from_millis(1200));
+    running.signal(CONTINUE);
+    let summary = running.wait().json(0);
+    assert_eq!(summary["outcome"], "completed");
+    assert_completed_around_a_gap(&summary);
     assert!(summary["recording"]["gaps"].as_u64() >= Some(1), "{summary:#}");
-    assert!(summary["recording"]["missing"].as_u64() >= Some(1), "{summary:#}");
+    assert!(number(&summary, "/marks/unrecorded") > 1e-3, "{summary:#}");
+    place.assert_nothing_left(&[]);
 }
 
 /// Killed as soon as the job is offered, while it is planned, or while it is played: its successor

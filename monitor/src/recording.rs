@@ -64,8 +64,12 @@ impl Recorder {
         Self { newest, started: true, continuity, lost_commands, ..Self::default() }
     }
 
-    /// Takes a feedback; feedback comes in order, possibly with gaps.
+    /// Takes a feedback; feedback comes in order, possibly with gaps. One that was recorded before
+    /// is left out: a monitor that was started again gets some of what its predecessor had.
     pub fn feedback(&mut self, feedback: &Feedback) {
+        if self.newest.is_some_and(|newest| newest.has_come_to(Stamp::of(feedback))) {
+            return;
+        }
         self.feedbacks.push_back(*feedback);
         self.pair(Self::PATIENCE);
     }

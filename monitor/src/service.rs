@@ -13,6 +13,7 @@ use crate::run_folder::{FileError, RunFolder};
 use crate::stage::Inputs;
 use machine::Machine;
 use recording::Recording;
+use runtime::channel::DEEP;
 use runtime::message::tell;
 use runtime::peer::{PeerState, Peers};
 use runtime::{Domain, Reading, Role, ServiceError, Subscriber, signal};
@@ -58,6 +59,8 @@ struct Service {
     /// When feedback and commands came last.
     heard: [Instant; 2],
     newest_command: Command,
+    /// Whether what was received stands before the first job.
+    early: bool,
     job: Option<Job>,
     recording: Option<Recording>,
 }
@@ -86,6 +89,7 @@ impl Service {
             command_batch: Vec::new(),
             heard: [Instant::now(); 2],
             newest_command: Command::default(),
+            early: true,
             job: None,
             recording: None,
         })
@@ -112,10 +116,15 @@ impl Service {
         if self.recording.as_ref().is_some_and(over) { self.end_recording() } else { Ok(()) }
     }
 
-    /// Empties the channels of the cycle.
+    /// Empties the channels of the cycle. What was received before is forgotten, unless no job was
+    /// offered yet: a monitor that was started again gets the newest cycles before it hears of the
+    /// job that they belong to.
     fn receive(&mut self) -> Result<(), ServiceError> {
-        self.feedback_batch.clear();
-        self.command_batch.clear();
+        let waiting = self.feedback_batch.len().max(self.command_batch.len());
+        if !self.early || waiting > DEEP {
+            self.forget();
+        }
+        self.early = self.job.is_none();
         while let Some(feedback) = self.feedbacks.receive()? {
             self.feedback_batch.push(feedback);
         }
@@ -131,6 +140,11 @@ impl Service {
             self.newest_command = *command;
         }
         Ok(())
+    }
+
+    fn forget(&mut self) {
+        self.feedback_batch.clear();
+        self.command_batch.clear();
     }
 
     /// Whether controller and drives live and speak. A monitor that was started after their death
@@ -166,8 +180,12 @@ impl Service {
             }
         };
         let (stream, began) = (offer.stream, Instant::now());
+        let goes_on = RecordingState::of(&folder, stream) == RecordingState::Open;
         let overruns_before = self.drives.map_or(0, |report| report.overruns);
         if self.shall_record(stream, &folder) {
+            if !goes_on {
+                self.forget();
+            }
             match Recording::begin(stream, folder.clone(), overruns_before) {
                 Ok(recording) => self.recording = Some(recording),
                 Err(error) => refuse(&folder, stream, &error)?,

@@ -25,6 +25,11 @@ impl Stamp {
     pub fn of(feedback: &Feedback) -> Self {
         Self { epoch: feedback.epoch, cycle: feedback.cycle.0 }
     }
+
+    /// Whether `other`, of the same run of drives, is this cycle or one before it.
+    pub fn has_come_to(self, other: Self) -> bool {
+        self.epoch == other.epoch && other.cycle <= self.cycle
+    }
 }
 
 /// How one record follows another.
