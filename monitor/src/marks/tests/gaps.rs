@@ -3,6 +3,7 @@
 #![allow(clippy::single_range_in_vec_init, reason = "a list of gaps may have one")]
 
 use super::*;
+use crate::conclusion::LIGHT_LAG;
 
 /// One cycle at the speed of the tests.
 const STEP: f64 = SPEED * CYCLE_TIME;
