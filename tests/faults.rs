@@ -162,7 +162,7 @@ fn without_a_supervisor_the_services_end_and_the_monitor_writes_the_summary() {
     let mut random = Random(4);
     for _ in 0..3 {
         let place = Place::new();
-        let job = place.file("lines.ngc", &lines(4));
+        let job = place.file("lines.ngc", &lines(8));
         let mut running = place.run(&job, RUN, &[]);
         let status = place.await_played(&mut running, 20 + random.below(1400));
         let what = format!("supervisor killed at {}", status["played"]);
@@ -216,6 +216,7 @@ fn without_a_monitor_the_marks_are_unharmed() {
         assert!(warnings.contains("monitor") && warnings.contains("signal 9"), "{warnings}");
         assert!(ended.error.contains("monitor"), "{}", ended.error);
         assert_completed_around_a_gap(&summary);
+        assert_tells_the_gap(&summary);
         let simulated = place.graver(&["simulate", job.to_str().unwrap(), "--json"]).json(0);
         assert_eq!(summary["digest"], simulated["digest"]);
         place.assert_nothing_left(&[]);
@@ -235,6 +236,10 @@ fn assert_completed_around_a_gap(summary: &Value) {
         (&summary["marks"]["strokes_lost"], number(summary, "/marks/stray")),
         (&0.into(), 0.0)
     );
+}
+
+/// Asserts that the summary counts what was not recorded.
+fn assert_tells_the_gap(summary: &Value) {
     assert!(summary["recording"]["gaps"].as_u64() >= Some(1), "{summary:#}");
     assert!(summary["recording"]["missing"].as_u64() >= Some(1), "{summary:#}");
 }
@@ -268,6 +273,10 @@ fn a_monitor_that_was_started_again_goes_on_with_the_recording() {
         support::assert_valid("summary", &summary);
         assert_eq!(summary["outcome"], "completed");
         assert_completed_around_a_gap(&summary);
+        // One that died before it had begun leaves nothing out.
+        if played.is_some() {
+            assert_tells_the_gap(&summary);
+        }
         // All of the end is there.
         support::assert_ends_dark_and_at_rest(&place.recording(RUN), 2);
         let length = number(&summary, "/job/length");
