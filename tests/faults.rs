@@ -163,7 +163,7 @@ fn without_a_supervisor_the_services_end_and_the_monitor_writes_the_summary() {
     let mut random = Random(4);
     for _ in 0..3 {
         let place = Place::new();
-        let job = place.file("lines.ngc", &lines(4));
+        let job = place.file("lines.ngc", &lines(8));
         let mut running = place.run(&job, RUN, &[]);
         let status = place.await_played(&mut running, 20 + random.below(1400));
         let what = format!("supervisor killed at {}", status["played"]);

@@ -2,6 +2,7 @@
 //! judgement says nothing else than that of the whole.
 
 #![allow(clippy::unwrap_used)]
+#![allow(clippy::single_range_in_vec_init, reason = "a list of gaps may have one")]
 
 mod support;
 

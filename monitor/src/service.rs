@@ -38,11 +38,13 @@ pub fn run(domain: &Domain, machine: &Machine) -> Result<(), ServiceError> {
         service.look()?;
         std::thread::sleep(LOOK);
     }
-    service.look()?;
-    if service.has_supervisor() {
-        return service.end_recording();
-    }
-    service.conclude_alone(machine)
+    let looked = service.look();
+    let ended = if service.has_supervisor() {
+        service.end_recording()
+    } else {
+        service.conclude_alone(machine)
+    };
+    looked.and(ended)
 }
 
 struct Service {

@@ -5,8 +5,8 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use signals::Feedback;
-use signals::time::CYCLE_TIME;
+use signals::time::CYCLE_PERIOD;
+use signals::{Feedback, Nanoseconds};
 
 /// Gaps that are told one by one; more are only counted.
 const LISTED: usize = 100;
@@ -114,7 +114,7 @@ impl Continuity {
             cycles: self.records,
             gaps: self.gaps,
             missing: self.missing,
-            longest: self.longest as f64 * CYCLE_TIME,
+            longest: Nanoseconds(self.longest as i64 * CYCLE_PERIOD.0).seconds(),
         }
     }
 }
@@ -168,7 +168,7 @@ mod tests {
         continuity.push(Succession::Apart);
         assert_eq!((continuity.records, continuity.gaps, continuity.longest), (501, 251, 3));
         assert_eq!((continuity.missing, continuity.list.len()), (84 + 2 * 83 + 3 * 83, LISTED));
-        let told = RecordingSummary { cycles: 501, gaps: 251, missing: 499, longest: 3e-3 };
+        let told = RecordingSummary { cycles: 501, gaps: 251, missing: 499, longest: 0.003 };
         assert_eq!(continuity.summary(), told);
     }
 }

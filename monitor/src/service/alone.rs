@@ -35,17 +35,23 @@ impl Service {
             // Nobody will start what is not being played yet.
             recording.withdrawn = true;
         }
-        let lost = Instant::now();
-        while !self.rests(job.stream) && lost.elapsed() < REST_PATIENCE {
-            self.look()?;
-            std::thread::sleep(LOOK);
-        }
-        self.end_recording()?;
+        // Whatever fails here, the summary is still to be written.
+        let rested = self.await_rest(job.stream);
+        let ended = self.end_recording();
         let ending = self.ending(&job);
         let summary = conclusion::conclude(&job.folder, machine, &ending, job.began);
         if !told(&job) {
             // Nobody else is left to say it.
             summary.warnings.iter().for_each(|warning| tell(&format!("monitor: {warning}")));
+        }
+        rested.and(ended)
+    }
+
+    fn await_rest(&mut self, stream: u64) -> Result<(), ServiceError> {
+        let lost = Instant::now();
+        while !self.rests(stream) && lost.elapsed() < REST_PATIENCE {
+            self.look()?;
+            std::thread::sleep(LOOK);
         }
         Ok(())
     }

@@ -135,8 +135,9 @@ impl Rows {
         self.add("cycles", format!("{}, {} overruns", summary.cycles, summary.overruns));
         if let Some(recording) = summary.recording.filter(|recording| recording.gaps > 0) {
             let RecordingSummary { cycles, gaps, missing, longest } = recording;
+            let stretches = if gaps == 1 { "1 gap".to_owned() } else { format!("{gaps} gaps") };
             let text = format!(
-                "{cycles} cycles, {missing} missing in {gaps} gaps, the longest {longest:.3} s"
+                "{cycles} cycles, {missing} missing in {stretches}, the longest {longest:.3} s"
             );
             self.add("recording", text);
         }

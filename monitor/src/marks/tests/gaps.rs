@@ -1,7 +1,9 @@
 //! Recordings with gaps: what passed in them is unrecorded, and the rest is judged as if it were
 //! whole.
+#![allow(clippy::single_range_in_vec_init, reason = "a list of gaps may have one")]
 
 use super::*;
+use crate::conclusion::LIGHT_LAG;
 
 /// One cycle at the speed of the tests.
 const STEP: f64 = SPEED * CYCLE_TIME;
@@ -148,7 +150,7 @@ fn a_dot_in_a_gap_is_not_lost() {
         (45..500, Some((3, 3))),
         (-100..25, Some((1, 1))),
     ] {
-        let judgement = judged(&art, &records, &[gap.clone()]).unwrap();
+        let judgement = judged(&art, &records, std::slice::from_ref(&gap)).unwrap();
         assert_eq!(judgement.marks.strokes_lost, 0, "{gap:?}");
         assert_eq!(judgement.unrecorded_strokes, strokes, "{gap:?}");
     }
@@ -256,7 +258,7 @@ fn a_stroke_that_comes_by_twice_is_found_by_its_time_or_not_judged() {
         // The beginning is gone, and with it the place: nothing of it is judged.
         (-100..30, art.length()),
     ] {
-        let marks = judged(&art, &records, &[gap.clone()]).unwrap().marks;
+        let marks = judged(&art, &records, std::slice::from_ref(&gap)).unwrap().marks;
         let what = format!("{gap:?}");
         // The chords of the cubic are a little shorter than the circle.
         near(marks.unrecorded, unrecorded, 2e-6, &what);
@@ -307,7 +309,7 @@ fn a_hold_in_a_gap_is_no_loss() {
     for from in (-10..120).step_by(3) {
         for lost in [1, 4, 25, 60] {
             let gap = from..from + lost;
-            let marks = judged(&art, &records, &[gap.clone()]).unwrap().marks;
+            let marks = judged(&art, &records, std::slice::from_ref(&gap)).unwrap().marks;
             let what = format!("{gap:?}");
             near(marks.missing, whole.missing, 2e-7, &what);
             near(marks.double, whole.double, 2e-7, &what);
