@@ -3,13 +3,20 @@
 use crate::exit::{Exit, Failure};
 use monitor::summary::{JobSummary, MachineSummary, Summary};
 use serde::Serialize;
+use signals::finite::first_not_finite;
 use std::io::{ErrorKind, IsTerminal, Write};
 
 /// Prints one JSON object.
 ///
 /// # Errors
-/// When standard output is closed.
+/// When standard output is closed, or a number is not finite, for which JSON has no word.
 pub fn json(value: &impl Serialize) -> Result<(), Failure> {
+    if let Some(place) = first_not_finite(value) {
+        return Err(Failure::bad_input(format!(
+            "the answer has no finite number at {place}: machine or job has values that cannot be \
+             computed with"
+        )));
+    }
     let mut text = serde_json::to_string_pretty(value).map_err(Failure::service)?;
     text.push('\n');
     match std::io::stdout().lock().write_all(text.as_bytes()) {

@@ -10,6 +10,7 @@ use machine::transmission::rest;
 use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea};
 use nalgebra::Vector3;
 use signals::axis::axis_array;
+use signals::finite::first_not_finite;
 use signals::{AxisArray, run_folder};
 use std::path::Path;
 use std::sync::Arc;
@@ -67,6 +68,10 @@ pub(super) fn write_refusal(folder: &Path, refusal: &Refusal) {
 }
 
 fn write_plan(folder: &Path, plan: &Plan) -> std::io::Result<()> {
+    // Whoever reads the plan would find null where a number is due.
+    if let Some(place) = first_not_finite(&(&plan.artwork, &plan.facts)) {
+        return Err(std::io::Error::other(format!("the plan has no finite number at {place}")));
+    }
     let write = |name: &str, content: serde_json::Result<Vec<u8>>| {
         std::fs::write(folder.join(name), content.map_err(std::io::Error::other)?)
     };
