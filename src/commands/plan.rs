@@ -60,6 +60,9 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         pulses::write(path, &input.machine, &plan)
             .map_err(|error| Failure::bad_input(format!("{}: {error}", path.display())))?;
     }
+    for warning in input.machine.job_warnings() {
+        eprintln!("graver: warning: {warning}");
+    }
     let report = PlanReport {
         machine: input.machine.name.clone(),
         time: plan.facts.duration,

@@ -252,6 +252,7 @@ impl<'a> JobRun<'a> {
         }
         self.ending.drives = Some(self.drives_with_cause());
         let machine = self.pipeline.configuration.source.machine()?;
+        self.ending.warnings.splice(0..0, machine.job_warnings());
         let summary = conclusion::conclude(&self.folder, &machine, &self.ending, self.started)
             .map_err(Failure::service)?;
         self.pipeline.board.name_job(None);
