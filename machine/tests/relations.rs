@@ -124,6 +124,13 @@ fn a_load_softer_than_the_loops_is_doubted() {
 }
 
 #[test]
+fn a_position_loop_near_its_velocity_loop_is_doubted() {
+    let parts = ["a bandwidth of 120.0 rad/s", "160.0 rad/s (line 67)", "swing together"];
+    doubted("corexy", &["axis.a.loops.position=120 1/s"], &parts);
+    sound("corexy", &["axis.a.loops.position=60 1/s"]);
+}
+
+#[test]
 fn loops_that_axes_make_faster_for_each_other_are_doubted() {
     // The bar of a five-bar moves only where both arms do.
     doubted(

@@ -43,6 +43,10 @@ const ELECTRICAL: [f64; 2] = [20e-6, 0.2];
 /// Usual mechanical time constants of motors with their load, J·R/k² [s].
 const MECHANICAL: [f64; 2] = [50e-6, 2.0];
 
+/// Times a velocity loop should be faster than the position loop around it: 4 are usual, and below 2
+/// both swing together.
+const LOOP_RATIO: f64 = 2.0;
+
 /// Share of a motor's torque that friction may take.
 const LARGEST_FRICTION: f64 = 0.3;
 
@@ -438,6 +442,19 @@ impl Subject<'_> {
                 MECHANICAL[1]
             );
             self.warn(data.torque_constant.place, &text, findings);
+        }
+        let (position, velocity) = (axis.gains.position, axis.gains.velocity);
+        if position * LOOP_RATIO > velocity {
+            let place = table.loops.as_ref().map_or(table.place, |loops| loops.position.place);
+            let text = format!(
+                "the position loop has a bandwidth of {position:.1} rad/s, and the velocity loop in it \
+                 {velocity:.1} rad/s{}: less than {LOOP_RATIO} times as much, and they swing together",
+                table
+                    .loops
+                    .as_ref()
+                    .map_or_else(String::new, |loops| { at_line(loops.velocity.place, findings) })
+            );
+            self.warn(place, &text, findings);
         }
         self.friction(motor.stall_torque(), findings);
         let push = axis.friction.coulomb / self.stiffness() * axis.ratio * lever;
