@@ -4,6 +4,7 @@ use crate::exit::{Exit, Failure};
 use monitor::summary::Summary;
 use runtime::message;
 use serde::Serialize;
+use signals::finite::first_not_finite;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 
 /// Writes one line for people on standard error, as `eprintln!` would; what cannot be written there
@@ -18,8 +19,14 @@ pub(crate) use say;
 /// Prints one JSON object.
 ///
 /// # Errors
-/// When standard output cannot be written.
+/// When standard output cannot be written, or a number is not finite, for which JSON has no word.
 pub fn json(value: &impl Serialize) -> Result<(), Failure> {
+    if let Some(place) = first_not_finite(value) {
+        return Err(Failure::bad_input(format!(
+            "the answer has no finite number at {place}: machine or job has values that cannot be \
+             computed with"
+        )));
+    }
     let mut text = serde_json::to_string_pretty(value).map_err(Failure::output)?;
     text.push('\n');
     printed(io::stdout().lock().write_all(text.as_bytes()))

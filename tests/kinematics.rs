@@ -8,7 +8,7 @@ use std::fs::File;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use support::{Ended, Place, assert_valid, golden, number};
+use support::{Ended, Place, Random, assert_valid, golden, number};
 
 const MACHINES: [&str; 2] = ["cartesian", "corexy"];
 
@@ -16,14 +16,28 @@ const MACHINES: [&str; 2] = ["cartesian", "corexy"];
 const TOLERANCE: f64 = 1e-9;
 
 /// Runs a verb on these lines of input.
-fn kinematics(place: &Place, machine: &Path, motor: bool, verb: &str, input: &str) -> Ended {
+fn kinematics(
+    place: &Place,
+    machine: &Path,
+    motor: bool,
+    verb: &str,
+    input: impl AsRef<[u8]>,
+) -> Ended {
     let more: &[&str] = if motor { &["--motor"] } else { &[] };
     kinematics_with(place, machine, more, verb, input)
 }
 
 /// Runs a verb on these lines of input, with more arguments.
-fn kinematics_with(place: &Place, machine: &Path, more: &[&str], verb: &str, input: &str) -> Ended {
-    let input = place.file(&format!("{verb}.jsonl"), input);
+fn kinematics_with(
+    place: &Place,
+    machine: &Path,
+    more: &[&str],
+    verb: &str,
+    input: impl AsRef<[u8]>,
+) -> Ended {
+    let path = place.path(&format!("{verb}.jsonl"));
+    std::fs::write(&path, input).unwrap();
+    let input = path;
     let (output, error) = (place.path("output"), place.path("error"));
     let mut arguments = vec!["kinematics", "--machine", machine.to_str().unwrap()];
     arguments.extend(more);
@@ -521,14 +535,99 @@ fn a_line_without_an_answer_is_an_error_in_its_place() {
 }
 
 #[test]
-fn input_that_is_not_json_ends_with_its_line() {
+fn input_that_is_not_json_ends_with_an_error_that_names_its_line() {
     let place = Place::new();
     let machine = support::source("machines/corexy.toml");
-    for broken in ["{", "7", "{\"p\": [1, 2]}", "{\"q\": [1, NaN]}", "{\"q\": \"1\"}"] {
-        let input = format!("{{\"q\": [0.1, 0.05]}}\n{broken}\n{{\"q\": [0.1, 0.05]}}\n");
+    let good = b"{\"q\": [0.1, 0.05]}\n";
+    let long = [b' '; (1 << 20) + 1];
+    let broken: [(&[u8], &str); 9] = [
+        (b"{", "column 1: EOF"),
+        (b"7", "invalid type"),
+        (b"{\"p\": [1, 2]}", "column 4: unknown field `p`"),
+        (b"{\"q\": [1, NaN]}", "column 11: expected value"),
+        (b"{\"q\": \"1\"}", "invalid type"),
+        (b"{\"q\": [1e999, 0]}", "number out of range"),
+        (b"\xff\xfe{\"q\": [0, 0]}", "column 1: this is not UTF-8 text"),
+        (b"{\"q\": [0, 0], \"\xe9\": 1}", "column 16: this is not UTF-8 text"),
+        (&long, "more than 1048576 bytes"),
+    ];
+    for (broken, told) in broken {
+        let input = [good, broken, b"\n", good].concat();
         let ended = kinematics(&place, &machine, false, "forward", &input);
-        assert_eq!(ended.code, Some(2), "{broken}: {}", ended.error);
-        assert!(ended.error.contains("line 2"), "{broken}: {}", ended.error);
-        assert_eq!(ended.output.lines().count(), 1, "{broken}: what came before is answered");
+        assert_eq!(ended.code, Some(2), "{told}: {}", ended.error);
+        assert!(ended.error.contains("line 2"), "{told}: {}", ended.error);
+        let lines: Vec<Value> =
+            ended.output.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let [answered, refused] = lines.as_slice() else { panic!("{told}: {}", ended.output) };
+        assert!(answered["pose"].is_object(), "what came before is answered: {answered}");
+        assert_valid("kinematics", refused);
+        assert_eq!(refused["error"]["code"], "not_json", "{refused}");
+        let detail = refused["error"]["detail"].as_str().unwrap();
+        assert!(detail.contains("line 2") && detail.contains(told), "{told}: {detail}");
+        assert!(ended.error.contains(told), "{told}: {}", ended.error);
     }
+}
+
+/// The numbers that a key of a request may have, and what a line may ask for with them.
+fn extreme_request(random: &mut Random, axes: u64) -> String {
+    const NUMBERS: [&str; 14] = [
+        "0", "0.1", "-0.1", "0.2", "3.14", "1e-9", "1e-308", "4.9e-324", "1e9", "-1e9", "1.1e9",
+        "1e200", "-1.7e308", "1e308",
+    ];
+    let mut number = || NUMBERS[random.below(NUMBERS.len() as u64) as usize].to_owned();
+    let mut list =
+        |count: u64| format!("[{}]", [(); 9].map(|()| number())[..count as usize].join(","));
+    format!(
+        "{{\"q\":{},\"qd\":{},\"qdd\":{},\"wrench\":{},\"previous\":{},\"pose\":{{\"position\":{}{}}}}}\n",
+        list(axes),
+        list(axes),
+        list(axes),
+        list(6),
+        list(axes),
+        list(3),
+        [
+            String::new(),
+            format!(",\"axis\":{}", list(3)),
+            format!(",\"rotation\":[{},{},{}]", list(3), list(3), list(3)),
+            ",\"rotation\":[[1,0,0],[0,1,0],[0,0,1]]".to_owned(),
+        ][random.below(4) as usize],
+    )
+}
+
+/// Every verb of every machine: each line has an answer whose numbers are all there, or an error.
+#[test]
+fn extreme_numbers_get_finite_answers_or_an_error_with_value_and_limit() {
+    let place = Place::new();
+    let mut random = Random(75);
+    let mut too_large = 0;
+    for (name, axes) in [
+        ("cartesian", 2),
+        ("cartesian_steppers", 2),
+        ("corexy", 2),
+        ("five_bar", 2),
+        ("prrrp", 2),
+        ("polar", 3),
+        ("tri_planar", 6),
+        ("mcm", 5),
+        ("twin_actuator", 2),
+        ("serial", 3),
+    ] {
+        let machine = support::source("machines").join(format!("{name}.toml"));
+        for verb in ["forward", "inverse", "jacobian", "dynamics", "ellipse"] {
+            for motor in [false, true] {
+                let input: String = (0..60).map(|_| extreme_request(&mut random, axes)).collect();
+                let replies = replies(&kinematics(&place, &machine, motor, verb, input.as_bytes()));
+                assert_eq!(replies.len(), 60, "{name} {verb}");
+                for reply in &replies {
+                    assert!(!reply.to_string().contains("null"), "{name} {verb}: {reply}");
+                    if reply["error"]["code"] == "too_large" {
+                        too_large += 1;
+                        assert_eq!(number(reply, "/error/limit"), 1e9, "{reply}");
+                        assert!(number(reply, "/error/value").abs() > 1e9, "{reply}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(too_large > 1000, "only {too_large} lines were refused for their size");
 }

@@ -9,6 +9,9 @@ use signals::{
     Command, ControllerReport, Cycle, Fault, Feedback, MAX_AXES, RealtimeFacts, Setpoint,
 };
 
+/// An angle beyond every motor's, whose square is still a number [rad].
+const BEYOND_ANGLE: f64 = 1e100;
+
 /// The running report of a stream.
 #[derive(Debug, Clone)]
 pub struct Statistics {
@@ -68,6 +71,10 @@ impl Statistics {
         self.digest.add(command, self.axes.len());
         for index in 0..self.axes.len().min(MAX_AXES) {
             let error = (now.angle[index] - feedback.position[index]).abs();
+            // What is no angle ends the run as a fault, and would leave no number in the summary.
+            if error > BEYOND_ANGLE || error.is_nan() {
+                continue;
+            }
             report.following_error_max[index] = report.following_error_max[index].max(error);
             report.following_error_squares[index] += error * error;
         }

@@ -3,7 +3,9 @@
 //! A finding says what is wrong and whether the axes can still be trusted to follow the plan. If
 //! so they come to rest along the path, else the drives brake them.
 
-use machine::{Axis, DcMotor, Machine, Motor};
+use machine::trip::Limit;
+use machine::trip::following::{CREEP, DISCONTINUITY, LEAD_STEP};
+use machine::{Axis, DcMotor, Machine};
 use signals::command::MOST_MISSES;
 use signals::feedback::status;
 use signals::setpoint::flags;
@@ -12,24 +14,6 @@ use signals::{AxisArray, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_A
 
 /// Overruns in a row that a clock which does not slip may have.
 const OVERRUNS: u64 = 3;
-
-/// How far a planned value may exceed its limit before the setpoint is refused. The planner's
-/// checker refuses sooner.
-const EXCESS: f64 = 1.001;
-
-/// Rounding of a planned position against its soft limit [m or rad].
-const ROUNDING: f64 = 1e-9;
-
-/// Share of the largest following error by which a setpoint may differ from where the speeds of
-/// both lead from the one before. The planned motion leaves 10⁻⁹ m.
-const DISCONTINUITY: f64 = 0.01;
-
-/// Share of the largest following error by which the lead may change between two setpoints; the
-/// largest planned jerk changes it by a hundredth.
-const LEAD_STEP: f64 = 0.25;
-
-/// Share of the largest following error that an axis may move in a cycle at a planned rest.
-const CREEP: f64 = 0.001;
 
 /// Encoder counts per cycle within which an axis counts as standing.
 const STANDING_COUNTS: f64 = 1.5;
@@ -199,12 +183,12 @@ impl Supervision {
                 let fault = Fault::new(FaultCode::PositionLimit).on(index);
                 return Err(Finding::lost(fault.beyond(FaultQuantity::Position, measured, limit)));
             }
-            if let Some(continuous) = axis.motor.dc().and_then(|motor| motor.continuous_current) {
+            if let Some(limit) = axis.motor.dc().and_then(DcMotor::heating_limit) {
                 let heating = self.heating[index];
-                if heating > continuous * continuous {
+                if heating > limit.trip * limit.trip {
                     let fault = Fault::new(FaultCode::Overload).on(index);
                     let (quantity, value) = (FaultQuantity::Heating, heating.sqrt());
-                    let finding = Finding::sound(fault.beyond(quantity, value, continuous));
+                    let finding = Finding::sound(fault.beyond(quantity, value, limit.trip));
                     overload.get_or_insert(finding);
                 }
             }
@@ -245,26 +229,19 @@ impl Supervision {
                 return Err(Finding::sound(fault));
             }
             let [position, velocity, acceleration, jerk, _, _, _, effort, ..] = numbers;
-            let friction =
-                axis.friction.coulomb + axis.friction.viscous * (velocity / axis.ratio).abs();
-            let torque = friction
-                + match &axis.motor {
-                    Motor::Dc(motor) => motor.torque_constant * motor.current,
-                    Motor::Stepper(motor) => motor.holding_torque,
-                };
             let [lower, upper] = limits.position;
             let sizes = [
-                (FaultQuantity::Velocity, velocity, limits.velocity),
-                (FaultQuantity::Acceleration, acceleration, limits.acceleration),
-                (FaultQuantity::Jerk, jerk, limits.jerk),
-                (FaultQuantity::Torque, effort, torque),
+                (FaultQuantity::Velocity, velocity, axis.velocity_limit()),
+                (FaultQuantity::Acceleration, acceleration, axis.acceleration_limit()),
+                (FaultQuantity::Jerk, jerk, axis.jerk_limit()),
+                (FaultQuantity::Torque, effort, axis.effort_limit(velocity / axis.ratio)),
             ];
-            let too_large = sizes.iter().find(|(_, value, limit)| value.abs() > limit * EXCESS);
+            let too_large = sizes.iter().find(|(_, value, limit)| value.abs() > limit.trip);
             let nearest = position.max(lower).min(upper);
             let broken = match too_large {
-                None if (position - nearest).abs() <= ROUNDING => continue,
+                None if (position - nearest).abs() <= Limit::ROUNDING.trip => continue,
                 None => (FaultQuantity::Position, position, nearest),
-                Some(broken) => *broken,
+                Some((quantity, value, limit)) => (*quantity, *value, limit.plan),
             };
             let (quantity, value, limit) = broken;
             let fault = Fault::new(FaultCode::SetpointLimit).on(index);

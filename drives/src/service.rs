@@ -15,7 +15,7 @@ use runtime::clock::{self, PeriodicClock};
 use runtime::peer::{PeerState, Peers};
 use runtime::thread::{self, RealtimeOptions};
 use runtime::wake::{Listener, Notifier, Wake};
-use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, signal};
+use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, message, signal};
 use signals::feedback::status;
 use signals::report::refused;
 use signals::time::CYCLE_PERIOD;
@@ -64,7 +64,7 @@ pub fn run(
         let facts = RealtimeFacts { refused: refused::CLAIM, ..realtime.facts };
         thread::missing(&[("drives", facts)])
             .iter()
-            .for_each(|warning| eprintln!("graver: drives: {warning}"));
+            .for_each(|warning| message::tell(&format!("drives: {warning}")));
     }
     let result = cycle.keep_running(realtime.spin_margin(), realtime.facts);
     cycle.bridge.release();

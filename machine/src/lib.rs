@@ -23,6 +23,7 @@ pub mod quantity;
 pub mod surface;
 pub mod taylor;
 pub mod transmission;
+pub mod trip;
 
 pub use actuator::{Axis, Encoder, Friction, JointUnit, LoopGains};
 pub use document::{DocumentError, Override};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::actuator::Axis;
-use crate::document::{DocumentError, Override};
+use crate::document::{Concern, DocumentError, Override};
 use crate::limits::{PathLimits, WorkArea};
 use crate::mechanisms::MechanismKind;
 use crate::process::{GcodeSettings, LaserSource};
@@ -50,9 +50,22 @@ pub struct Warning {
     pub line: usize,
     /// Column in characters from 1; 0 when an override is meant.
     pub column: usize,
+    /// Whether the value is used, or only compared with others.
+    pub concern: Concern,
 }
 
 impl Machine {
+    /// The warnings that bear on a job, each with its line in the machine file: those of values that are
+    /// used.
+    pub fn job_warnings(&self) -> Vec<String> {
+        let used = self.warnings.iter().filter(|warning| warning.concern == Concern::Use);
+        used.map(|Warning { text, line, .. }| match line {
+            0 => text.clone(),
+            line => format!("machine file, line {line}: {text}"),
+        })
+        .collect()
+    }
+
     /// The CoreXY of source 003, the machine when none is named: `machines/corexy.toml`, built in.
     ///
     /// # Panics

@@ -1,5 +1,6 @@
 //! Every sample of a plan against every limit of path, area and axes, before the first one is sent.
 
+use machine::trip::Limit;
 use machine::{Axis, DcMotor, Friction, Machine, Motor, PathLimits};
 use signals::Setpoint;
 use signals::time::CYCLE_TIME;
@@ -15,7 +16,7 @@ const ALLOWANCE: f64 = 1.001;
 const DARK_ALLOWANCE: f64 = 1.005;
 
 /// Rounding allowed at the edge of an area or a soft limit [m or rad].
-const ROUNDING: f64 = 1e-9;
+const ROUNDING: f64 = Limit::ROUNDING.plan;
 
 /// What a plan holds to a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -207,14 +208,19 @@ impl<'a> Checker<'a> {
             let [place, speed, acceleration, jerk] = axis.unit.names();
             within(position, nearest, time, name, Quantity::JointPosition, place)?;
             let demands = [
-                (setpoint.velocity[index], limits.velocity, Quantity::JointVelocity, speed),
+                (
+                    setpoint.velocity[index],
+                    axis.velocity_limit().plan,
+                    Quantity::JointVelocity,
+                    speed,
+                ),
                 (
                     setpoint.acceleration[index],
-                    limits.acceleration,
+                    axis.acceleration_limit().plan,
                     Quantity::JointAcceleration,
                     acceleration,
                 ),
-                (setpoint.jerk[index], limits.jerk, Quantity::JointJerk, jerk),
+                (setpoint.jerk[index], axis.jerk_limit().plan, Quantity::JointJerk, jerk),
             ];
             let most =
                 [&mut uses.velocity[index], &mut uses.acceleration[index], &mut uses.jerk[index]];
@@ -258,18 +264,20 @@ impl<'a> Checker<'a> {
             let voltage = motor.resistance * (current + earlier) / 2.0
                 + motor.inductance * (current - earlier) / CYCLE_TIME
                 + motor.torque_constant * speed;
+            let most = motor.current_limit();
             let share =
-                below(current.abs(), motor.current, 1.0, time, name, Quantity::MotorCurrent, "A")?;
+                below(current.abs(), most.plan, 1.0, time, name, Quantity::MotorCurrent, "A")?;
             self.uses.current[index] = self.uses.current[index].max(share);
+            let most = motor.voltage_limit();
             let share =
-                below(voltage.abs(), motor.voltage, 1.0, time, name, Quantity::MotorVoltage, "V")?;
+                below(voltage.abs(), most.plan, 1.0, time, name, Quantity::MotorVoltage, "V")?;
             self.uses.voltage[index] = self.uses.voltage[index].max(share);
-            if let Some(continuous) = motor.continuous_current {
+            if let Some(limit) = motor.heating_limit() {
                 let heating = &mut self.heating[index];
                 *heating = DcMotor::heated(*heating, current, CYCLE_TIME, DcMotor::HEATING_TIME);
                 let value = heating.sqrt();
                 let share =
-                    below(value, continuous, 1.0, time, name, Quantity::HeatingCurrent, "A")?;
+                    below(value, limit.plan, 1.0, time, name, Quantity::HeatingCurrent, "A")?;
                 self.uses.heat[index] = self.uses.heat[index].max(share);
             }
             now.push((angle, current));

@@ -13,6 +13,7 @@ pub mod axis;
 pub mod command;
 pub mod fault;
 pub mod feedback;
+pub mod finite;
 pub mod hop;
 pub mod job;
 pub mod laser;

@@ -13,6 +13,7 @@ use crate::exit::{Exit, Failure};
 use crate::files::Sources;
 use crate::inputs::MachineInput;
 use crate::{inputs, output};
+use drives::{PlantOptions, SimulatedPlant};
 use machine::Machine;
 use monitor::conclusion::machine_summary;
 use monitor::report::workspace::Workspace;
@@ -44,9 +45,9 @@ pub struct CheckReport {
 /// A doubt and its place.
 #[derive(Debug, Serialize, schemars::JsonSchema)]
 pub struct CheckWarning {
-    /// Line of the machine file, 0 for an override.
+    /// Line of the machine file, 0 for an override or the machine as a whole.
     pub line: u64,
-    /// Column from 1, 0 for an override.
+    /// Column from 1, 0 likewise.
     pub column: u64,
     /// What is doubtful.
     pub message: String,
@@ -81,7 +82,7 @@ pub fn run(arguments: &CheckArguments) -> Result<Exit, Failure> {
         machine: machine_summary(machine),
         axes: axes::axes(machine),
         reach: surveyed.report,
-        warnings: warnings(machine),
+        warnings: warnings(&input),
         sample_job: sample_job(&input),
         job,
     };
@@ -132,13 +133,20 @@ fn tidy(path: &Path) -> PathBuf {
     tidy
 }
 
-fn warnings(machine: &Machine) -> Vec<CheckWarning> {
-    let warnings = machine.warnings.iter().map(|warning| CheckWarning {
+/// The doubts about the machine file, and why it cannot be simulated, if it cannot.
+fn warnings(input: &MachineInput) -> Vec<CheckWarning> {
+    let doubts = input.machine.warnings.iter().map(|warning| CheckWarning {
         line: warning.line as u64,
         column: warning.column as u64,
         message: warning.text.clone(),
     });
-    warnings.collect()
+    let simulated = SimulatedPlant::new(&input.plant, PlantOptions::default());
+    let refused = simulated.err().map(|error| CheckWarning {
+        line: 0,
+        column: 0,
+        message: format!("`graver simulate` cannot simulate it: {error}"),
+    });
+    doubts.chain(refused).collect()
 }
 
 /// The picture of the workspace, as SVG.

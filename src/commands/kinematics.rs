@@ -1,17 +1,24 @@
 //! `graver kinematics`: JSON lines in, JSON lines out, in order.
 
+mod input;
 pub mod lines;
 
+use self::input::{Input, NotJson};
 use self::lines::{Branch, Ellipse, ErrorBody, Reply, ReplyPose, Request, RequestPose};
 use crate::arguments::{KinematicsArguments, KinematicsVerb};
 use crate::exit::{Exit, Failure};
 use crate::inputs;
 use machine::kinematics::{Branch as _, Freedom, Joints, KinematicsError};
 use machine::{Machine, Mechanism, MechanismVisitor, Pose};
-use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SMatrix, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SMatrix, SVD, SymmetricEigen, Vector3};
 use serde_json::Value;
+use signals::finite::first_not_finite;
 use signals::math;
-use std::io::{BufRead, BufWriter, Write};
+use std::io::{self, BufRead, BufWriter, ErrorKind, Write};
+
+/// Turns of the iterations behind singular values and eigenvalues before they are given up; a matrix
+/// of six rows takes about a dozen.
+const MOST_TURNS: usize = 1000;
 
 /// Runs the command on standard input and output.
 ///
@@ -44,34 +51,71 @@ impl<I: BufRead, O: Write> MechanismVisitor for Lines<'_, I, O> {
             previous: Joints::from_fn(|axis, _| home.get(axis).copied().unwrap_or_default()),
             near: None,
         };
-        let mut line = String::new();
-        let mut number = 0;
+        let mut input = Input::new(self.input);
         loop {
-            line.clear();
-            let read = self.input.read_line(&mut line).map_err(Failure::service)?;
-            if read == 0 {
-                break;
-            }
-            number += 1;
-            if line.trim().is_empty() {
-                continue;
-            }
-            let request: Request = match serde_json::from_str(&line) {
-                Ok(request) => request,
-                Err(error) => {
-                    self.output.flush().map_err(Failure::service)?;
-                    return Err(Failure::bad_input(format!(
-                        "standard input, line {number}, column {}: {error}",
-                        error.column()
-                    )));
+            let request = match input.next_request() {
+                Ok(None) => break,
+                Ok(Some(Ok(request))) => request,
+                Ok(Some(Err(error))) => {
+                    if !write_line(&mut self.output, &Reply::Error { error })? {
+                        break;
+                    }
+                    continue;
+                }
+                Err(NotJson::Unreadable(error)) => return Err(Failure::service(error)),
+                Err(NotJson::Line { number, detail }) => {
+                    let message = format!("standard input, line {number}: {detail}");
+                    let error = ErrorBody::not_json(message.clone());
+                    if write_line(&mut self.output, &Reply::Error { error })? {
+                        flush(&mut self.output)?;
+                    }
+                    return Err(Failure::bad_input(message));
                 }
             };
-            let reply = answer.line(&request).unwrap_or_else(|error| Reply::Error { error });
-            serde_json::to_writer(&mut self.output, &reply).map_err(Failure::service)?;
-            self.output.write_all(b"\n").map_err(Failure::service)?;
+            let reply = answer
+                .line(&request)
+                .and_then(finite)
+                .unwrap_or_else(|error| Reply::Error { error });
+            if !write_line(&mut self.output, &reply)? {
+                break;
+            }
         }
-        self.output.flush().map_err(Failure::service)?;
+        flush(&mut self.output)?;
         Ok(Exit::Done)
+    }
+}
+
+/// Writes `reply` as a line; `false` where nobody reads on.
+fn write_line(output: &mut impl Write, reply: &Reply) -> Result<bool, Failure> {
+    let mut line = serde_json::to_vec(reply).map_err(Failure::service)?;
+    line.push(b'\n');
+    heard(output.write_all(&line))
+}
+
+fn flush(output: &mut impl Write) -> Result<bool, Failure> {
+    heard(output.flush())
+}
+
+/// Whoever read has read enough where the pipe is closed, as `head` does.
+fn heard(written: io::Result<()>) -> Result<bool, Failure> {
+    match written {
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+        Err(error) => Err(Failure::service(error)),
+    }
+}
+
+/// The reply, if all of its numbers are finite.
+fn finite(reply: Reply) -> Result<Reply, ErrorBody> {
+    match first_not_finite(&reply) {
+        None => Ok(reply),
+        Some(place) => Err(ErrorBody {
+            code: "not_finite".into(),
+            axis: None,
+            value: None,
+            limit: Some(f64::MAX),
+            detail: format!("\"{place}\" of the answer is beyond the largest number"),
+        }),
     }
 }
 
@@ -276,7 +320,10 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         } else {
             (&task * task.transpose()).lu().determinant().max(0.0).sqrt()
         };
-        let mut singular: Vec<f64> = task.singular_values().iter().copied().collect();
+        let values = SVD::try_new_unordered(task, false, false, 5.0 * f64::EPSILON, MOST_TURNS)
+            .ok_or_else(ErrorBody::not_converged)?
+            .singular_values;
+        let mut singular: Vec<f64> = values.iter().copied().collect();
         singular.sort_by(|a, b| b.total_cmp(a));
         Ok(Reply::Jacobian { j: rows, det: determinant, singular_values: singular })
     }
@@ -315,9 +362,10 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         let jacobian = self.tool_jacobian(&assembly);
         let size = self.dimensions();
         let linear = DMatrix::from_fn(size, N, |row, column| jacobian[(row, column)]);
-        let axes = principal_axes(&linear * linear.transpose());
+        let axes = principal_axes(&linear * linear.transpose())?;
         let least = axes.last().map_or(0.0, |(axis, _)| *axis);
-        if least <= 0.0 {
+        // So near to a singularity that the force has no number either.
+        if !least.recip().is_finite() {
             return Err(ErrorBody {
                 code: "singular".into(),
                 axis: None,
@@ -371,8 +419,8 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         ErrorBody {
             code: error.code.into(),
             axis: error.axis.and_then(|axis| self.machine.axes.get(axis)).map(|a| a.name.clone()),
-            value: Some(error.value),
-            limit: Some(error.limit),
+            value: error.value.is_finite().then_some(error.value),
+            limit: error.limit.is_finite().then_some(error.limit),
             detail: error.detail.into(),
         }
     }
@@ -422,8 +470,9 @@ fn shown_branch(branch: impl machine::kinematics::Branch) -> Branch {
 }
 
 /// Semi-axes, larger first, of the ellipsoid of a symmetric matrix, with their directions.
-fn principal_axes(matrix: DMatrix<f64>) -> Vec<(f64, DVector<f64>)> {
-    let eigen = SymmetricEigen::new(matrix);
+fn principal_axes(matrix: DMatrix<f64>) -> Result<Vec<(f64, DVector<f64>)>, ErrorBody> {
+    let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, MOST_TURNS)
+        .ok_or_else(ErrorBody::not_converged)?;
     let mut axes: Vec<(f64, DVector<f64>)> = eigen
         .eigenvalues
         .iter()
@@ -431,7 +480,7 @@ fn principal_axes(matrix: DMatrix<f64>) -> Vec<(f64, DVector<f64>)> {
         .map(|(value, direction)| (value.max(0.0).sqrt(), direction.into_owned()))
         .collect();
     axes.sort_by(|(first, _), (second, _)| second.total_cmp(first));
-    axes
+    Ok(axes)
 }
 
 /// Angle of a line along `direction` in the x-y plane, in (−π/2, π/2] [rad].

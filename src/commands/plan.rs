@@ -66,6 +66,9 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         let file = sources.create("--pulses", path)?;
         written(path, pulses::write(file, &input.machine, &plan))?;
     }
+    for warning in input.machine.job_warnings() {
+        say!("graver: warning: {warning}");
+    }
     let report = PlanReport {
         machine: input.machine.name.clone(),
         time: plan.facts.duration,

@@ -60,6 +60,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
         controller: Some(simulated.controller),
         drives: Some(simulated.drives),
         plan_time,
+        warnings: input.machine.job_warnings(),
         realtime_factor: Some(time / simulated.stepping.as_secs_f64()),
         ..Ending::default()
     };

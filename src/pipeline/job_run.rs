@@ -388,6 +388,7 @@ impl<'a> JobRun<'a> {
             self.ending.latched = self.pipeline.heard.progress.fault;
         }
         let machine = &self.pipeline.machine;
+        self.ending.warnings.splice(0..0, machine.job_warnings());
         let summary = conclusion::conclude(&self.folder, machine, &self.ending, self.started);
         self.pipeline.board.name_job(None);
         self.control.end();

@@ -2,6 +2,7 @@
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
+use super::bounds::Measured;
 use super::error::ProblemKind;
 use super::findings::Findings;
 use super::node::{Node, Place, Value};
@@ -15,6 +16,11 @@ pub trait Decode: Sized + JsonSchema {
     fn absent(place: Place, findings: &mut Findings) -> Option<Self> {
         let _ = (place, findings);
         None
+    }
+
+    /// The numbers in it, for the bounds of its key; tables hold theirs to bounds themselves.
+    fn numbers(&self) -> Vec<Measured> {
+        Vec::new()
     }
 
     /// Whether a key of this type must be there when it has no default.
@@ -113,6 +119,10 @@ impl<T: Decode> Decode for Option<T> {
         T::decode(node, findings).map(Some)
     }
 
+    fn numbers(&self) -> Vec<Measured> {
+        self.as_ref().map(T::numbers).unwrap_or_default()
+    }
+
     fn absent(_place: Place, _findings: &mut Findings) -> Option<Self> {
         Some(None)
     }
@@ -140,6 +150,10 @@ impl<T: Decode> Decode for Vec<T> {
         let values: Vec<Option<T>> = nodes.iter().map(|node| T::decode(node, findings)).collect();
         values.into_iter().collect()
     }
+
+    fn numbers(&self) -> Vec<Measured> {
+        self.iter().flat_map(T::numbers).collect()
+    }
 }
 
 impl<T: Decode, const N: usize> Decode for [T; N]
@@ -165,5 +179,9 @@ where
             return None;
         }
         Vec::decode(node, findings)?.try_into().ok()
+    }
+
+    fn numbers(&self) -> Vec<Measured> {
+        self.iter().flat_map(T::numbers).collect()
     }
 }

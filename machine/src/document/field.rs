@@ -5,12 +5,13 @@ use std::borrow::Cow;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
+use super::bounds::Measured;
 use super::decode::{Decode, Located, wrong_type};
 use super::error::ProblemKind;
 use super::findings::Findings;
 use super::nearest;
 use super::node::{Node, Place, Value};
-use crate::quantity::{self, Kind, LARGEST, Length, QuantityErrorKind, SMALLEST};
+use crate::quantity::{self, Dimension, Kind, LARGEST, Length, QuantityErrorKind, SMALLEST};
 
 /// The range of a number.
 pub trait Range: Copy + core::fmt::Debug + PartialEq + Send + Sync + 'static {
@@ -149,6 +150,11 @@ impl<K: Kind, R: Range> Decode for Quantity<K, R> {
             }
         }
     }
+
+    fn numbers(&self) -> Vec<Measured> {
+        let dimension = K::DIMENSIONS[self.form];
+        vec![Measured { value: self.value, dimension, place: self.place }]
+    }
 }
 
 /// The pattern of a quantity in a schema: a number, then a unit.
@@ -198,6 +204,10 @@ impl<R: Range> Decode for Number<R> {
         let number = finite(number, node.place, findings)?;
         let value = check_range::<R>(number, &number.to_string(), node.place, findings)?;
         Some(Self { value, place: node.place, range: PhantomData })
+    }
+
+    fn numbers(&self) -> Vec<Measured> {
+        vec![Measured { value: self.value, dimension: Dimension::NONE, place: self.place }]
     }
 }
 
@@ -273,6 +283,10 @@ impl<R: Range> Decode for Fraction<R> {
             return None;
         }
         Some(Self { value, place, range: PhantomData })
+    }
+
+    fn numbers(&self) -> Vec<Measured> {
+        vec![Measured { value: self.value, dimension: Dimension::NONE, place: self.place }]
     }
 }
 
@@ -365,6 +379,13 @@ where
         }
         T::decode(node, findings).map(Self::Value)
     }
+
+    fn numbers(&self) -> Vec<Measured> {
+        match self {
+            Self::Word(_) => Vec::new(),
+            Self::Value(value) => value.numbers(),
+        }
+    }
 }
 
 impl<K: Keyword, T: Decode> JsonSchema for Either<K, T> {
@@ -417,6 +438,11 @@ impl Decode for Point {
             *coordinate = length.value;
         }
         Some(Self { value, place: node.place })
+    }
+
+    fn numbers(&self) -> Vec<Measured> {
+        let (dimension, place) = (Length::DIMENSIONS[0], self.place);
+        self.value.map(|value| Measured { value, dimension, place }).into()
     }
 }
 

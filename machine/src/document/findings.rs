@@ -2,19 +2,52 @@
 
 use std::sync::Arc;
 
+use super::bounds::Bounds;
 use super::error::{DocumentError, Problem, ProblemKind, Source};
 use super::node::Place;
 
-/// Problems so far, and the texts that they point into.
+/// Problems and doubts so far, and the texts that they point into.
 #[derive(Debug)]
 pub struct Findings {
     sources: Vec<Arc<Source>>,
     problems: Vec<Problem>,
+    doubts: Vec<Doubt>,
+    bounds: &'static [Bounds],
+}
+
+/// What can be true but should be looked at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Doubt {
+    /// Where the value stands.
+    pub place: Place,
+    /// What is doubtful, with the numbers.
+    pub text: String,
+    /// What it bears on.
+    pub concern: Concern,
+}
+
+/// What a doubt bears on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Concern {
+    /// A value that is used, whenever the document is.
+    Use,
+    /// A value that is only compared with others.
+    Comparison,
 }
 
 impl Findings {
     pub(super) fn new(file: Arc<Source>) -> Self {
-        Self { sources: vec![file], problems: Vec::new() }
+        Self { sources: vec![file], problems: Vec::new(), doubts: Vec::new(), bounds: &[] }
+    }
+
+    /// Holds the numbers that are decoded from now on to `bounds`.
+    pub(super) fn hold_to(&mut self, bounds: &'static [Bounds]) {
+        self.bounds = bounds;
+    }
+
+    /// What numbers are held to.
+    pub(super) fn bounds(&self) -> &'static [Bounds] {
+        self.bounds
     }
 
     pub(super) fn add_source(&mut self, source: Arc<Source>) -> usize {
@@ -43,6 +76,18 @@ impl Findings {
         source.and_then(|source| source.text.get(place.start..place.end)).unwrap_or_default()
     }
 
+    /// The text of the value at `place`, as it was written.
+    pub(super) fn written(&self, place: Place) -> String {
+        let text = self.text(place);
+        match self.override_text(place) {
+            // Of an override the place is all of it.
+            Some(setting) if text == setting => {
+                setting.split_once('=').map_or(setting, |(_, value)| value).to_owned()
+            }
+            _ => text.to_owned(),
+        }
+    }
+
     /// The override that `place` is in, as on the command line; `None` for the file.
     pub fn override_text(&self, place: Place) -> Option<&str> {
         if place.source == 0 {
@@ -61,6 +106,21 @@ impl Findings {
     ) {
         let Some(source) = self.sources.get(place.source).cloned() else { return };
         self.problems.push(Problem { kind, source, place, message, help });
+    }
+
+    /// Notes that what stands at `place` should be looked at.
+    pub fn warn(&mut self, place: Place, text: String) {
+        self.doubts.push(Doubt { place, text, concern: Concern::Use });
+    }
+
+    /// Notes the same of a value that is only compared with others.
+    pub fn remark(&mut self, place: Place, text: String) {
+        self.doubts.push(Doubt { place, text, concern: Concern::Comparison });
+    }
+
+    /// The doubts so far, in the order in which they were noted; from now on there are none.
+    pub fn take_doubts(&mut self) -> Vec<Doubt> {
+        core::mem::take(&mut self.doubts)
     }
 
     /// Notes that a value contradicts another.

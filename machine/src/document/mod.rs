@@ -24,6 +24,7 @@
 //! assert_eq!(error.message(), "unknown key `hight`; did you mean `height`?");
 //! ```
 
+mod bounds;
 mod decode;
 mod error;
 mod field;
@@ -37,12 +38,13 @@ mod table;
 use std::path::Path;
 use std::sync::Arc;
 
+pub use bounds::{Bounds, Measured};
 pub use decode::{Decode, Located};
 pub use error::{DocumentError, Problem, ProblemKind};
 pub use field::{
     Any, Either, Fraction, Keyword, Named, NonNegative, Number, Point, Positive, Quantity, Range,
 };
-pub use findings::Findings;
+pub use findings::{Concern, Doubt, Findings};
 pub use node::{Literal, Node, Place};
 pub use overrides::{MalformedOverride, Override};
 pub use position::Position;
@@ -132,7 +134,19 @@ impl Document {
     ///
     /// # Errors
     /// Everything that does not fit the declaration of `T`.
-    pub fn decode<T: Decode>(mut self) -> Result<(T, Findings), DocumentError> {
+    pub fn decode<T: Decode>(self) -> Result<(T, Findings), DocumentError> {
+        self.decode_within(&[])
+    }
+
+    /// As [`Self::decode`], with every number held to its `bounds`.
+    ///
+    /// # Errors
+    /// As [`Self::decode`], and every number that is not possible.
+    pub fn decode_within<T: Decode>(
+        mut self,
+        bounds: &'static [Bounds],
+    ) -> Result<(T, Findings), DocumentError> {
+        self.findings.hold_to(bounds);
         match T::decode(&self.root, &mut self.findings) {
             Some(value) if self.findings.is_empty() => Ok((value, self.findings)),
             _ => Err(self.findings.into_error()),

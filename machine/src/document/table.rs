@@ -2,6 +2,7 @@
 
 use schemars::{Schema, SchemaGenerator, json_schema};
 
+use super::bounds;
 use super::decode::{Decode, wrong_type};
 use super::error::ProblemKind;
 use super::findings::Findings;
@@ -24,14 +25,21 @@ pub struct Field {
 /// Reads the fields of one table.
 #[derive(Debug)]
 pub struct TableReader<'a> {
+    name: &'static str,
     entries: &'a [Entry],
     place: Place,
     misspelt: Vec<&'static str>,
 }
 
 impl<'a> TableReader<'a> {
-    /// Starts on `node`, which must be a table, and reports the keys that `fields` does not have.
-    pub fn open(node: &'a Node, fields: &[Field], findings: &mut Findings) -> Option<Self> {
+    /// Starts on `node`, which must be a table of the type called `name`, and reports the keys that
+    /// `fields` does not have.
+    pub fn open(
+        name: &'static str,
+        node: &'a Node,
+        fields: &[Field],
+        findings: &mut Findings,
+    ) -> Option<Self> {
         let Value::Table(entries) = &node.value else {
             wrong_type(node, "a table", findings);
             return None;
@@ -65,7 +73,7 @@ impl<'a> TableReader<'a> {
                 Some(help),
             );
         }
-        Some(Self { entries, place: node.place, misspelt })
+        Some(Self { name, entries, place: node.place, misspelt })
     }
 
     /// The value of `key`, its default, or what its absence means.
@@ -76,7 +84,11 @@ impl<'a> TableReader<'a> {
         findings: &mut Findings,
     ) -> Option<T> {
         if let Some(entry) = self.entries.iter().find(|entry| entry.key == key) {
-            return T::decode(&entry.node, findings);
+            let value = T::decode(&entry.node, findings)?;
+            for number in value.numbers() {
+                bounds::check(self.name, key, &number, findings);
+            }
+            return Some(value);
         }
         if let Some(default) = default {
             return T::decode(&default.node(self.place), findings);
@@ -184,8 +196,12 @@ macro_rules! table {
                 node: &$crate::document::Node,
                 findings: &mut $crate::document::Findings,
             ) -> Option<Self> {
-                let reader =
-                    $crate::document::TableReader::open(node, &Self::fields(), findings)?;
+                let reader = $crate::document::TableReader::open(
+                    stringify!($name),
+                    node,
+                    &Self::fields(),
+                    findings,
+                )?;
                 $(
                     let $field: Option<$type> = reader.read(
                         stringify!($field),

@@ -120,18 +120,6 @@ fn gains(table: &AxisTable, inertia: f64, findings: &mut Findings) -> Option<Loo
             &defaults
         }
     };
-    // A loop that answers within its own cycle cannot be stable.
-    let fastest = 1.0 / signals::time::CYCLE_TIME;
-    for bandwidth in [loops.position, loops.velocity, loops.current] {
-        if bandwidth.value > fastest {
-            findings.refuse(
-                ProblemKind::OutOfRange,
-                bandwidth.place,
-                format!("a bandwidth of {} rad/s is too high", bandwidth.value),
-                Some(format!("the control cycle bears at most {fastest} rad/s")),
-            );
-        }
-    }
     for (inner, outer, words) in [
         (loops.velocity, loops.position, ["velocity", "position"]),
         (loops.current, loops.velocity, ["current", "velocity"]),

@@ -9,7 +9,7 @@ use core::f64::consts::TAU;
 use super::axes::Joint;
 use super::tables::DcMotorTable;
 use crate::actuator::Axis;
-use crate::document::{Findings, Number, Place, Positive, Quantity};
+use crate::document::{Doubt, Findings, Number, Positive, Quantity};
 use crate::machine::Warning;
 use crate::quantity::Speed;
 
@@ -17,19 +17,18 @@ use crate::quantity::Speed;
 /// rounding of two-digit data.
 const ROUNDING: f64 = 0.02;
 
-/// Doubts about the motor of `axis`.
-pub(super) fn of_motor(axis: &str, motor: &DcMotorTable, findings: &Findings) -> Vec<Warning> {
+/// Notes doubts about the motor of `axis`.
+pub(super) fn of_motor(axis: &str, motor: &DcMotorTable, findings: &mut Findings) {
     let voltage = motor.voltage.value;
     let resistance = motor.resistance.value;
     let constant = motor.torque_constant.value;
-    let mut warnings = Vec::new();
     if let (Some(torque), Some(speed)) = (motor.nominal_torque, motor.nominal_speed) {
         let current = torque.value / constant;
         let needed = resistance * current + constant * speed.value;
         if needed > voltage * (1.0 + ROUNDING) {
             let available = (voltage - constant * speed.value).max(0.0) / resistance * constant;
             let stall = voltage / resistance * constant;
-            warnings.push(warning(
+            findings.remark(
                 torque.place,
                 format!(
                     "axis `{axis}`: the nominal torque of {:.3} N·m at {:.0} rpm needs {current:.1} \
@@ -40,69 +39,70 @@ pub(super) fn of_motor(axis: &str, motor: &DcMotorTable, findings: &Findings) ->
                     speed.value * 60.0 / TAU,
                     resistance * current,
                 ),
-                findings,
-            ));
+            );
         }
     }
     let stall_current = voltage / resistance;
     if motor.current.value > stall_current {
-        warnings.push(warning(
+        findings.warn(
             motor.current.place,
             format!(
                 "axis `{axis}`: {voltage:.1} V across {resistance:.3} Ω drive at most \
                  {stall_current:.2} A, so the current limit of {:.2} A is never reached",
                 motor.current.value
             ),
-            findings,
-        ));
+        );
     }
-    warnings
 }
 
-/// Doubts about path speeds that `axis` cannot follow in every direction.
+/// Notes doubts about path speeds that `axis` cannot follow in every direction.
 pub(super) fn of_speeds(
     speeds: [&Quantity<Speed, Positive>; 2],
     joint: &Joint,
     axis: &Axis,
-    findings: &Findings,
-) -> Vec<Warning> {
+    findings: &mut Findings,
+) {
     let limit = axis.limits.velocity;
-    speeds
-        .into_iter()
-        .filter(|speed| speed.value * joint.worst_speed > limit)
-        .map(|speed| {
+    for speed in speeds {
+        let asked = speed.value * joint.worst_speed;
+        if asked > limit {
             let text = format!(
-                "axis `{}` reaches {limit:.3} m/s, but a path at {} m/s may ask it for {:.3} m/s: \
+                "axis `{}` reaches {limit:.3} m/s, but a path at {} m/s may ask it for {asked:.3} m/s: \
                  jobs that do will be refused",
-                axis.name,
-                speed.value,
-                speed.value * joint.worst_speed
+                axis.name, speed.value
             );
-            warning(speed.place, text, findings)
-        })
-        .collect()
+            findings.warn(speed.place, text);
+        }
+    }
 }
 
-/// Doubts about the damping of a spring: a spring that rings cannot be led by inverting it
+/// Notes doubts about the damping of a spring: a spring that rings cannot be led by inverting it
 /// once a millisecond, as a pilot of both machines found.
-pub(super) fn of_damping(ratio: &Number<Positive>, findings: &Findings) -> Option<Warning> {
+pub(super) fn of_damping(ratio: &Number<Positive>, findings: &mut Findings) {
     /// Share of critical damping below which the inversion fails.
     const RINGING: f64 = 0.1;
-    (ratio.value < RINGING).then(|| {
+    if ratio.value < RINGING {
         let text = format!(
             "a damping ratio of {} lets the transmission ring: below {RINGING} the feedforward \
              at 1 kHz cannot lead it",
             ratio.value
         );
-        warning(ratio.place, text, findings)
-    })
+        findings.warn(ratio.place, text);
+    }
 }
 
-fn warning(place: Place, text: String, findings: &Findings) -> Warning {
-    let (line, column) = findings.position(place).unwrap_or((0, 0));
-    let text = match findings.override_text(place) {
-        Some(setting) => format!("--set {setting}: {text}"),
-        None => text,
-    };
-    Warning { text, line, column }
+/// Everything that was doubted, in the order in which it was noted.
+pub(super) fn warnings(findings: &mut Findings) -> Vec<Warning> {
+    let doubts = findings.take_doubts();
+    doubts
+        .into_iter()
+        .map(|Doubt { place, text, concern }| {
+            let (line, column) = findings.position(place).unwrap_or((0, 0));
+            let text = match findings.override_text(place) {
+                Some(setting) => format!("--set {setting}: {text}"),
+                None => text,
+            };
+            Warning { text, line, column, concern }
+        })
+        .collect()
 }

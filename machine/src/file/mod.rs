@@ -1,10 +1,13 @@
 //! The machine file: what its tables are (`tables`), and how they become a [`Machine`]
-//! (`validate`, `axes`), or are doubted (`doubts`).
+//! (`validate`, `axes`), or are doubted: one value by itself (`bounds`), one against others (`doubts`,
+//! `relations`).
 
 mod axes;
+pub mod bounds;
 mod doubts;
 pub mod mechanism;
 mod motors;
+mod relations;
 pub mod tables;
 mod validate;
 

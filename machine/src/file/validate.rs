@@ -3,21 +3,23 @@
 use std::path::PathBuf;
 
 use super::axes::{Joint, axis};
+use super::bounds::BOUNDS;
 use super::doubts;
 use super::mechanism::{self, Built};
 use super::motors;
+use super::relations;
 use super::tables::{AreaTable, AxisTable, LaserTable, MachineTable, OriginsTable, PathTable};
 use crate::actuator::Axis;
 use crate::document::{
     Document, DocumentError, Findings, Located, Named, Place, Point, ProblemKind, nearest,
 };
 use crate::limits::{PathLimits, WorkArea};
-use crate::machine::{Machine, Warning};
+use crate::machine::Machine;
 use crate::mechanisms::MechanismKind;
 use crate::process::{GcodeSettings, LaserSource, ZMeaning};
 
 pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
-    let (table, mut findings) = document.decode::<MachineTable>()?;
+    let (table, mut findings) = document.decode_within::<MachineTable>(BOUNDS)?;
     let area = area(&table.area, &mut findings);
     let home = home(table.home, &area, &mut findings);
     let Some(Built { mechanism, joints, home }) =
@@ -28,7 +30,10 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let Some(tables) = axes_in_order(&table.axis, &joints, &mut findings) else {
         return findings.fail();
     };
-    let (axes, warnings) = axes(&table, &tables, &joints, &mut findings);
+    let axes = axes(&table, &tables, &joints, &mut findings);
+    if findings.is_empty() {
+        relations::check(&table, &mechanism, &tables, &joints, &axes, &mut findings);
+    }
     refuse_rigid_backlash(&mechanism, &table.axis, &mut findings);
     check_z(&table, &mechanism, &mut findings);
     let laser = laser(&table.laser, &mut findings);
@@ -56,36 +61,36 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
             air_assist: gcode.air_assist.value,
         },
         sample_job: table.job.as_ref().map(|job| PathBuf::from(&job.sample.value)),
-        warnings,
+        warnings: doubts::warnings(&mut findings),
     };
     findings.finish(machine)
 }
 
-/// The axes that `tables` describe, in the order of `joints`, and what is doubtful about them and
-/// their transmissions. Those without a sound motor are left out, and noted.
+/// The axes that `tables` describe, in the order of `joints`; what is doubtful about them and their
+/// transmissions is noted. Those without a sound motor are left out, and noted.
 fn axes(
     table: &MachineTable,
     tables: &[&AxisTable],
     joints: &[Joint],
     findings: &mut Findings,
-) -> (Vec<Axis>, Vec<Warning>) {
+) -> Vec<Axis> {
     let mut axes = Vec::with_capacity(joints.len());
-    let mut warnings = Vec::new();
     for (axis_table, joint) in tables.iter().copied().zip(joints) {
         let Some(axis) = axis(axis_table, joint, findings) else { continue };
         if let Some(dc) = &axis_table.motor.dc {
-            warnings.extend(doubts::of_motor(joint.name, dc, findings));
+            doubts::of_motor(joint.name, dc, findings);
         }
         let speeds = [&table.path.speed, &table.path.rapid];
-        warnings.extend(doubts::of_speeds(speeds, joint, &axis, findings));
+        doubts::of_speeds(speeds, joint, &axis, findings);
         axes.push(axis);
     }
     if axes.len() == tables.len() {
         motors::of_one_kind(tables.iter().copied().zip(&axes), findings);
     }
-    let ratios = mechanism::damping_ratios(table);
-    warnings.extend(ratios.filter_map(|ratio| doubts::of_damping(ratio, findings)));
-    (axes, warnings)
+    for ratio in mechanism::damping_ratios(table) {
+        doubts::of_damping(ratio, findings);
+    }
+    axes
 }
 
 /// That the area has a range of z, and Z moves the focus, only where the mechanism moves in z.

@@ -8,7 +8,7 @@ mod plane;
 pub mod polar;
 pub mod prrrp;
 pub mod serial;
-mod spectrum;
+pub(crate) mod spectrum;
 pub mod tri_planar;
 pub mod twin_actuator;
 

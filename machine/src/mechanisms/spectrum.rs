@@ -7,12 +7,12 @@ const TURNS: usize = 50;
 
 /// The largest eigenvalue of a symmetric matrix, of which the lower half is read, to a few units in
 /// the last place of itself; not a number where the matrix has none.
-pub(super) fn largest_eigenvalue<const N: usize>(matrix: SMatrix<f64, N, N>) -> f64 {
+pub(crate) fn largest_eigenvalue<const N: usize>(matrix: SMatrix<f64, N, N>) -> f64 {
     eigenvalues(matrix).into_iter().fold(f64::NAN, f64::max)
 }
 
 /// The smallest eigenvalue, to a few units in the last place of the largest one.
-pub(super) fn smallest_eigenvalue<const N: usize>(matrix: SMatrix<f64, N, N>) -> f64 {
+pub(crate) fn smallest_eigenvalue<const N: usize>(matrix: SMatrix<f64, N, N>) -> f64 {
     eigenvalues(matrix).into_iter().fold(f64::NAN, f64::min)
 }
 

@@ -59,6 +59,15 @@ pub fn read_form<K: Kind>(text: &str) -> Result<(f64, usize), QuantityError> {
     Ok((value, form))
 }
 
+/// Reads `text` as a number with any unit or none: its value in SI units and radians, and what it is
+/// measured in.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn read_any(text: &str) -> Result<(f64, Dimension), QuantityError> {
+    parse::parse(text)
+}
+
 /// Reads `text` as a share, `"80 %"` or `"0.8"`.
 ///
 /// # Errors

@@ -11,6 +11,7 @@ use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea};
 use nalgebra::Vector3;
 use runtime::{ServiceError, message};
 use signals::axis::axis_array;
+use signals::finite::first_not_finite;
 use signals::{AxisArray, run_folder};
 use std::fmt::Display;
 use std::path::Path;
@@ -54,7 +55,7 @@ pub(super) fn plan_request(
     approach(&mut job, machine, standing).map_err(Refusal::internal)?;
     let plan = plan_unless(machine, &job, &|| abandoned.load(Ordering::Relaxed))
         .map_err(|error| request.refuse(&error))?;
-    write_plan(folder, &plan).map_err(Refusal::internal)?;
+    write_plan(folder, &plan)?;
     Ok(plan)
 }
 
@@ -68,13 +69,17 @@ pub(super) fn write_refusal(folder: &Path, spare: &Path, refusal: &Refusal) {
     }
 }
 
-fn write_plan(folder: &Path, plan: &Plan) -> Result<(), ServiceError> {
+fn write_plan(folder: &Path, plan: &Plan) -> Result<(), Refusal> {
+    // Whoever reads the plan would find null where a number is due.
+    if let Some(place) = first_not_finite(&(&plan.artwork, &plan.facts)) {
+        return Err(Refusal::internal(format!("the plan has no finite number at {place}")));
+    }
     let write = |name: &str, content: serde_json::Result<Vec<u8>>| {
         let path = folder.join(name);
         let content = content.map_err(std::io::Error::other);
         content
             .and_then(|content| std::fs::write(&path, content))
-            .map_err(|source| ServiceError::io(path, source))
+            .map_err(|source| Refusal::internal(ServiceError::io(path, source)))
     };
     write(run_folder::ARTWORK, serde_json::to_vec(&plan.artwork))?;
     write(run_folder::PLAN, serde_json::to_vec_pretty(&plan.facts))

@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
+/// The largest number of a request, SI: beyond any joint, pose, speed, acceleration or force of a
+/// machine, and far below where products of a few such numbers leave the range of an `f64`.
+pub const LARGEST: f64 = 1e9;
+
 /// One line of input; which keys it needs depends on the verb. Joint values are in joint units, or
 /// motor angles with `--motor`.
 #[derive(Debug, Deserialize)]
@@ -140,6 +144,57 @@ pub struct ErrorBody {
 impl ErrorBody {
     /// A line that does not ask what the verb answers.
     pub fn bad_request(detail: String) -> Self {
-        Self { code: "bad_request".into(), axis: None, value: None, limit: None, detail }
+        Self::of("bad_request", detail)
     }
+
+    /// A line that is not JSON, or is no request.
+    pub fn not_json(detail: String) -> Self {
+        Self::of("not_json", detail)
+    }
+
+    /// An iteration that came to no end.
+    pub fn not_converged() -> Self {
+        Self::of("not_converged", "the matrix here has no singular values in sight".into())
+    }
+
+    fn of(code: &str, detail: String) -> Self {
+        Self { code: code.into(), axis: None, value: None, limit: None, detail }
+    }
+}
+
+impl Request {
+    /// Refuses numbers that no machine has.
+    ///
+    /// # Errors
+    /// The first beyond [`LARGEST`], with its key.
+    pub fn check(&self) -> Result<(), ErrorBody> {
+        let lists = [
+            ("q", self.q.as_deref()),
+            ("qd", self.qd.as_deref()),
+            ("qdd", self.qdd.as_deref()),
+            ("previous", self.previous.as_deref()),
+            ("wrench", self.wrench.as_deref()),
+        ];
+        for (key, values) in lists {
+            values.map_or(Ok(()), |values| plausible(key, values))?;
+        }
+        let Some(pose) = &self.pose else { return Ok(()) };
+        plausible("position", &pose.position)?;
+        plausible("rotation", pose.rotation.as_ref().map_or(&[], |rows| rows.as_flattened()))?;
+        plausible("axis", pose.axis.as_ref().map_or(&[], |axis| axis))?;
+        plausible("a", pose.a.as_slice())?;
+        plausible("r", pose.r.as_slice())
+    }
+}
+
+fn plausible(key: &str, values: &[f64]) -> Result<(), ErrorBody> {
+    // Put this way a value that is no number is refused too.
+    let Some(value) = values.iter().find(|value| !(-LARGEST..=LARGEST).contains(*value)) else {
+        return Ok(());
+    };
+    Err(ErrorBody {
+        value: value.is_finite().then_some(*value),
+        limit: Some(LARGEST),
+        ..ErrorBody::of("too_large", format!("\"{key}\" has a number beyond any machine"))
+    })
 }

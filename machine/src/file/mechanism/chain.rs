@@ -107,7 +107,8 @@ pub(super) fn joints<const N: usize, M: Mechanism<N>>(
 ) -> Option<Standing<N>> {
     let Site { table, area, home } = *site;
     let (standing, assembly) = standing(mechanism, &names, table, home, findings)?;
-    if let Some(values) = &table.home_axes {
+    // In an area that is refused already, where to rest cannot be said.
+    if let Some(values) = table.home_axes.as_ref().filter(|_| findings.is_empty()) {
         rest::check(mechanism, &assembly, values, area, findings);
     }
     let mass = mechanism.mass_matrix(&assembly);

@@ -1,6 +1,6 @@
 //! What a pose must keep besides every leg's reach: clearance, stator, gaps, a stiff platform.
 
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::{SMatrix, SVD, Vector3};
 
 use super::struts::struts;
 use super::{TriPlanar, TriPlanarAssembly};
@@ -35,8 +35,12 @@ fn lowest(arms: &[Vector3<f64>; 3], position: &Vector3<f64>) -> f64 {
     position.z + arms[0].z.min(arms[1].z).min(arms[2].z)
 }
 
+/// Not a number where the iteration comes to no end.
 fn smallest_singular_value(matrix: &SMatrix<f64, 6, 6>) -> f64 {
-    matrix.singular_values().min()
+    /// Turns of the iteration before it is given up; a dozen are usual.
+    const MOST_TURNS: usize = 1000;
+    SVD::try_new_unordered(*matrix, false, false, 5.0 * f64::EPSILON, MOST_TURNS)
+        .map_or(f64::NAN, |decomposed| decomposed.singular_values.min())
 }
 
 /// Whether the smallest singular value of `matrix` reaches `limit`: then `AᵀA − limit²` is

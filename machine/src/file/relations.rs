@@ -1,0 +1,554 @@
+//! What two values of a machine file say of each other: each may be usual by itself, and both together
+//! make a machine that trips, misses its path, or cannot be controlled.
+//!
+//! The arithmetic is that of the machine at home. It is a doubt and no proof: the planner holds every
+//! job to the machine's limits, and the controller every motion.
+
+use nalgebra::{DMatrix, SMatrix};
+use signals::time::CYCLE_TIME;
+
+use super::axes::Joint;
+use super::tables::{AxisTable, MachineTable, PathTable};
+use crate::actuator::{Axis, JointUnit};
+use crate::document::{Findings, Place};
+use crate::kinematics::{Joints, Mechanism};
+use crate::mechanisms::spectrum::smallest_eigenvalue;
+use crate::mechanisms::{MechanismKind, MechanismVisitor};
+use crate::motor::{DcMotor, Motor, StepperMotor};
+use crate::trip::following::{DISCONTINUITY, LEAD_STEP};
+
+/// The fastest that a velocity loop may be in any direction of the joints [rad/s]: with a command that
+/// acts one cycle after its measurement, and the speed taken over a cycle, it is unstable from about
+/// 600 rad/s on.
+const FASTEST_LOOP: f64 = 350.0;
+
+/// Tolerances of the path by which friction alone may push the tool off it: its feedforward, which
+/// depends on oil and warmth, would else have to be right to half a per cent.
+const FRICTION_TOLERANCES: f64 = 200.0;
+
+/// Tolerances of the path by which a weight may push the tool off it when a motor takes it over from
+/// its brake: the loops need some tenths of a second to hold it, and a job may mark as soon.
+const WEIGHT_TOLERANCES: f64 = 25.0;
+
+/// Load inertia per rotor inertia that a velocity loop of the rotor still rules: behind a spring, and
+/// rigid.
+const LARGEST_LOAD: [f64; 2] = [10.0, 30.0];
+
+/// Times a motor may outrun what path and limits ask of its axis.
+const LARGEST_SPEED_RESERVE: f64 = 60.0;
+
+/// Usual electrical time constants of windings, L/R [s].
+const ELECTRICAL: [f64; 2] = [20e-6, 0.2];
+
+/// Usual mechanical time constants of motors with their load, J·R/k² [s].
+const MECHANICAL: [f64; 2] = [50e-6, 2.0];
+
+/// Times a velocity loop should be faster than the position loop around it: 4 are usual, and below 2
+/// both swing together.
+const LOOP_RATIO: f64 = 2.0;
+
+/// Share of a motor's torque that friction may take.
+const LARGEST_FRICTION: f64 = 0.3;
+
+/// Share of the holding torque that the detent torque of a stepper may have.
+const LARGEST_DETENT: f64 = 0.3;
+
+/// Counts that a largest following error must leave to an axis that is held in one place.
+const FEWEST_COUNTS: f64 = 4.0;
+
+/// The machine at home.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Standing {
+    /// Way of the tool per joint unit [m/m or m/rad].
+    lever: Vec<f64>,
+    /// Joint speed per tool speed in the least favourable direction, the other joints helping.
+    worst_speed: Vec<f64>,
+    /// What gravity takes at each joint [N or N·m].
+    gravity: Vec<f64>,
+    /// The lowest resonance of the load on its springs, the motors held [rad/s]; `None` where the
+    /// transmission is rigid.
+    resonance: Option<f64>,
+    /// The smallest inertia that the loops move together, as a share of what each takes for its own.
+    smallest_share: f64,
+}
+
+/// Gives [`Standing`]; `None` where the chain cannot close at home, which is refused elsewhere.
+struct AtHome<'a> {
+    joints: &'a [Joint],
+    axes: &'a [Axis],
+}
+
+impl MechanismVisitor for AtHome<'_> {
+    type Output = Option<Standing>;
+
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
+        let Self { joints, axes } = self;
+        let home = Joints::<N>::from_fn(|row, _| joints.get(row).map_or(0.0, |joint| joint.home));
+        let assembly = mechanism.assemble(&home, mechanism.branch(), None).ok()?;
+        let jacobian = mechanism.jacobian(&assembly);
+        let linear = DMatrix::from_fn(3, N, |row, column| jacobian[(row, column)]);
+        let mass = mechanism.mass_matrix(&assembly);
+        let seen = SMatrix::<f64, N, N>::from_fn(|row, column| {
+            let rotor = if row == column { axes[row].motor.rotor_inertia() } else { 0.0 };
+            let inertia = rotor + axes[row].ratio * mass[(row, column)] * axes[column].ratio;
+            inertia / (axes[row].gains.inertia * axes[column].gains.inertia).sqrt()
+        });
+        Some(Standing {
+            lever: linear.column_iter().map(|column| column.norm()).collect(),
+            worst_speed: inverse_rows(&linear).unwrap_or_else(|| vec![0.0; N]),
+            gravity: mechanism.gravity(&assembly).iter().copied().collect(),
+            resonance: mechanism.stiffness().and_then(|stiffness| lowest(&mass, &stiffness)),
+            smallest_share: smallest_eigenvalue(seen),
+        })
+    }
+}
+
+/// The lengths of the rows of the inverse of `jacobian`, of the least motion of the joints where they
+/// can move the tool in several ways; `None` at a singularity.
+fn inverse_rows(jacobian: &DMatrix<f64>) -> Option<Vec<f64>> {
+    /// Turns of the iteration before it is given up; a dozen are usual.
+    const MOST_TURNS: usize = 1000;
+    /// Singular values below this count as directions in which the tool cannot move [m/rad].
+    const LEAST: f64 = 1e-6;
+    if jacobian.iter().any(|entry| !entry.is_finite()) {
+        return None;
+    }
+    let turned = jacobian.clone();
+    let parts =
+        nalgebra::SVD::try_new_unordered(turned, true, true, 5.0 * f64::EPSILON, MOST_TURNS)?;
+    let inverse = parts.pseudo_inverse(LEAST).ok()?;
+    Some(inverse.row_iter().map(|row| row.norm()).collect())
+}
+
+/// The lowest angular frequency of `mass` on `stiffness` [rad/s].
+fn lowest<const N: usize>(
+    mass: &SMatrix<f64, N, N>,
+    stiffness: &SMatrix<f64, N, N>,
+) -> Option<f64> {
+    let half = mass.cholesky()?.l().try_inverse()?;
+    let square = smallest_eigenvalue(half * stiffness * half.transpose());
+    (square >= 0.0).then(|| square.sqrt())
+}
+
+/// One axis as the file says it and as it was understood.
+struct Subject<'a> {
+    table: &'a AxisTable,
+    joint: &'a Joint,
+    axis: &'a Axis,
+    /// Way of the tool per joint unit [m/m or m/rad].
+    lever: f64,
+    /// Joint speed per tool speed at home, or anywhere where that is the same.
+    worst_speed: f64,
+    /// What gravity takes at the joint [N or N·m].
+    gravity: f64,
+}
+
+/// Looks for doubts about what the values of a machine say of each other, and refuses what cannot be
+/// together. `tables`, `joints` and `axes` belong to each other.
+pub(super) fn check(
+    table: &MachineTable,
+    mechanism: &MechanismKind,
+    tables: &[&AxisTable],
+    joints: &[Joint],
+    axes: &[Axis],
+    findings: &mut Findings,
+) {
+    if tables.len() != axes.len() || joints.len() != axes.len() {
+        return;
+    }
+    let Some(standing) = mechanism.visit(AtHome { joints, axes }) else { return };
+    for (index, (axis_table, (joint, axis))) in
+        tables.iter().zip(joints.iter().zip(axes)).enumerate()
+    {
+        let worst_speed = joint.worst_speed.max(standing.worst_speed[index]);
+        let subject = Subject {
+            table: axis_table,
+            joint,
+            axis,
+            lever: standing.lever[index],
+            worst_speed,
+            gravity: standing.gravity[index],
+        };
+        subject.following_error(&table.path, standing.resonance, findings);
+        subject.resolution(&table.path, findings);
+        subject.speeds(&table.path, findings);
+        subject.lead(table, findings);
+        subject.load(standing.resonance.is_some(), findings);
+        subject.weight(&table.path, findings);
+        match &axis.motor {
+            Motor::Dc(motor) => subject.dc(motor, &table.path, findings),
+            Motor::Stepper(motor) => subject.stepper(motor, findings),
+        }
+    }
+    loops(tables, axes, &standing, findings);
+}
+
+/// Whether the loops are fast enough for the springs, and slow enough for the cycle, where the axes
+/// move each other's loads.
+fn loops(tables: &[&AxisTable], axes: &[Axis], standing: &Standing, findings: &mut Findings) {
+    let Some((table, axis)) = tables
+        .iter()
+        .zip(axes)
+        .filter(|(_, axis)| axis.motor.dc().is_some())
+        .max_by(|(_, one), (_, other)| one.gains.velocity.total_cmp(&other.gains.velocity))
+    else {
+        return;
+    };
+    let bandwidth = axis.gains.velocity;
+    let place = table.loops.as_ref().map_or(table.place, |loops| loops.velocity.place);
+    if let Some(resonance) = standing.resonance
+        && resonance < bandwidth
+    {
+        findings.warn(
+            place,
+            format!(
+                "axis `{}`: the velocity loop has a bandwidth of {bandwidth:.1} rad/s, and the load on \
+                 its springs resonates at {resonance:.1} rad/s: lower the one or stiffen the other",
+                axis.name
+            ),
+        );
+    }
+    let fastest = bandwidth / standing.smallest_share;
+    // Put this way a share that is no number is doubted.
+    let slow_enough = fastest <= FASTEST_LOOP;
+    if !slow_enough {
+        findings.warn(
+            place,
+            format!(
+                "the axes move each other's load: where they work against each other the inertia is \
+                 {:.3} of what the velocity loops of {bandwidth:.1} rad/s are made for, which makes \
+                 them {fastest:.1} rad/s fast, and the control cycle bears {FASTEST_LOOP} rad/s: lower \
+                 the bandwidth, or raise `gear` or `rotor_inertia`",
+                standing.smallest_share
+            ),
+        );
+    }
+}
+
+impl Subject<'_> {
+    fn warn(&self, place: Place, text: &str, findings: &mut Findings) {
+        findings.warn(place, format!("axis `{}`: {text}", self.axis.name));
+    }
+
+    /// What the loops of position and velocity, without their integral, hold a shaft with
+    /// [N·m/rad].
+    fn stiffness(&self) -> f64 {
+        self.axis.gains.inertia * self.axis.gains.velocity * self.axis.gains.position
+    }
+
+    /// The unit of the joint, and of its speed.
+    fn units(&self) -> [&'static str; 4] {
+        self.joint.unit.names()
+    }
+
+    /// The largest following error against the encoder, and against what supervision takes for a jump.
+    fn following_error(&self, path: &PathTable, resonance: Option<f64>, findings: &mut Findings) {
+        let Self { table, axis, .. } = self;
+        let limit = axis.limits.following_error;
+        let place = table.limits.following_error.map_or(table.limits.place, |given| given.place);
+        let [unit, ..] = self.units();
+        let count = axis.encoder.resolution() * axis.ratio;
+        let what = counted(&axis.motor);
+        let line = self.count_line(findings);
+        if limit < count {
+            findings.contradict(
+                place,
+                format!(
+                    "axis `{}`: a following error of {limit:.3e} {unit} stops the machine, and one {what} \
+                     is {count:.3e} {unit}{line}: it would stop at once",
+                    axis.name
+                ),
+                "raise `following_error` to some counts or more, or the resolution",
+            );
+            return;
+        }
+        if limit < FEWEST_COUNTS * count {
+            let text = format!(
+                "a following error of {limit:.3e} {unit} stops the machine, which is less than \
+                 {FEWEST_COUNTS} times the {what} of {count:.3e} {unit}{line}: noise of the encoder \
+                 may stop it"
+            );
+            self.warn(place, &text, findings);
+        }
+        // The jerk of a join, once more for what the mechanism adds to it.
+        let jerk = 2.0 * path.jerk.value * self.worst_speed;
+        let jump = jerk * CYCLE_TIME * CYCLE_TIME * CYCLE_TIME / 12.0 / DISCONTINUITY;
+        let lead = resonance
+            .map_or(0.0, |resonance| jerk * CYCLE_TIME / (resonance * resonance) / LEAD_STEP);
+        let least = jump.max(lead);
+        if limit < least {
+            let text = format!(
+                "a following error of {limit:.3e} {unit} stops the machine, and a path with the jerk \
+                 of {} m/s³{} changes by what supervision takes for a jump below {least:.3e} {unit}: \
+                 raise `following_error`, or lower the jerk",
+                path.jerk.value,
+                at_line(path.jerk.place, findings)
+            );
+            self.warn(place, &text, findings);
+        }
+    }
+
+    /// Where the counts of the axis are said, ", line 3" of the file.
+    fn count_line(&self, findings: &Findings) -> String {
+        let encoder = self.table.encoder.as_ref().map(|encoder| encoder.resolution.place);
+        let stepper = self.table.motor.stepper.as_ref().map(|stepper| stepper.microsteps.place);
+        encoder.or(stepper).map_or_else(String::new, |place| at_line(place, findings))
+    }
+
+    /// A count of the encoder against the path's tolerance.
+    fn resolution(&self, path: &PathTable, findings: &mut Findings) {
+        let Self { table, axis, lever, .. } = self;
+        let count = axis.encoder.resolution() * axis.ratio * lever;
+        if count > path.tolerance.value {
+            let encoder = table.encoder.as_ref().map(|encoder| encoder.resolution.place);
+            let stepper = table.motor.stepper.as_ref().map(|stepper| stepper.microsteps.place);
+            let text = format!(
+                "one {} moves the tool by {:.3} µm, and the path's tolerance is {:.3} µm{}: give it a \
+                 finer encoder or more gear, or the path more tolerance",
+                counted(&axis.motor),
+                count * 1e6,
+                path.tolerance.value * 1e6,
+                at_line(path.tolerance.place, findings)
+            );
+            self.warn(encoder.or(stepper).unwrap_or(table.place), &text, findings);
+        }
+    }
+
+    /// What the motor reaches through its gear against what path and limits ask for.
+    fn speeds(&self, path: &PathTable, findings: &mut Findings) {
+        let Self { table, axis, worst_speed, .. } = self;
+        let [_, unit, ..] = self.units();
+        let speed = if path.speed.value > path.rapid.value { path.speed } else { path.rapid };
+        let asked = speed.value * worst_speed;
+        let limit = axis.limits.velocity;
+        // Where the tool's straight lines are the joints', `doubts` says it for each speed; a limit
+        // that the file sets is meant.
+        let is_given = table.limits.velocity.is_some();
+        if self.joint.worst_speed == 0.0 && !is_given && asked > limit {
+            let text = format!(
+                "it reaches {limit:.3} {unit}, and near home a path at {} m/s may ask it for \
+                 {asked:.3} {unit}: jobs that do are slowed or refused",
+                speed.value
+            );
+            self.warn(speed.place, &text, findings);
+        }
+        let used = table.limits.velocity.map_or(asked, |given| given.value).max(asked);
+        let most = axis.motor.largest_speed() * axis.ratio;
+        if axis.motor.dc().is_some() && used > 0.0 && most > LARGEST_SPEED_RESERVE * used {
+            let text = format!(
+                "the motor reaches {most:.3} {unit} through a gear of {}, and path and limits use \
+                 {used:.3} {unit}: more gear or less lead would use the motor, and its encoder, better",
+                table.gear.value
+            );
+            self.warn(table.gear.place, &text, findings);
+        }
+    }
+
+    /// The lead of a screw against its travel.
+    fn lead(&self, table: &MachineTable, findings: &mut Findings) {
+        let Self { joint, axis, .. } = self;
+        let [lower, upper] = axis.limits.position;
+        let turn = joint.travel * core::f64::consts::TAU;
+        if joint.unit == JointUnit::Length && turn > upper - lower {
+            let place = lead_place(table, self.table, joint.name);
+            let text = format!(
+                "one turn of the gear's output moves the joint by {turn:.4} m, and its whole travel is \
+                 {:.4} m: is the lead or the radius right?",
+                upper - lower
+            );
+            self.warn(place.unwrap_or(self.table.place), &text, findings);
+        }
+    }
+
+    /// The load's inertia against the rotor's.
+    fn load(&self, is_elastic: bool, findings: &mut Findings) {
+        let Self { table, axis, joint, .. } = self;
+        let rotor = axis.motor.rotor_inertia();
+        if axis.motor.stepper().is_some_and(StepperMotor::is_planar) {
+            return;
+        }
+        let load = axis.ratio * axis.ratio * joint.load;
+        let most = LARGEST_LOAD[usize::from(!is_elastic)];
+        let ratio = load / rotor;
+        if ratio > most {
+            let text = format!(
+                "seen through a gear of {} the load has {load:.3e} kg·m², {ratio:.1} times the motor's \
+                 {rotor:.3e} kg·m²{}, and up to {most} times are usual: is the gear right?",
+                table.gear.value,
+                rotor_line(table, findings)
+            );
+            self.warn(table.gear.place, &text, findings);
+        }
+    }
+
+    /// What gravity takes against what holds an axis whose motor is unpowered, and against the loops
+    /// that take it over.
+    fn weight(&self, path: &PathTable, findings: &mut Findings) {
+        let Self { table, axis, gravity, lever, .. } = self;
+        let torque = (gravity * axis.ratio).abs();
+        let teeth = axis.motor.stepper().map_or(0.0, |motor| motor.detent_torque);
+        let held = axis.friction.coulomb + axis.brake + teeth;
+        if torque > held {
+            let text = format!(
+                "at home gravity turns the motor with {torque:.3e} N·m, and friction and brake hold \
+                 {held:.3e} N·m: it sinks while the motor is unpowered; give it a `brake`, or balance it"
+            );
+            self.warn(table.friction.place, &text, findings);
+        }
+        if axis.motor.dc().is_none() {
+            return;
+        }
+        let push = (torque - axis.friction.coulomb) / self.stiffness() * axis.ratio * lever;
+        if push > WEIGHT_TOLERANCES * path.tolerance.value {
+            let text = format!(
+                "at home gravity turns the motor with {torque:.3e} N·m, friction holds {:.3e} N·m{}, \
+                 and the loops give way by {:.1} µm until they bear the rest: {:.0} times the path's \
+                 tolerance of {:.3} µm{}, which marks soon after enabling show; balance it",
+                axis.friction.coulomb,
+                at_line(table.friction.coulomb.place, findings),
+                push * 1e6,
+                push / path.tolerance.value,
+                path.tolerance.value * 1e6,
+                at_line(path.tolerance.place, findings)
+            );
+            self.warn(table.friction.place, &text, findings);
+        }
+    }
+
+    /// What the data of a DC motor say of each other, and of the loops.
+    fn dc(&self, motor: &DcMotor, path: &PathTable, findings: &mut Findings) {
+        let Self { table, axis, lever, .. } = self;
+        let Some(data) = &table.motor.dc else { return };
+        let DcMotor { resistance, inductance, torque_constant, .. } = *motor;
+        let electrical = inductance / resistance;
+        if !(ELECTRICAL[0]..=ELECTRICAL[1]).contains(&electrical) {
+            let text = format!(
+                "{inductance:.3e} H over {resistance:.3e} Ω{} are a time constant of {electrical:.3e} \
+                 s; windings have {:.0e} to {:.1} s, and the current loop a cycle of {CYCLE_TIME} s",
+                at_line(data.resistance.place, findings),
+                ELECTRICAL[0],
+                ELECTRICAL[1]
+            );
+            self.warn(data.inductance.place, &text, findings);
+        }
+        let inertia = axis.gains.inertia;
+        let mechanical = inertia * resistance / (torque_constant * torque_constant);
+        if !(MECHANICAL[0]..=MECHANICAL[1]).contains(&mechanical) {
+            let text = format!(
+                "{torque_constant:.3e} N·m/A and {resistance:.3e} Ω{} turn {inertia:.3e} kg·m² with a \
+                 time constant of {mechanical:.3e} s; motors have {:.0e} to {} s",
+                at_line(data.resistance.place, findings),
+                MECHANICAL[0],
+                MECHANICAL[1]
+            );
+            self.warn(data.torque_constant.place, &text, findings);
+        }
+        let (position, velocity) = (axis.gains.position, axis.gains.velocity);
+        if position * LOOP_RATIO > velocity {
+            let place = table.loops.as_ref().map_or(table.place, |loops| loops.position.place);
+            let text = format!(
+                "the position loop has a bandwidth of {position:.1} rad/s, and the velocity loop in it \
+                 {velocity:.1} rad/s{}: less than {LOOP_RATIO} times as much, and they swing together",
+                table
+                    .loops
+                    .as_ref()
+                    .map_or_else(String::new, |loops| { at_line(loops.velocity.place, findings) })
+            );
+            self.warn(place, &text, findings);
+        }
+        self.friction(motor.stall_torque(), findings);
+        let push = axis.friction.coulomb / self.stiffness() * axis.ratio * lever;
+        if push > FRICTION_TOLERANCES * path.tolerance.value {
+            let text = format!(
+                "a friction of {:.3e} N·m against the {inertia:.3e} kg·m² that the loops are made for{} \
+                 pushes the tool off its path by {:.2} mm, {:.0} times the tolerance of {:.3} µm{}: its \
+                 feedforward would have to be that exact",
+                axis.friction.coulomb,
+                rotor_line(table, findings),
+                push * 1e3,
+                push / path.tolerance.value,
+                path.tolerance.value * 1e6,
+                at_line(path.tolerance.place, findings)
+            );
+            self.warn(table.friction.coulomb.place, &text, findings);
+        }
+    }
+
+    /// Friction against what the motor gives at standstill [N·m].
+    fn friction(&self, stall: f64, findings: &mut Findings) {
+        let coulomb = self.axis.friction.coulomb;
+        if coulomb > LARGEST_FRICTION * stall {
+            let text = format!(
+                "friction takes {coulomb:.3e} N·m of the {stall:.3e} N·m that the motor gives at \
+                 standstill: more than {:.0} % is unusual",
+                LARGEST_FRICTION * 100.0
+            );
+            self.warn(self.table.friction.coulomb.place, &text, findings);
+        }
+    }
+
+    /// What the data of a stepper say of each other.
+    fn stepper(&self, motor: &StepperMotor, findings: &mut Findings) {
+        let Some(data) = &self.table.motor.stepper else { return };
+        let (detent, holding) = (motor.detent_torque, motor.holding_torque);
+        if detent >= holding {
+            findings.contradict(
+                data.detent_torque.place,
+                format!(
+                    "axis `{}`: a detent torque of {detent} N·m is not less than the holding torque of \
+                     {holding} N·m{}: the motor could not turn",
+                    self.axis.name,
+                    at_line(data.holding_torque.place, findings)
+                ),
+                "a detent torque is about a twentieth of the holding torque",
+            );
+        } else if detent > LARGEST_DETENT * holding {
+            let text = format!(
+                "a detent torque of {detent} N·m is {:.0} % of the holding torque of {holding} N·m{}: \
+                 about 5 % are usual",
+                detent / holding * 100.0,
+                at_line(data.holding_torque.place, findings)
+            );
+            self.warn(data.detent_torque.place, &text, findings);
+        }
+        self.friction(holding, findings);
+    }
+}
+
+/// What the position of `motor` is counted in.
+fn counted(motor: &Motor) -> &'static str {
+    match motor {
+        Motor::Dc(_) => "count of the encoder",
+        Motor::Stepper(_) => "pulse",
+    }
+}
+
+/// " (line 12)" for a place in the file.
+fn at_line(place: Place, findings: &Findings) -> String {
+    findings.position(place).map_or_else(String::new, |(line, _)| format!(" (line {line})"))
+}
+
+/// Where the rotor's inertia of an axis is said.
+fn rotor_line(table: &AxisTable, findings: &Findings) -> String {
+    let dc = table.motor.dc.as_ref().map(|motor| motor.rotor_inertia.place);
+    let stepper = table.motor.stepper.as_ref().map(|motor| motor.rotor_inertia.place);
+    dc.or(stepper).map_or_else(String::new, |place| at_line(place, findings))
+}
+
+/// Where the travel of the axis `name` per turn of its gear is said.
+fn lead_place(machine: &MachineTable, axis: &AxisTable, name: &str) -> Option<Place> {
+    let cartesian = machine.mechanism.cartesian.as_ref();
+    let screw = cartesian.and_then(|cartesian| match name {
+        "x" => Some(&cartesian.x),
+        "y" => Some(&cartesian.y),
+        _ => cartesian.z.as_ref(),
+    });
+    let corexy = machine.mechanism.corexy.as_ref();
+    let transmission = &axis.transmission;
+    screw
+        .map(|screw| screw.lead.place)
+        .or(corexy.map(|corexy| corexy.pulley_radius.place))
+        .or(transmission.screw.as_ref().map(|screw| screw.lead.place))
+        .or(transmission.belt.as_ref().map(|belt| belt.pulley_radius.place))
+        .or(transmission.planar.as_ref().map(|planar| planar.pitch.place))
+}
