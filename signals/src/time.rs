@@ -56,6 +56,16 @@ impl Nanoseconds {
         self.0 as f64 / NANOSECONDS_PER_SECOND
     }
 
+    /// The whole cycles in this duration; 0 for a negative one.
+    pub fn cycles(self) -> u64 {
+        (self.0 / CYCLE_PERIOD.0).max(0).unsigned_abs()
+    }
+
+    /// The duration of this many cycles.
+    pub fn of_cycles(cycles: u64) -> Self {
+        Self(i64::try_from(cycles).unwrap_or(i64::MAX).saturating_mul(CYCLE_PERIOD.0))
+    }
+
     /// `seconds` [s] rounded to the nearest nanosecond.
     pub fn from_seconds(seconds: f64) -> Self {
         Self((seconds * NANOSECONDS_PER_SECOND).round() as i64)
