@@ -25,6 +25,7 @@ pub mod peer;
 pub mod service;
 pub mod signal;
 pub mod socket;
+pub mod stall;
 pub mod thread;
 pub mod wake;
 

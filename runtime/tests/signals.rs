@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use runtime::clock;
 use runtime::peer::Peer;
 use runtime::signal::{self, Termination};
 
@@ -18,4 +19,11 @@ fn a_signal_sets_the_flag_and_a_second_one_counts() {
         }
         assert_eq!(signal::termination(), Some(Termination { signal: number, count }));
     }
+    assert_eq!(signal::continued(), None);
+    let before = clock::now();
+    own.signal(libc::SIGCONT).unwrap();
+    while signal::continued().is_none() {
+        std::thread::yield_now();
+    }
+    assert!(signal::continued().is_some_and(|at| before <= at && at <= clock::now()));
 }
