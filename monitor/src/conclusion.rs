@@ -9,7 +9,8 @@ use crate::recording::file::{RecordingError, RecordingReader};
 use crate::report::Report;
 use crate::run_folder::RunFolder;
 use crate::summary::{
-    ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, Summary,
+    ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, StallSummary,
+    Summary,
 };
 use machine::{Axis, Machine};
 use runtime::thread;
@@ -116,10 +117,20 @@ pub fn summarise(
     }
     if let Some(report) = &ending.drives {
         summary.overruns = report.overruns.saturating_sub(ending.overruns_before);
+        if let Some(stream) = &ending.controller {
+            summary.stalls = StallSummary::of(&report.stalls, stream);
+        }
+        // A clock that slips has the machine wait: the marks are the same.
+        if report.slips == 0 {
+            summary.warnings.extend(summary.stalls.warning());
+        }
     }
     let faults = [ending.controller.map(|report| report.fault), ending.drives.map(|it| it.fault)];
     summary.fault =
         faults.iter().flatten().find_map(|fault| FaultSummary::of(fault, &machine.axes));
+    if let Some(fault) = &mut summary.fault {
+        fault.blame(&summary.stalls);
+    }
     summary.outcome = outcome(ending, summary.fault.is_some());
     if let Some(findings) = findings {
         summary.latency = findings.histograms.summary();

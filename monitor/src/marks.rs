@@ -239,8 +239,9 @@ impl<'a> Judge<'a> {
 
     fn moment(&mut self, moment: Moment) {
         if let Some(newest) = self.newest {
-            if moment.cycle != newest.cycle + 1 {
-                self.lost += moment.cycle.checked_sub(newest.cycle + 1).unwrap_or(1);
+            if !moment.follows(&newest) {
+                let due = newest.cycle.saturating_add(moment.elapsed);
+                self.lost += moment.cycle.checked_sub(due).unwrap_or(1);
             } else if newest.planned.is_none() && moment.in_force == Some(newest.cycle) {
                 // Drives had an answer to the cycle before that is not in the records.
                 self.lost += 1;
@@ -288,15 +289,16 @@ impl<'a> Judge<'a> {
         self.whole_before = stroke;
     }
 
-    /// Marks from part `from` to part `to` of a cycle.
+    /// Marks from part `from` to part `to` of an interval.
     fn light(&mut self, interval: &Interval, stroke: u64, from: f64, to: f64) {
-        let steps = ((to - from) * STEPS).ceil().max(1.0);
+        let cycles = interval.time() / CYCLE_TIME;
+        let steps = ((to - from) * cycles * STEPS).ceil().max(1.0);
         let step = (to - from) / steps;
         for index in 0..=steps as u32 {
             let part = from + step * f64::from(index);
             let tool = interval.tool(part);
             let deviation = interval.deviation(part).map(|deviation| deviation.norm());
-            let time = if index == 0 { 0.0 } else { step * CYCLE_TIME };
+            let time = if index == 0 { 0.0 } else { step * interval.time() };
             self.point(stroke, tool, deviation, time);
         }
     }

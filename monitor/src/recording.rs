@@ -1,7 +1,8 @@
 //! The recording of a run: each feedback with the command that answered it, in order.
 //!
 //! The monitor is best effort, so samples can be lost on the way. [`Recorder`] tells a loss from a
-//! command that was never given, and counts it: a judgement over a gap would be wrong.
+//! command that was never given and from cycles that drives skipped, and counts it: a judgement over
+//! a gap would be wrong.
 
 pub mod file;
 pub mod table;
@@ -60,7 +61,7 @@ impl Recorder {
             && self.started
         {
             // A cycle number that falls back is another drives process: nothing joins up there.
-            self.lost += cycle.checked_sub(newest + 1).unwrap_or(1);
+            self.lost += cycle.checked_sub(newest.saturating_add(feedback.elapsed())).unwrap_or(1);
         }
         self.newest = Some(cycle);
         self.feedbacks.push_back(*feedback);
@@ -119,7 +120,7 @@ impl Recorder {
     /// Whether drives reports a command for `feedback` that never arrived here.
     fn was_in_force(&self, feedback: &Feedback) -> bool {
         self.feedbacks.front().is_some_and(|next| {
-            next.cycle == feedback.cycle.next()
+            next.cycle.0 == feedback.cycle.0 + next.elapsed()
                 && next.command_cycle == feedback.cycle
                 && next.command_published.0 != 0
         })
@@ -179,6 +180,23 @@ mod tests {
     fn counts_lost_feedback() {
         let (records, lost) = record(1000, |cycle| !(300..307).contains(&cycle), |_| true);
         assert_eq!((records.len(), lost), (993, 7));
+    }
+
+    #[test]
+    fn cycles_that_drives_skipped_are_no_loss() {
+        let mut recorder = Recorder::new();
+        for cycle in (0..300).chain(307..400).chain(410..500) {
+            // Before 410, three feedbacks were lost as well.
+            let skipped = match cycle {
+                307 => 7,
+                410 => 7,
+                _ => 0,
+            };
+            recorder.feedback(&Feedback { skipped, ..feedback(cycle) });
+            recorder.command(&command(cycle));
+        }
+        recorder.finish();
+        assert_eq!((recorder.take().len(), recorder.lost()), (483, 3));
     }
 
     #[test]
