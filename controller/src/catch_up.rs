@@ -18,6 +18,13 @@ const CYCLES: u32 = 48;
 /// Share of the largest following error within which an axis counts as on the plan: 5 µm of 1 mm.
 const ON_PLAN: f64 = 0.005;
 
+/// How many times [`ON_PLAN`] an axis may be off before the velocity loop's integral is wound up by it,
+/// which takes longer to unwind: its tail is waited for with [`WOUND_UP`].
+const LARGE: f64 = 8.0;
+
+/// How many times closer than [`ON_PLAN`] the position loop alone would be by then.
+const WOUND_UP: f64 = 5.0;
+
 /// Time for which a wrong speed lasts until the loops have it back [s]: about two cycles.
 const SPEED_LOSS: f64 = 2.0 * CYCLE_TIME;
 
@@ -53,7 +60,10 @@ impl CatchUp {
                 _ if left <= 1.0 => 0.0,
                 Motor::Stepper(_) => f64::from(CYCLES),
                 // The position loop leaves e^(−ω·t) of it.
-                Motor::Dc(_) => (math::ln(left) / (axis.gains.position * CYCLE_TIME)).ceil(),
+                Motor::Dc(_) => {
+                    let left = if left > LARGE { left * WOUND_UP } else { left };
+                    (math::ln(left) / (axis.gains.position * CYCLE_TIME)).ceil()
+                }
             }
         });
         settling.fold(0.0, f64::max) as u64
@@ -127,9 +137,10 @@ mod tests {
         };
         assert_eq!(settling(&machine, 0.0, 0.0), 0);
         assert_eq!(settling(&machine, -0.99 * on_plan, 0.0), 0);
-        let tenfold = (math::ln(10.0) / bandwidth / CYCLE_TIME).ceil() as u64;
-        assert_eq!(settling(&machine, -10.0 * on_plan, 0.0), tenfold);
-        assert_eq!(settling(&machine, 0.0, 10.0 * on_plan / SPEED_LOSS), tenfold);
+        let cycles = |times: f64| (math::ln(times) / bandwidth / CYCLE_TIME).ceil() as u64;
+        assert_eq!(settling(&machine, -6.0 * on_plan, 0.0), cycles(6.0));
+        assert_eq!(settling(&machine, 0.0, 6.0 * on_plan / SPEED_LOSS), cycles(6.0));
+        assert_eq!(settling(&machine, -20.0 * on_plan, 0.0), cycles(20.0 * WOUND_UP));
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../machines");
         machine = Machine::load(&folder.join("cartesian_steppers.toml"), &[]).unwrap();
         let turned = 6e-6 / machine.axes[1].ratio;
