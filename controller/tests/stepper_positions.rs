@@ -162,8 +162,8 @@ impl Drivers {
         let _ = self.told.pop();
         self.feedback.position = self.position_before;
         for _ in 0..=cycles {
-            for axis in 0..2 {
-                self.feedback.position[axis] += coasting[axis] * 1e-3;
+            for (position, speed) in self.feedback.position.iter_mut().zip(&coasting) {
+                *position += speed * 1e-3;
             }
             let joint = |axis: usize| self.feedback.position[axis] * self.machine.axes[axis].ratio;
             self.told.push([joint(0), joint(1)]);
