@@ -73,7 +73,8 @@ impl Pipeline {
         plant_options: PlantOptions,
     ) -> Result<Self, SimulationError> {
         let port = SimulatedPlant::new(plant, plant_options)?;
-        let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict };
+        let options =
+            BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
         Ok(Self {
             controller: Controller::new(machine),
             bridge: Bridge::new(port, options),

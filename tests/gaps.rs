@@ -57,7 +57,7 @@ impl Recorded {
         unseen
             .map(|(_, pair)| {
                 let way = distance(&pair[0].feedback.tool, &pair[1].feedback.tool);
-                way * LitSpans::of(&pair[1].feedback.laser).share()
+                way * LitSpans::of(&pair[1].feedback.laser, 1).share()
             })
             .sum()
     }

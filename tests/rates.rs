@@ -29,7 +29,7 @@ fn play(machine: &Machine, requests: &[(u64, OperatorVerb, f64)]) -> Played {
     let plan = plan(machine, &job).unwrap();
     let mut setpoints = plan.setpoints(1);
     let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
-    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict };
+    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
     let mut bridge = Bridge::new(port, options);
     let mut controller = Controller::new(machine);
     let mut outputs = Outputs::default();

@@ -25,6 +25,7 @@
 //! A hold that nobody asked for ends by itself, and the mark is taken up where it was left:
 //!
 //! - light was lost, because a command came too late and drives kept its cycle dark;
+//! - light is due before the axes have come back from where a stall left them;
 //! - setpoints ran out, and a planner that lives has sent more.
 //!
 //! # Glossary
@@ -41,6 +42,7 @@ mod transitions;
 
 use crate::alignment::Alignment;
 use crate::cascade::Cascade;
+use crate::catch_up::CatchUp;
 use crate::exchange::{Inputs, Outputs, Peers, Presence};
 use crate::feedforward::Feedforward;
 use crate::intake::Intake;
@@ -76,6 +78,7 @@ pub struct Controller {
     intake: Intake,
     player: Player,
     alignment: Alignment,
+    catch_up: CatchUp,
     feedforward: Feedforward,
     /// None for steppers.
     cascades: [Option<Cascade>; MAX_AXES],
@@ -108,6 +111,7 @@ impl Controller {
             intake: Intake::new(machine),
             player: Player::new(),
             alignment: Alignment::default(),
+            catch_up: CatchUp::default(),
             feedforward: Feedforward::new(machine),
             cascades: core::array::from_fn(|index| machine.axes.get(index).and_then(cascade)),
             drive: match machine.axes[0].motor {
@@ -155,9 +159,7 @@ impl Controller {
         self.make_up(elapsed, now);
         outputs.reply = inputs.request.map(|request| self.request(&request, feedback.cycle));
         self.transition(now, feedback);
-        for _ in 0..elapsed.cycles {
-            self.advance(feedback);
-        }
+        self.go_on(elapsed, feedback, now);
         if self.state.follows()
             && let Err(finding) = self.supervision.motion(feedback, &self.feedforward.now().angle)
         {
@@ -217,14 +219,17 @@ impl Controller {
         let gone =
             |peer: Presence, code: FaultCode| (peer == Presence::Lost).then(|| Fault::new(code));
         let begun = self.intake.started() != 0;
+        let told = self.state.follows().then(|| self.supervision.drives(feedback).err()).flatten();
         // Drives keeps the gate closed: going on would leave marks out.
         let inhibited = self.playing != 0 && feedback.has(status::GATE_INHIBITED);
         let findings = [
             gone(peers.drives, FaultCode::DrivesLost).map(Finding::lost),
             gone(peers.supervisor, FaultCode::SupervisorLost).map(Finding::sound),
             gone(peers.planner, FaultCode::PlannerLost).filter(|_| begun).map(Finding::sound),
+            // What drives has found comes before the gap that it left.
+            told.filter(|finding| finding.fault == feedback.fault),
             seen.err(),
-            self.state.follows().then(|| self.supervision.drives(feedback).err()).flatten(),
+            told,
             inhibited.then(|| Finding::sound(Fault::new(FaultCode::DriveFault))),
         ];
         // A peer that is lost stays lost: what is worse must be heard beside it.
@@ -238,7 +243,13 @@ impl Controller {
         if self.playing == 0 {
             return;
         }
-        let Some(from) = self.player.miss(elapsed, self.intake.lookahead()) else { return };
+        if let Some(from) = self.player.miss(elapsed, self.intake.lookahead()) {
+            self.owe_light(from, now);
+        }
+    }
+
+    /// Light is left out from here on: holds, to go back for it.
+    fn owe_light(&mut self, from: StreamTime, now: Nanoseconds) {
         let same_place = self.losses > 0 && from < self.lost_at + ONE_PLACE;
         self.losses = if same_place { self.losses + 1 } else { 1 };
         self.lost_at = from;
@@ -270,6 +281,38 @@ impl Controller {
         };
     }
 
+    /// Goes on along the stream by the cycles that went by: references are a function of time, so that
+    /// axes which kept their speed in a stall are about where they should be. Positions take the rest
+    /// back without a step; light waits for axes that are off the plan.
+    fn go_on(&mut self, elapsed: Elapsed, feedback: &Feedback, now: Nanoseconds) {
+        // The end of the command that drives had last.
+        let last = match elapsed.missed >= elapsed.cycles {
+            true => *self.feedforward.next(),
+            false => *self.feedforward.after(),
+        };
+        if elapsed.missed > 0 {
+            self.catch_up = CatchUp::default();
+        }
+        for _ in 0..elapsed.cycles {
+            self.advance(feedback);
+        }
+        if elapsed.missed == 0 || !self.state.follows() {
+            return;
+        }
+        let mut catch_up = self.feedforward.coasted(&last, elapsed.missed);
+        let settling = catch_up.settling(&self.machine);
+        if self.drive == CommandMode::Position {
+            self.feedforward.put_coasted(&last, elapsed.missed, &mut catch_up);
+            self.catch_up = catch_up;
+        }
+        if settling > 0
+            && self.playing != 0
+            && let Some(from) = self.player.unsettle(settling, self.intake.lookahead())
+        {
+            self.owe_light(from, now);
+        }
+    }
+
     /// Goes on by one cycle along the stream, or stands.
     fn advance(&mut self, feedback: &Feedback) {
         if !self.state.follows() {
@@ -293,6 +336,7 @@ impl Controller {
         let setpoint = lookahead.setpoint(self.player.after().time.sequence());
         self.statistics.setpoint(setpoint, self.player.after());
         self.alignment.apply(&mut planned);
+        self.catch_up.apply(&mut planned);
         self.feedforward.advance(planned);
         match event {
             Event::Paused => self.state = State::Holding(AfterRest::Wait),

@@ -11,6 +11,7 @@
 //! its mean over the cycle is weighted by how long either direction lasts.
 
 use crate::cascade::Reference;
+use crate::catch_up::CatchUp;
 use crate::lookahead::Lookahead;
 use crate::player::Instant;
 use crate::winding::Winding;
@@ -77,9 +78,30 @@ impl Feedforward {
         &self.now
     }
 
+    /// What the plan has for the start of the cycle in which the command acts.
+    pub fn next(&self) -> &Planned {
+        &self.next
+    }
+
     /// What the plan has for the end of the cycle in which the command acts.
     pub fn after(&self) -> &Planned {
         &self.after
+    }
+
+    /// The way back to the plan for axes that went on from `last` by themselves, for `cycles`, to the
+    /// start of the cycle in which the command acts.
+    pub fn coasted(&self, last: &Planned, cycles: u64) -> CatchUp {
+        CatchUp::new(&last.coasted(cycles), &self.next)
+    }
+
+    /// Has the axes where such a coasting left them, and the end of the cycle on the way back.
+    pub fn put_coasted(&mut self, last: &Planned, cycles: u64, way: &mut CatchUp) {
+        let put = |planned: &mut Planned, coasted: &Planned| {
+            (planned.angle, planned.speed) = (coasted.angle, coasted.speed);
+        };
+        put(&mut self.now, &last.coasted(cycles.saturating_sub(1)));
+        put(&mut self.next, &last.coasted(cycles));
+        way.apply(&mut self.after);
     }
 
     /// Rests at `angle` [rad] from now on, as if it always had; the tool at `tool`, in metres.
@@ -259,6 +281,15 @@ struct Joint {
 }
 
 impl Planned {
+    /// This, so many cycles later at an even speed.
+    fn coasted(&self, cycles: u64) -> Self {
+        let time = cycles as f64 * CYCLE_TIME;
+        Self {
+            angle: core::array::from_fn(|axis| self.angle[axis] + self.speed[axis] * time),
+            ..*self
+        }
+    }
+
     /// Joint to motor, at `rate` and its `change`.
     fn put(&mut self, index: usize, axis: &Axis, joint: &Joint, rate: f64, change: f64) {
         let square = rate * rate;

@@ -6,6 +6,7 @@
 
 pub mod alignment;
 pub mod cascade;
+pub mod catch_up;
 pub mod controller;
 pub mod digest;
 pub mod exchange;

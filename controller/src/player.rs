@@ -17,7 +17,6 @@ use crate::rate_limit::LARGEST_RATE;
 use crate::stream_time::{ONE, StreamTime};
 use crate::supervision::Elapsed;
 use signals::LaserCycle;
-use signals::command::MOST_MISSES;
 use signals::setpoint::flags;
 use signals::time::CYCLE_TIME;
 
@@ -178,12 +177,27 @@ impl Player {
         // The command given last acts from `next` to `after`; for later cycles there was none.
         let sent = elapsed.missed >= elapsed.cycles && self.marking;
         let unsent = elapsed.cycles > 1 && matches!(self.activity, Activity::Playing(_));
-        let cycles = elapsed.cycles.saturating_sub(1).min(MOST_MISSES) as i64;
+        let cycles = elapsed.cycles.saturating_sub(1) as i64;
         let from = if sent { self.next.time } else { self.after.time };
         let from = from.max(self.dark_until);
         let to = self.after.time + StreamTime(cycles * LARGEST_RATE as i64 * ONE);
         let lost = elapsed.missed > 0 && (sent || unsent) && lookahead.is_lit(from, to);
         if !lost {
+            return None;
+        }
+        self.brake_in_the_dark(from);
+        self.marking = false;
+        self.owes_light_from = Some(from);
+        Some(from)
+    }
+
+    /// The axes are off the plan at `next`, and need so many cycles to come back to it: brakes if light
+    /// is due before that, and gives the place from which it is left out.
+    pub fn unsettle(&mut self, cycles: u64, lookahead: &Lookahead) -> Option<StreamTime> {
+        let from = self.next.time.max(self.dark_until);
+        let playing = matches!(self.activity, Activity::Playing(_));
+        let played = (cycles as f64 * self.after.rate.max(1.0)).ceil() as u64;
+        if !playing || !lookahead.is_lit(from, self.after.time + StreamTime::of(played)) {
             return None;
         }
         self.brake_in_the_dark(from);

@@ -65,9 +65,10 @@ impl Statistics {
     /// Counts one cycle: what was commanded, and how well the motors follow.
     pub fn cycle(&mut self, command: &Command, feedback: &Feedback, now: &Planned) {
         let report = &mut self.report;
-        report.cycles += 1;
         report.count += 1;
         report.last_cycle = feedback.cycle;
+        // With those in between that drives skipped.
+        report.cycles = (feedback.cycle.0 + 1).saturating_sub(report.first_cycle.0);
         self.digest.add(command, self.axes.len());
         for index in 0..self.axes.len().min(MAX_AXES) {
             let error = (now.angle[index] - feedback.position[index]).abs();

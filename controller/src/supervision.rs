@@ -5,15 +5,11 @@
 
 use machine::trip::Limit;
 use machine::trip::following::{CREEP, DISCONTINUITY, LEAD_STEP};
-use machine::{Axis, DcMotor, Machine};
-use signals::command::MOST_MISSES;
+use machine::{Axis, DcMotor, Machine, StallTolerance};
 use signals::feedback::status;
 use signals::setpoint::flags;
 use signals::time::CYCLE_TIME;
 use signals::{AxisArray, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, Setpoint};
-
-/// Overruns in a row that a clock which does not slip may have.
-const OVERRUNS: u64 = 3;
 
 /// Encoder counts per cycle within which an axis counts as standing.
 const STANDING_COUNTS: f64 = 1.5;
@@ -67,8 +63,10 @@ impl Elapsed {
 #[derive(Debug, Clone)]
 pub struct Supervision {
     axes: Vec<Axis>,
+    tolerance: StallTolerance,
     seen: Option<Seen>,
-    overruns: u64,
+    /// Cycles since the last that was in time.
+    late: u64,
     heating: AxisArray,
     standing: u32,
 }
@@ -86,8 +84,9 @@ impl Supervision {
     pub fn new(machine: &Machine) -> Self {
         Self {
             axes: machine.axes.clone(),
+            tolerance: machine.stall,
             seen: None,
-            overruns: 0,
+            late: 0,
             heating: [0.0; MAX_AXES],
             standing: 0,
         }
@@ -95,7 +94,7 @@ impl Supervision {
 
     /// Forgets what was counted; the windings stay as warm as they are.
     pub fn reset(&mut self) {
-        self.overruns = 0;
+        self.late = 0;
     }
 
     /// Cycles in a row in which no axis moved by more than an encoder count or so.
@@ -106,8 +105,8 @@ impl Supervision {
     /// Takes a feedback: what went by since the last one.
     ///
     /// # Errors
-    /// The same or an older cycle, a gap, another run of drives, a number that is not finite, or
-    /// too many overruns in a row.
+    /// The same or an older cycle, a gap longer than the tolerated stall, another run of drives, a
+    /// number that is not finite, or drives late for longer than that, with no cycle in time between.
     pub fn feedback(&mut self, feedback: &Feedback) -> Result<Elapsed, Finding> {
         let seen = Seen {
             epoch: feedback.epoch,
@@ -125,15 +124,16 @@ impl Supervision {
             return Err(Finding::lost(fault.with(FaultQuantity::Number, value)));
         }
         let Some(before) = before else { return Ok(Elapsed::ONE) };
-        if before.epoch != seen.epoch || gap == 0 || gap > MOST_MISSES {
-            let (value, limit) = (gap as f64, MOST_MISSES as f64);
+        let most = self.tolerance.feedback_gap();
+        if before.epoch != seen.epoch || gap == 0 || gap > most {
+            let (value, limit) = (gap as f64, most as f64);
             let fault = Fault::new(FaultCode::StaleFeedback);
             return Err(Finding::lost(fault.beyond(FaultQuantity::Cycles, value, limit)));
         }
         let overran = seen.overruns > before.overruns && !feedback.has(status::SLIPPING);
-        self.overruns = if overran { self.overruns + 1 } else { 0 };
-        if self.overruns > OVERRUNS {
-            let (value, limit) = (self.overruns as f64, OVERRUNS as f64);
+        self.late = if overran { self.late + gap } else { 0 };
+        if self.late > self.tolerance.cycles() {
+            let (value, limit) = (self.late as f64, self.tolerance.cycles() as f64);
             let fault = Fault::new(FaultCode::Overrun);
             return Err(Finding::sound(fault.beyond(FaultQuantity::Overruns, value, limit)));
         }

@@ -12,7 +12,7 @@ use signals::{
     CommandMode, ControllerState, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds,
     OperatorVerb, Setpoint,
 };
-use support::{Bench, Job, two_marks};
+use support::{Bench, Job, stalling, two_marks};
 
 /// In the middle of the first mark, lit.
 fn marking(machine: &Machine, job: &Job) -> Bench {
@@ -67,7 +67,8 @@ fn a_feedback_that_cannot_be_trusted_brakes_the_drives() {
     let quick = CommandMode::QuickStop;
     check(FaultCode::NotFinite, 2, quick, |feedback| feedback.position[1] = f64::NAN);
     check(FaultCode::NotFinite, 1, quick, |feedback| feedback.current[0] = f64::INFINITY);
-    check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.cycle.0 += 3);
+    let most = Machine::builtin().stall.feedback_gap();
+    check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.cycle.0 += most);
     check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.cycle.0 -= 1);
     check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.epoch += 1);
     check(FaultCode::StaleCommand, 0, quick, |feedback| feedback.status |= status::STOPPED_ALONE);
@@ -174,20 +175,45 @@ fn setpoints_that_break_the_stream_or_a_limit_are_never_played() {
 }
 
 #[test]
-fn overruns_are_bounded_on_a_clock_that_does_not_slip() {
-    for slipping in [false, true] {
-        let machine = Machine::builtin();
+fn drives_may_be_late_for_as_long_as_a_stall_is_tolerated_and_a_clock_that_slips_for_ever() {
+    for milliseconds in [1, 3, 10, 17] {
+        let tolerated = Nanoseconds(milliseconds * 1_000_000);
+        let machine = stalling(tolerated);
         let job = two_marks(&machine, 0.25, 0.5);
-        let mut bench = marking(&machine, &job);
-        for _ in 0..4 {
-            bench.cycle(Some(&job), None, |feedback| {
-                feedback.overruns += 1;
-                feedback.status |= if slipping { status::SLIPPING } else { 0 };
-            });
-        }
-        let fault = bench.last().command.fault.code();
-        assert_eq!(fault, if slipping { FaultCode::None } else { FaultCode::Overrun });
+        let late = |slipping: u32, cycles: i64| {
+            let mut bench = marking(&machine, &job);
+            for _ in 0..cycles {
+                bench.cycle(Some(&job), None, |feedback| {
+                    feedback.overruns += 1;
+                    feedback.status |= slipping;
+                });
+            }
+            // A cycle in time ends it.
+            bench.run(Some(&job), 1);
+            bench.last().command.fault
+        };
+        assert_eq!(late(0, milliseconds).code(), FaultCode::None);
+        let fault = late(0, milliseconds + 1);
+        let found = (fault.code(), fault.value, fault.limit);
+        assert_eq!(found, (FaultCode::Overrun, milliseconds as f64 + 1.0, milliseconds as f64));
+        assert_eq!(late(status::SLIPPING, 3 * milliseconds).code(), FaultCode::None);
     }
+}
+
+#[test]
+fn what_drives_found_in_a_stall_comes_before_the_gap_that_it_left() {
+    let machine = Machine::builtin();
+    let job = two_marks(&machine, 0.25, 0.5);
+    let mut bench = marking(&machine, &job);
+    let found = Fault::new(FaultCode::StaleCommand).beyond(FaultQuantity::Cycles, 31.0, 10.0);
+    bench.cycle(Some(&job), None, |feedback| {
+        feedback.cycle.0 += 30;
+        feedback.skipped = 30;
+        feedback.fault = found;
+    });
+    let command = bench.last().command;
+    assert_eq!((command.fault.code(), command.fault.value), (FaultCode::StaleCommand, 31.0));
+    assert_eq!(command.mode(), CommandMode::QuickStop);
 }
 
 #[test]

@@ -12,7 +12,10 @@ use machine::Machine;
 use signals::feedback::status;
 use signals::setpoint::flags;
 use signals::time::CYCLE_PERIOD;
-use signals::{CommandMode, ControllerState, Feedback, OperatorRequest, OperatorVerb, Setpoint};
+use signals::{
+    AxisArray, CommandMode, ControllerState, Feedback, MAX_AXES, Nanoseconds, OperatorRequest,
+    OperatorVerb, Setpoint,
+};
 use support::Move;
 
 /// How far gravity has the second motor's field ahead of its joint [m]: far more than a pulse.
@@ -72,6 +75,12 @@ struct Drivers {
     told: Vec<[f64; 2]>,
     state: ControllerState,
     ticket: u32,
+    /// Positions and speeds at the end of the command before the newest [rad, rad/s].
+    position_before: AxisArray,
+    velocity_before: AxisArray,
+    newest: (AxisArray, AxisArray),
+    /// How far the drivers are ahead of the measurement that comes, after a stall [rad].
+    ahead: AxisArray,
 }
 
 impl Drivers {
@@ -89,6 +98,10 @@ impl Drivers {
             told: Vec::new(),
             state: ControllerState::default(),
             ticket: 0,
+            position_before: [0.0; MAX_AXES],
+            velocity_before: [0.0; MAX_AXES],
+            newest: ([0.0; MAX_AXES], [0.0; MAX_AXES]),
+            ahead: [0.0; MAX_AXES],
         }
     }
 
@@ -96,6 +109,10 @@ impl Drivers {
         self.feedback.cycle = self.feedback.cycle.next();
         self.feedback.deadline = self.feedback.deadline + CYCLE_PERIOD;
         self.feedback.measured = self.feedback.deadline;
+        for (position, ahead) in self.feedback.position.iter_mut().zip(&self.ahead) {
+            *position -= ahead;
+        }
+        self.ahead = [0.0; MAX_AXES];
         let end = (self.sent + self.controller.room().min(64)).min(setpoints.len());
         let request = verb.map(|verb| {
             self.ticket += 1;
@@ -119,12 +136,15 @@ impl Drivers {
         let command = outputs.command;
         self.state = command.state();
         self.feedback.status = 0;
+        self.feedback.skipped = 0;
         if command.mode() == CommandMode::Disabled {
             return;
         }
         self.feedback.status = status::POWERED;
         assert_eq!(command.mode(), CommandMode::Position);
         let before = self.feedback.position;
+        (self.position_before, self.velocity_before) = (self.newest.0, self.newest.1);
+        self.newest = (command.position, command.velocity);
         self.feedback.position = command.position;
         let moved = before.iter().zip(&command.position);
         for (velocity, (before, now)) in self.feedback.velocity.iter_mut().zip(moved) {
@@ -132,6 +152,28 @@ impl Drivers {
         }
         let joint = |axis: usize| command.position[axis] * self.machine.axes[axis].ratio;
         self.told.push([joint(0), joint(1)]);
+    }
+
+    /// Cycles that drives skips, and the one after them: the drivers go on at the speed that they
+    /// were told last in force, which is that of the command before the newest.
+    fn stall(&mut self, cycles: u64) {
+        let coasting = self.velocity_before;
+        // The newest command comes to nothing.
+        let _ = self.told.pop();
+        self.feedback.position = self.position_before;
+        for _ in 0..=cycles {
+            for (position, speed) in self.feedback.position.iter_mut().zip(&coasting) {
+                *position += speed * 1e-3;
+            }
+            let joint = |axis: usize| self.feedback.position[axis] * self.machine.axes[axis].ratio;
+            self.told.push([joint(0), joint(1)]);
+        }
+        // What is measured is where they are at the deadline: a cycle before the end of all that.
+        self.ahead = coasting.map(|speed| speed * 1e-3);
+        self.feedback.cycle.0 += cycles;
+        self.feedback.skipped = cycles;
+        self.feedback.missed += cycles + 1;
+        self.feedback.deadline = self.feedback.deadline + Nanoseconds::of_cycles(cycles);
     }
 
     /// Until a hold has come to rest.
@@ -196,4 +238,41 @@ fn a_loaded_steppers_position_has_no_step() {
     assert!(sharpest < 5.5, "{sharpest} m/s²");
     let moved = drivers.told.iter().map(|told| told[0] - machine.home[0]).fold(0.0, f64::max);
     assert!((moved - 0.06).abs() < 1e-6, "{moved}");
+}
+
+#[test]
+fn a_stepper_comes_back_from_a_stall_without_a_step() {
+    let machine = machine();
+    let setpoints = setpoints(&machine);
+    // While it speeds up, cruises, and slows down.
+    for moment in [30, 150, 290] {
+        let mut drivers = Drivers::new(&machine);
+        for _ in 0..3 {
+            drivers.cycle(&[], None);
+        }
+        drivers.cycle(&[], Some(OperatorVerb::Enable));
+        drivers.until(&[], ControllerState::Idle);
+        drivers.cycle(&setpoints, Some(OperatorVerb::Start));
+        drivers.until(&setpoints, ControllerState::Running);
+        for _ in 0..moment {
+            drivers.cycle(&setpoints, None);
+        }
+        drivers.stall(9);
+        assert!(drivers.told.len() > 10);
+        for _ in 0..200 {
+            drivers.cycle(&setpoints, None);
+        }
+        let sharpest = drivers
+            .told
+            .windows(3)
+            .map(|told| ((told[2][0] - told[1][0]) - (told[1][0] - told[0][0])).abs() / 1e-6)
+            .fold(0.0, f64::max);
+        // The plan's 5 m/s², as much again to come back, and the end of the coasting.
+        assert!(sharpest < 11.0, "{sharpest} m/s² at {moment}");
+        // On the plan again by the pause.
+        drivers.until(&setpoints, ControllerState::Holding);
+        drivers.rest(&setpoints);
+        let stands = drivers.told.last().unwrap()[0] - machine.home[0];
+        assert!((stands - 0.06).abs() < 1e-9, "{stands}");
+    }
 }

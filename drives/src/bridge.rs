@@ -15,14 +15,20 @@
 //! - *Fresh*: answers the newest feedback of this run of drives.
 //! - *Overrun*: the cycle's work did not end before the next deadline.
 //! - *Slip*: an overrun that simulated drives waited for; the deadlines that follow moved.
+//! - *Skipped*: a cycle that drives, with strict deadlines, was too late for. Nobody measures in it,
+//!   the gate is closed, the axes go on with what was in force, and the cycle numbers go on with the
+//!   time: the deadline of cycle `n` stays `start + n × period`.
+//! - *Stall*: a time in which the cycle stood still; see [`signals::Stalls`].
 
+use machine::StallTolerance;
 use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
 use signals::{
     AxisArray, Command, CommandMode, Cycle, DrivesReport, Fault, FaultCode, Feedback, MAX_AXES,
-    Nanoseconds, RealtimeFacts, feedback::status,
+    Nanoseconds, RealtimeFacts, StallCause, feedback::status,
 };
 
 use crate::port::{Actuation, Freshness, Measurement, Port, Power};
+use crate::stalls::{Stall, StallAccount};
 pub use crate::watchdog::GatePermission;
 use crate::watchdog::{Watch, Watchdog};
 
@@ -41,12 +47,14 @@ pub enum Deadlines {
 }
 
 /// How a bridge runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BridgeOptions {
     /// Identifies this run of drives: its start on the monotonic clock [ns].
     pub epoch: u64,
     /// Whether its clock may slip.
     pub deadlines: Deadlines,
+    /// How long the axes may go on without a fresh command.
+    pub stall: StallTolerance,
 }
 
 /// A command that waits for its deadline.
@@ -69,6 +77,18 @@ enum Phase {
     Overrun,
 }
 
+/// A run of cycles without a fresh command that has not ended yet.
+#[derive(Debug, Clone, Copy)]
+struct Lack {
+    cycle: Cycle,
+    began: Nanoseconds,
+    /// What explains it where the kernel tells nothing: bits of [`StallCause`].
+    otherwise: u32,
+}
+
+/// What explains a stall in which drives was in time.
+const LATE_ANSWER: u32 = StallCause::LateAnswer.bit();
+
 /// The bridge between samples and a port.
 pub struct Bridge {
     port: Box<dyn Port + Send>,
@@ -82,6 +102,9 @@ pub struct Bridge {
     feedback: Feedback,
     slips: u64,
     resting: u32,
+    lack: Option<Lack>,
+    stalls: StallAccount,
+    unexplained: Option<(u64, Stall)>,
 }
 
 impl core::fmt::Debug for Bridge {
@@ -102,7 +125,7 @@ impl Bridge {
         Self {
             port,
             options,
-            watchdog: Watchdog::new(axes),
+            watchdog: Watchdog::new(axes, options.stall),
             permission: GatePermission::Granted,
             phase: Phase::Unstarted,
             latched: None,
@@ -111,6 +134,9 @@ impl Bridge {
             feedback: Feedback { epoch: options.epoch, ..Feedback::default() },
             slips: 0,
             resting: 0,
+            lack: None,
+            stalls: StallAccount::default(),
+            unexplained: None,
         }
     }
 
@@ -133,25 +159,34 @@ impl Bridge {
 
     /// Starts the cycle of `deadline` at `now`, not before it: puts the latched command in force,
     /// measures, and gives the feedback, whose `published` and `exchange` [`Self::stamp`] fills.
+    ///
+    /// With strict deadlines, each whole period beyond the one after the deadline before is a cycle
+    /// that was skipped.
     pub fn begin(&mut self, now: Nanoseconds, deadline: Nanoseconds) -> &Feedback {
-        self.count_slip(deadline);
-        let status = self.engage(now);
+        let before = (self.watchdog.watch(), self.watchdog.misses());
+        let skipped = self.count_late(now, deadline);
+        let missed = self.watchdog.counts().missed;
+        self.skip(skipped, now);
+        self.engage(now);
+        self.watch_lack(before, skipped, deadline);
+        let missed = self.watchdog.counts().missed > missed;
         self.port.exchange(&self.in_force, &mut self.measurement);
         if self.measurement.fault.is_some() {
             self.in_force = self.watchdog.stop(Fault { at: now, ..self.measurement.fault });
         }
         let first = self.phase == Phase::Unstarted;
-        self.describe(first);
+        self.describe(first, skipped);
 
+        self.feedback.cycle = self.cycle_after(skipped);
         let feedback = &mut self.feedback;
-        feedback.cycle = if first { Cycle(0) } else { feedback.cycle.next() };
+        feedback.skipped = skipped;
         feedback.deadline = deadline;
         feedback.measured = now;
         feedback.published = now;
         feedback.exchange = Nanoseconds(0);
         feedback.missed = self.watchdog.counts().missed;
         feedback.fault = *self.watchdog.fault();
-        feedback.status = status
+        feedback.status = bit(status::COMMAND_MISSED, missed)
             | bit(status::POWERED, self.measurement.power == Power::On)
             | bit(status::TOOL_KNOWN, self.measurement.tool.is_some())
             | bit(status::STOPPED_ALONE, self.watchdog.watch() == Watch::Stopped)
@@ -218,6 +253,7 @@ impl Bridge {
             at_rest: u32::from(braked && self.at_rest() && !lit),
             lit: u32::from(lit),
             fault: self.feedback.fault,
+            stalls: *self.stalls.stalls(),
             realtime,
         }
     }
@@ -226,27 +262,97 @@ impl Bridge {
         self.resting >= REST_CYCLES
     }
 
-    /// A deadline later than one period after the last means that the clock slipped, or on strict
-    /// deadlines that it left some out.
-    fn count_slip(&mut self, deadline: Nanoseconds) {
-        let late = deadline - (self.feedback.deadline + CYCLE_PERIOD);
-        if self.phase == Phase::Unstarted || late.0 <= 0 {
-            return;
-        }
-        let counted = u64::from(self.phase == Phase::Overrun);
-        let overruns = match self.options.deadlines {
-            Deadlines::Slipping => {
-                self.slips += 1;
-                1
-            }
-            Deadlines::Strict => late.0.unsigned_abs().div_ceil(CYCLE_PERIOD.0.unsigned_abs()),
-        };
-        self.feedback.overruns += overruns.saturating_sub(counted);
+    /// The stall that has ended in the newest begin, or stopped the axes there, to be explained by
+    /// whoever can ask the kernel; with the number for [`Self::explain`].
+    pub fn take_stall(&mut self) -> Option<(u64, Stall)> {
+        self.unexplained.take()
     }
 
-    /// Decides what is in force in the cycle that begins; the status bits of that decision.
-    fn engage(&mut self, now: Nanoseconds) -> u32 {
-        let missed = self.watchdog.counts().missed;
+    /// Why the stall with this number was: bits of [`StallCause`].
+    pub fn explain(&mut self, number: u64, causes: u32) {
+        self.stalls.explain(number, causes);
+    }
+
+    /// A deadline later than one period after the last means that the clock slipped, or on strict
+    /// deadlines that cycles were skipped. Counts either; returns how many were skipped.
+    fn count_late(&mut self, now: Nanoseconds, deadline: Nanoseconds) -> u64 {
+        let due = self.feedback.deadline + CYCLE_PERIOD;
+        let late = deadline - due;
+        if self.phase == Phase::Unstarted || late.0 <= 0 {
+            return 0;
+        }
+        let counted = u64::from(self.phase == Phase::Overrun);
+        let (overruns, skipped) = match self.options.deadlines {
+            Deadlines::Slipping => {
+                self.slips += 1;
+                if late >= CYCLE_PERIOD {
+                    let published = self.latched.as_ref().map_or(now, |it| it.command.published);
+                    let otherwise = if published < due { 0 } else { LATE_ANSWER };
+                    let cycle = self.cycle_after(0);
+                    self.note(Stall { cycle, began: due, length: late, otherwise });
+                }
+                (1, 0)
+            }
+            Deadlines::Strict => {
+                let period = CYCLE_PERIOD.0.unsigned_abs();
+                (late.0.unsigned_abs().div_ceil(period), late.cycles())
+            }
+        };
+        self.feedback.overruns += overruns.saturating_sub(counted);
+        skipped
+    }
+
+    /// Goes through the cycles that drives was too late for. A command that waits was for the first
+    /// of them, and acts in no other.
+    fn skip(&mut self, skipped: u64, now: Nanoseconds) {
+        if skipped == 0 {
+            return;
+        }
+        self.latched = None;
+        let port = &mut self.port;
+        self.watchdog.skip(skipped, now, |actuation| port.pass(actuation));
+    }
+
+    /// Follows a run of cycles without a fresh command: it is a stall once it has ended, or has
+    /// stopped the axes. `before` is the watchdog's state, and the length of the run, before this
+    /// begin.
+    fn watch_lack(&mut self, before: (Watch, u64), skipped: u64, deadline: Nanoseconds) {
+        if self.options.deadlines == Deadlines::Slipping || before.0 != Watch::Following {
+            self.lack = None;
+            return;
+        }
+        let misses = self.watchdog.misses();
+        if misses > 0 {
+            let began = deadline - Nanoseconds::of_cycles(skipped);
+            let lack = Lack { cycle: self.cycle_after(0), began, otherwise: LATE_ANSWER };
+            let lack = self.lack.get_or_insert(lack);
+            if skipped > 0 {
+                lack.otherwise = 0;
+            }
+        }
+        let stopped = self.watchdog.watch() == Watch::Stopped;
+        if misses == 0 || stopped {
+            let length = Nanoseconds::of_cycles(if misses == 0 { before.1 } else { misses });
+            if let Some(Lack { cycle, began, otherwise }) = self.lack.take() {
+                self.note(Stall { cycle, began, length, otherwise });
+            }
+        }
+    }
+
+    fn note(&mut self, stall: Stall) {
+        self.unexplained = Some((self.stalls.note(&stall), stall));
+    }
+
+    /// The number of the cycle that follows the newest, with so many left out.
+    fn cycle_after(&self, skipped: u64) -> Cycle {
+        match self.phase {
+            Phase::Unstarted => Cycle(0),
+            _ => Cycle(self.feedback.cycle.0 + 1 + skipped),
+        }
+    }
+
+    /// Decides what is in force in the cycle that begins.
+    fn engage(&mut self, now: Nanoseconds) {
         let resting = self.at_rest();
         let latched = self.latched.take();
         let command = latched.as_ref().map(|latched| &latched.command);
@@ -259,11 +365,14 @@ impl Bridge {
             self.feedback.command_published = command.published;
             self.feedback.command_applied = now;
         }
-        bit(status::COMMAND_MISSED, self.watchdog.counts().missed > missed)
+        if let Some(command) = command {
+            self.stalls.play(command.stream);
+        }
     }
 
-    /// Copies the measurement into the feedback; `first` has nothing before it to differ from.
-    fn describe(&mut self, first: bool) {
+    /// Copies the measurement into the feedback; `first` has nothing before it to differ from, and
+    /// that lies `skipped` cycles further back than usual.
+    fn describe(&mut self, first: bool, skipped: u64) {
         let measured = &self.measurement;
         let axes = self.port.axes().min(MAX_AXES);
         let mut velocity: AxisArray = [0.0; MAX_AXES];
@@ -271,7 +380,7 @@ impl Bridge {
         if !first {
             let pairs = measured.position.iter().zip(&self.feedback.position);
             for (velocity, (now, before)) in velocity.iter_mut().zip(pairs).take(axes) {
-                *velocity = (now - before) / CYCLE_TIME;
+                *velocity = (now - before) / (CYCLE_TIME * (1.0 + skipped as f64));
             }
         }
         self.resting = if first || moved { 0 } else { self.resting.saturating_add(1) };

@@ -3,7 +3,8 @@
 //! - [`port`]: the seam; what hardware or a plant must do.
 //! - [`plant`]: the simulated plant, motors and laser included.
 //! - [`bridge`]: one cycle: apply the latched command, measure, tell.
-//! - [`watchdog`]: laser off without a fresh command, axes to rest without three.
+//! - [`watchdog`]: laser off without a fresh command, axes to rest when that lasts too long.
+//! - [`stalls`]: the account of the times in which the cycle stood still.
 //!
 //! The bridge's step has no input or output and reads no clock; times come in as arguments.
 
@@ -15,9 +16,11 @@ pub mod plant;
 pub mod port;
 pub mod pulses;
 pub mod service;
+pub mod stalls;
 pub mod watchdog;
 
 pub use bridge::{Bridge, BridgeOptions, Deadlines};
 pub use plant::{PlantOptions, SimulatedPlant};
 pub use port::{Actuation, Freshness, Measurement, Port, Power};
+pub use stalls::Stall;
 pub use watchdog::GatePermission;

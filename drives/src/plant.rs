@@ -38,9 +38,10 @@ use machine::transmission::rest;
 use machine::{Axis, LaserSource, Machine, Mechanism, MechanismVisitor};
 use nalgebra::SVector;
 use signals::random::SplitMix64;
-use signals::time::CYCLE_TIME;
+use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
 use signals::{
-    AxisArray, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, MAX_AXES, Nanoseconds,
+    AxisArray, CommandMode, Fault, FaultCode, FaultQuantity, GateEdge, LaserCycle, MAX_AXES,
+    Nanoseconds,
 };
 
 use crate::port::{Actuation, Freshness, Measurement, Port, Power};
@@ -167,7 +168,10 @@ pub struct Plant<const N: usize, M: Mechanism<N>> {
     /// Where it was a substep before.
     passed: State<N>,
     in_force: Option<Actuation>,
+    /// What the laser did since the last exchange.
     light: LaserCycle,
+    /// Cycles gone by since the last exchange.
+    passed_cycles: u32,
     fault: Fault,
 }
 
@@ -236,6 +240,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             dynamics,
             in_force: None,
             light: LaserCycle::OFF,
+            passed_cycles: 0,
             fault: Fault::default(),
         })
     }
@@ -415,17 +420,52 @@ impl<const N: usize, M: Mechanism<N>> Port for Plant<N, M> {
     }
 
     fn exchange(&mut self, actuation: &Actuation, measurement: &mut Measurement) {
-        self.light = LaserCycle::OFF;
-        if let Some(in_force) = self.in_force {
-            self.advance(&in_force);
-            match self.source.cycle(&in_force.laser) {
-                Ok(light) => self.light = light,
-                Err(source::TooManyEdges) => {
-                    self.fail(impossible_light(&in_force.laser));
-                }
+        self.cycle();
+        self.measure(measurement);
+        (self.light, self.passed_cycles) = (LaserCycle::OFF, 0);
+        if self.engage(actuation) != CommandMode::Disabled {
+            measurement.power = Power::On;
+        }
+        measurement.fault = self.fault;
+    }
+
+    fn pass(&mut self, actuation: &Actuation) {
+        self.cycle();
+        self.engage(actuation);
+    }
+}
+
+impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
+    /// The cycle from the last call to this one, under what is in force.
+    fn cycle(&mut self) {
+        let Some(in_force) = self.in_force else { return };
+        self.advance(&in_force);
+        let told = self.source.cycle(&in_force.laser).and_then(|light| self.tell(&light));
+        if told == Err(source::TooManyEdges) {
+            self.fail(impossible_light(&in_force.laser));
+        }
+        self.passed_cycles = self.passed_cycles.saturating_add(1);
+    }
+
+    /// Adds the light of a cycle to what the laser did since the last exchange.
+    fn tell(&mut self, light: &LaserCycle) -> Result<(), source::TooManyEdges> {
+        let start = self.passed_cycles.saturating_mul(CYCLE_PERIOD.0 as u32);
+        if self.passed_cycles == 0 {
+            self.light = *light;
+            return Ok(());
+        }
+        let first = GateEdge { offset: 0, gate: light.gate, power: light.power };
+        let changes = (self.light.last() != (light.gate, light.power)).then_some(&first);
+        for edge in changes.into_iter().chain(light.edges()) {
+            if !self.light.push(GateEdge { offset: edge.offset.saturating_add(start), ..*edge }) {
+                return Err(source::TooManyEdges);
             }
         }
-        self.measure(measurement);
+        Ok(())
+    }
+
+    /// Puts `actuation` in force, as far as this plant carries it out; the mode that is.
+    fn engage(&mut self, actuation: &Actuation) -> CommandMode {
         let mut admitted = self.admit(actuation);
         if let Some(stepping) = &mut self.stepping
             && let Err(beyond) = stepping.engage(&admitted, &self.state)
@@ -440,11 +480,8 @@ impl<const N: usize, M: Mechanism<N>> Port for Plant<N, M> {
         if braking(Some(admitted.mode)) && !braking(self.in_force.map(|before| before.mode)) {
             self.brake.engage(&self.state);
         }
-        if admitted.mode != CommandMode::Disabled {
-            measurement.power = Power::On;
-        }
-        measurement.fault = self.fault;
         self.in_force = Some(admitted);
+        admitted.mode
     }
 }
 

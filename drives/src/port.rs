@@ -5,14 +5,18 @@
 //! - [`Port::exchange`] is called once a cycle, at its deadline. The actuation acts from this
 //!   instant to the next call. The measurement is taken at this instant, and its `laser` tells
 //!   what was fired between the previous call and this one.
+//! - Where drives was too late for deadlines, it says so by [`Port::pass`] for each of them, before
+//!   the exchange of the one that it is in time for. Hardware has done by then what the next point
+//!   asks of it.
 //! - The gate opens only inside a cycle whose actuation is [`Freshness::Fresh`]. With
 //!   [`Freshness::Stale`] the gate stays closed, whatever `laser` asks: the bridge has asked for
 //!   darkness already, and a port does not rely on it.
 //! - When the next call does not come at all, nothing in this process can help. Hardware must then
 //!   act by itself: close the gate at the end of the actuation's cycle, since no actuation is
-//!   valid for longer than one, and stop the axes at their limit of deceleration no later than
-//!   three cycles after it. A hardware port arms that watchdog before it first powers a motor
-//!   (on a fieldbus: the slave's process-data watchdog).
+//!   valid for longer than one, go on with its targets, and stop the axes at their limit of
+//!   deceleration once the tolerated stall of the machine file ([`machine::StallTolerance`]) is over.
+//!   A hardware port arms that watchdog before it first powers a motor (on a fieldbus: the slave's
+//!   process-data watchdog).
 //! - A mode that the port does not have, or a number that is not finite, is never replaced by
 //!   something similar: the port closes the gate, brakes, and reports a fault, until it is told
 //!   [`CommandMode::Disabled`].
@@ -93,7 +97,8 @@ pub struct Measurement {
     pub tool: Option<[f64; 3]>,
     /// Digital inputs, one bit each.
     pub inputs: u32,
-    /// What the laser did since the previous exchange.
+    /// What the laser did since the previous exchange; offsets count from there, through the cycles
+    /// that passed since.
     pub laser: LaserCycle,
     /// The port's own fault, latched until the mode is [`CommandMode::Disabled`]; its `at` is set
     /// by the bridge.
@@ -112,4 +117,11 @@ pub trait Port {
     ///
     /// The first call starts the first cycle, so nothing has happened before it.
     fn exchange(&mut self, actuation: &Actuation, measurement: &mut Measurement);
+
+    /// A deadline has passed without an exchange; hardware was in the state of `actuation` from there
+    /// to the next: the last targets in the dark, or the brake. It has done so by itself and is not
+    /// touched here. A plant that moves only when it is told moves on.
+    fn pass(&mut self, actuation: &Actuation) {
+        let _ = actuation;
+    }
 }

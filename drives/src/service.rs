@@ -4,15 +4,20 @@
 //! A cycle: sleep until the deadline, look whether the peers live, let the bridge apply and
 //! measure, publish the feedback, wait for the command with a bound, latch it. The bound is strict
 //! on hardware and with `--strict`; simulated drives wait longer for a controller that is alive and
-//! followed, and move the later deadlines by what that took.
+//! followed, and move the later deadlines by what that took. Strict deadlines never move: those after
+//! which another has passed are skipped, and the cycle goes on with the newest.
+//!
+//! Each stall is handed to a thread that is not real-time, which asks the kernel for its causes.
 //!
 //! Told to end, or left by the supervisor, the service closes the gate at once. A live controller
 //! then brings the axes to rest; where it does not, drives stops them, and leaves when they rest.
 
 use crate::bridge::{Bridge, BridgeOptions, Deadlines, GatePermission};
 use crate::port::{Freshness, Port};
+use machine::StallTolerance;
 use runtime::clock::{self, PeriodicClock};
 use runtime::peer::{PeerState, Peers};
+use runtime::stall::{StallNote, StallWatch};
 use runtime::thread::{self, RealtimeOptions};
 use runtime::wake::{Listener, Notifier, Wake};
 use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, message, signal};
@@ -21,7 +26,8 @@ use signals::report::refused;
 use signals::time::CYCLE_PERIOD;
 use signals::{Command, DrivesReport, FaultCode, Feedback, Nanoseconds, RealtimeFacts};
 
-/// How long drives waits for a command in its cycle, from the deadline, when it is strict.
+/// How long drives waits for a command in its cycle, from the deadline or the feedback, whichever was
+/// later, when it is strict: what made drives late is not the controller's to make up for.
 const STRICT_BOUND: Nanoseconds = Nanoseconds(300_000);
 
 /// How long simulated drives wait for the command of a controller that is alive.
@@ -41,6 +47,8 @@ const LAST_PATIENCE: Nanoseconds = Nanoseconds(3_000_000_000);
 pub struct ServiceOptions {
     /// Whether the clock may slip.
     pub deadlines: Deadlines,
+    /// How long the axes may go on without a fresh command.
+    pub stall: StallTolerance,
     /// Real-time set-up of the cycle's thread.
     pub realtime: RealtimeOptions,
 }
@@ -95,6 +103,8 @@ struct ServiceCycle {
     commands: Subscriber<Command>,
     feedback_wake: Notifier,
     command_wake: Listener,
+    /// None where the operating system gives no thread: stalls stay unexplained.
+    stalls: Option<StallWatch>,
     reported: DrivesReport,
     /// Since when the service shall end.
     leaving: Option<Nanoseconds>,
@@ -106,8 +116,11 @@ impl ServiceCycle {
         port: Box<dyn Port + Send>,
         options: &ServiceOptions,
     ) -> Result<Self, ServiceError> {
-        let bridge_options =
-            BridgeOptions { epoch: clock::now().0.unsigned_abs(), deadlines: options.deadlines };
+        let bridge_options = BridgeOptions {
+            epoch: clock::now().0.unsigned_abs(),
+            deadlines: options.deadlines,
+            stall: options.stall,
+        };
         Ok(Self {
             bridge: Bridge::new(port, bridge_options),
             deadlines: options.deadlines,
@@ -117,6 +130,7 @@ impl ServiceCycle {
             commands: domain.subscriber(Reading::Newest)?,
             feedback_wake: domain.notifier(Wake::Feedback)?,
             command_wake: domain.listener(Wake::Command)?,
+            stalls: StallWatch::start().ok(),
             reported: DrivesReport::default(),
             leaving: None,
         })
@@ -130,10 +144,14 @@ impl ServiceCycle {
         let mut clock = PeriodicClock::new(CYCLE_PERIOD, margin);
         loop {
             clock.wait();
+            if self.deadlines == Deadlines::Strict {
+                clock.skip();
+            }
             let vitality = self.look_after_peers();
             self.begin(clock.deadline())?;
             self.await_command(vitality)?;
             self.bridge.finish(clock::now());
+            self.account_for_stalls();
 
             let report = self.bridge.report(facts);
             if report.cycle.0.is_multiple_of(REPORT_INTERVAL) || self.has_news(&report) {
@@ -193,8 +211,12 @@ impl ServiceCycle {
         let patient = self.deadlines == Deadlines::Slipping
             && vitality.controller == PeerState::Alive
             && !self.bridge.feedback().has(status::STOPPED_ALONE);
-        let bound = if patient { SLIPPING_BOUND } else { STRICT_BOUND };
-        let until = self.bridge.feedback().deadline + bound;
+        let Feedback { deadline, published, .. } = *self.bridge.feedback();
+        let until = if patient {
+            deadline + SLIPPING_BOUND
+        } else {
+            deadline.max(published) + STRICT_BOUND
+        };
         loop {
             while let Some(command) = self.commands.newest()? {
                 if self.bridge.latch(&command, clock::now()) == Freshness::Fresh {
@@ -218,14 +240,24 @@ impl ServiceCycle {
         patient && self.peers.state(Role::Controller) != PeerState::Alive
     }
 
+    /// Hands on a stall that is to be explained, and takes an explanation.
+    fn account_for_stalls(&mut self) {
+        let Some(watch) = &self.stalls else { return };
+        if let Some((number, stall)) = self.bridge.take_stall() {
+            let to = stall.began + stall.length;
+            watch.tell(StallNote { number, from: stall.began, to, otherwise: stall.otherwise });
+        }
+        if let Some(explanation) = watch.explained() {
+            self.bridge.explain(explanation.number, explanation.causes);
+        }
+    }
+
     fn has_news(&self, report: &DrivesReport) -> bool {
-        (report.at_rest, report.stops, report.gate_trips, report.fault.code)
-            != (
-                self.reported.at_rest,
-                self.reported.stops,
-                self.reported.gate_trips,
-                self.reported.fault.code,
-            )
+        let news = |report: &DrivesReport| {
+            let DrivesReport { at_rest, stops, gate_trips, fault, stalls, .. } = *report;
+            (at_rest, stops, gate_trips, fault.code, stalls)
+        };
+        news(report) != news(&self.reported)
     }
 
     fn publish(&mut self, report: &DrivesReport) -> Result<(), ServiceError> {

@@ -4,28 +4,34 @@
 //!
 //! - **Gate**: open only in a cycle with a fresh command. The first cycle without one is dark; the
 //!   axes go on with the last command for it, which at constant speed is the right voltage.
-//! - **Axes**: after [`MOST_MISSES`] cycles in a row without a fresh command, or at once for a
-//!   command that makes no sense, a fault of the port or a lost peer, they are stopped by the
-//!   drive's own brake, in the dark and with all outputs off.
+//! - **Axes**: once more cycles in a row than the tolerated stall has ([`StallTolerance`]) lack a
+//!   fresh command, or at once for a command that makes no sense, a fault of the port or a lost peer,
+//!   they are stopped by the drive's own brake, in the dark and with all outputs off. Until then they
+//!   go on with the last command.
+//! - **Skipped cycles**, for whose deadlines drives was too late, are cycles without a fresh command.
 //! - **Latch**: a stop stays, with its first cause, until a person has asked for a reset (its
 //!   ticket travels in the command) and the controller starts again from disabled.
 //!
 //! ```text
 //! Waiting ──command: disabled──► Following ──doubt──► Stopped
 //!    ▲ ▲                            │                    │
-//!    │ └──three misses, unpowered───┘                    │
+//!    │ └──too many misses, unpowered┘                    │
 //!    └──────────command: disabled, with a new reset──────┘   (goes on to Following)
 //! ```
 //!
 //! This is software on the control computer and not a safety function: the laser's interlock and
 //! the motors' safe torque off are wired.
 
+use machine::StallTolerance;
 use signals::{
     AxisArray, Command, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, MAX_EDGES,
-    Nanoseconds, axis::MAX_AXES, command::MOST_MISSES,
+    Nanoseconds, axis::MAX_AXES,
 };
 
 use crate::port::{Actuation, Freshness};
+
+/// Skipped cycles that are gone through one by one; axes that brake rest long before.
+const MOST_PASSED: u64 = 1000;
 
 /// Whether the gate may open in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -63,7 +69,9 @@ pub struct Counts {
 #[derive(Debug, Clone)]
 pub struct Watchdog {
     axes: usize,
+    tolerated: u64,
     watch: Watch,
+    /// Cycles in a row without a fresh command.
     misses: u64,
     reset: u64,
     fault: Fault,
@@ -74,10 +82,11 @@ pub struct Watchdog {
 }
 
 impl Watchdog {
-    /// A watchdog over `axes` axes that waits for the first command.
-    pub fn new(axes: usize) -> Self {
+    /// A watchdog over `axes` axes that waits for the first command, and bears stalls of `tolerance`.
+    pub fn new(axes: usize, tolerance: StallTolerance) -> Self {
         Self {
             axes: axes.min(MAX_AXES),
+            tolerated: tolerance.cycles(),
             watch: Watch::Waiting,
             misses: 0,
             reset: 0,
@@ -103,6 +112,28 @@ impl Watchdog {
         self.counts
     }
 
+    /// Cycles in a row, to now, without a fresh command.
+    pub fn misses(&self) -> u64 {
+        self.misses
+    }
+
+    /// `cycles` were skipped before the one that begins `now`, which will lack a fresh command too:
+    /// gives what was in force in each of them, in order, to `passed`. Beyond [`MOST_PASSED`] they are
+    /// only counted.
+    pub fn skip(&mut self, cycles: u64, now: Nanoseconds, mut passed: impl FnMut(&Actuation)) {
+        let lacking = self.misses.saturating_add(cycles).saturating_add(1);
+        for _ in 0..cycles.min(MOST_PASSED) {
+            self.missed(lacking, now);
+            self.watch_gate();
+            passed(&self.last);
+        }
+        if self.watch != Watch::Waiting {
+            let rest = cycles.saturating_sub(MOST_PASSED);
+            self.misses = self.misses.saturating_add(rest);
+            self.counts.missed += rest;
+        }
+    }
+
     /// What is in force in the cycle that begins `now`, with the fresh command if one came.
     /// `resting` axes may be unpowered while stopped; moving ones are braked first.
     pub fn decide(
@@ -114,15 +145,20 @@ impl Watchdog {
     ) -> Actuation {
         match command {
             Some(command) => self.fresh(command, resting, now),
-            None => self.missed(now),
+            None => self.missed(self.misses.saturating_add(1), now),
         }
         if permission == GatePermission::Inhibited {
             self.darken();
         }
+        self.watch_gate();
+        self.last
+    }
+
+    /// Counts an open gate that was closed for want of a command.
+    fn watch_gate(&mut self) {
         let commanded = self.last.freshness == Freshness::Fresh;
         self.counts.gate_trips += u64::from(self.gate != 0 && !commanded);
         (self.gate, _) = self.last.laser.last();
-        self.last
     }
 
     fn fresh(&mut self, command: &Command, resting: bool, now: Nanoseconds) {
@@ -161,19 +197,20 @@ impl Watchdog {
         }
     }
 
-    fn missed(&mut self, now: Nanoseconds) {
+    /// A cycle without a fresh command, one of `lacking` in a row as far as is known.
+    fn missed(&mut self, lacking: u64, now: Nanoseconds) {
         if self.watch == Watch::Waiting {
             return;
         }
         self.counts.missed += 1;
         self.misses = self.misses.saturating_add(1);
         self.darken();
-        if self.watch == Watch::Following && self.misses >= MOST_MISSES {
+        if self.watch == Watch::Following && self.misses > self.tolerated {
             if self.last.mode == CommandMode::Disabled {
                 self.watch = Watch::Waiting;
                 self.last = Actuation::DISABLED;
             } else {
-                let (value, limit) = (self.misses as f64, MOST_MISSES as f64);
+                let (value, limit) = (lacking as f64, self.tolerated as f64);
                 let fault = Fault::new(FaultCode::StaleCommand);
                 self.stop(fault.beyond(FaultQuantity::Cycles, value, limit).at(now));
             }

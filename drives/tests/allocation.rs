@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use drives::{Bridge, BridgeOptions, PlantOptions, SimulatedPlant};
+use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
 use machine::{Machine, Motor};
 use runtime::allocation::{Allocations, CountingAllocator};
 use signals::{Command, CommandMode, LaserCycle, Nanoseconds, RealtimeFacts, axis::axis_array};
@@ -18,13 +18,14 @@ fn machine_files() -> Vec<PathBuf> {
     entries.filter(|path| path.extension().is_some_and(|kind| kind == "toml")).collect()
 }
 
-/// Runs the bridge of `machine` to and fro about home, with commands missed now and then, and at the
-/// end with a mode that the plant refuses.
+/// Runs the bridge of `machine` to and fro about home, with commands missed and cycles skipped now and
+/// then, and at the end with a mode that the plant refuses.
 fn assert_allocates_nothing(name: &str, machine: &Machine) {
     let (port, built) =
         Allocations::during(|| SimulatedPlant::new(machine, PlantOptions::default()));
     assert!(built.allocations > 0, "the counting allocator does not count");
-    let mut bridge = Bridge::new(port.unwrap(), BridgeOptions::default());
+    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
+    let mut bridge = Bridge::new(port.unwrap(), options);
     let stepping = matches!(machine.axes[0].motor, Motor::Stepper(_));
     let (follows, refused) = if stepping {
         (CommandMode::Position, CommandMode::Voltage)
@@ -34,8 +35,10 @@ fn assert_allocates_nothing(name: &str, machine: &Machine) {
     let mut home = None;
     let mut moved = 0.0_f64;
     let ((), cycles) = Allocations::during(|| {
+        let mut skipped = 0;
         for index in 0..1000_i64 {
-            let deadline = Nanoseconds(1_000_000 * (index + 1));
+            skipped += if index % 200 == 150 { 4 } else { 0 };
+            let deadline = Nanoseconds(1_000_000 * (index + skipped + 1));
             bridge.begin(deadline, deadline);
             let feedback = *bridge.stamp(deadline + Nanoseconds(3000));
             let home = *home.get_or_insert(feedback.position);
@@ -62,6 +65,7 @@ fn assert_allocates_nothing(name: &str, machine: &Machine) {
             }
             bridge.finish(deadline + Nanoseconds(21_000));
             bridge.report(RealtimeFacts::default());
+            bridge.take_stall();
         }
     });
     assert_eq!(cycles, Allocations::default(), "{name}");

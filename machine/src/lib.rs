@@ -28,7 +28,7 @@ pub mod trip;
 pub use actuator::{Axis, Encoder, Friction, JointUnit, LoopGains};
 pub use document::{DocumentError, Override};
 pub use kinematics::{Mechanism, Pose};
-pub use limits::{AxisLimits, PathLimits, WorkArea};
+pub use limits::{AxisLimits, PathLimits, StallTolerance, WorkArea};
 pub use machine::{Machine, Warning};
 pub use mechanisms::{Cartesian, CoreXy, Mcm, MechanismKind, MechanismVisitor, Polar, Serial};
 pub use motor::{DcMotor, Motor, StepperMotor};

@@ -1,4 +1,8 @@
-//! Limits of the path, of each axis, and of the area that the tool may reach.
+//! Limits of the path, of each axis, of the area that the tool may reach, and of the time for which
+//! the axes may go on without a command.
+
+use signals::Nanoseconds;
+use signals::time::CYCLE_PERIOD;
 
 /// Limits of the tool's motion; they bind the norms of the vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,4 +42,50 @@ pub struct WorkArea {
     pub lower: [f64; 3],
     /// Upper corner [m].
     pub upper: [f64; 3],
+}
+
+/// How long the axes may go on with their last command, in the dark, before they are stopped.
+///
+/// Every watch over time derives from this one value:
+///
+/// - drives stops the axes once more than [`Self::cycles`] cycles in a row lack a fresh command, be
+///   it that drives itself was late for them or the controller;
+/// - the controller takes a feedback that came at most [`Self::feedback_gap`] cycles after the one
+///   before;
+/// - the controller stops the axes once drives has been late for more than [`Self::cycles`] cycles
+///   without a cycle in time between.
+///
+/// A hardware bridge arms the watchdog of its drives with it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct StallTolerance(Nanoseconds);
+
+impl StallTolerance {
+    /// The shortest that makes sense: one cycle, which a single late command takes.
+    pub const SHORTEST: Self = Self(CYCLE_PERIOD);
+
+    /// The longest that makes sense. At 10 m/s² an axis that keeps its speed is then 12 mm from its
+    /// reference: any following error is found long before.
+    pub const LONGEST: Self = Self(Nanoseconds(50 * CYCLE_PERIOD.0));
+
+    /// This long; `None` outside of [`Self::SHORTEST`] to [`Self::LONGEST`].
+    pub fn new(time: Nanoseconds) -> Option<Self> {
+        (Self::SHORTEST..=Self::LONGEST).contains(&Self(time)).then_some(Self(time))
+    }
+
+    /// The time.
+    pub fn time(self) -> Nanoseconds {
+        self.0
+    }
+
+    /// Cycles in a row that may lack a fresh command, at least 1: whole ones, because a command acts
+    /// for a whole cycle or not at all.
+    pub fn cycles(self) -> u64 {
+        self.0.cycles()
+    }
+
+    /// Cycles from one feedback to the next that the controller sees, at most: the answer to the one
+    /// before is still in force in the first of them, the others lack a command.
+    pub fn feedback_gap(self) -> u64 {
+        self.cycles() + 1
+    }
 }

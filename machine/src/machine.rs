@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::actuator::Axis;
 use crate::document::{Concern, DocumentError, Override};
-use crate::limits::{PathLimits, WorkArea};
+use crate::limits::{PathLimits, StallTolerance, WorkArea};
 use crate::mechanisms::MechanismKind;
 use crate::process::{GcodeSettings, LaserSource};
 
@@ -31,6 +31,8 @@ pub struct Machine {
     pub home_joints: Vec<f64>,
     /// Limits of the tool's motion.
     pub path: PathLimits,
+    /// How long the axes may go on without a fresh command.
+    pub stall: StallTolerance,
     /// The laser source.
     pub laser: LaserSource,
     /// How it reads G-code.

@@ -100,6 +100,30 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
         "off_delay = \"1001 ms\"",
         &["102:13: an `off_delay` of 1.001 s is too long; a laser source answers within 1 s"],
     );
+    for (stall, found) in [("0.9 ms", "0.0009"), ("51 ms", "0.051"), ("1e15 s", "1000000000000000")]
+    {
+        refused(
+            "[laser]",
+            &format!("[realtime]\nstall = \"{stall}\"\n[laser]"),
+            &[&format!(
+                "101:9: a `stall` of {found} s cannot be tolerated; write a time from 1 ms, one cycle, \
+                 to 50 ms"
+            )],
+        );
+    }
+}
+
+#[test]
+fn a_tolerated_stall_is_a_time_of_which_whole_cycles_count() {
+    let read = |stall: &str| {
+        let text = COREXY.replacen("[laser]", &format!("[realtime]\nstall = {stall}\n[laser]"), 1);
+        Machine::parse("machine.toml", &text, &[]).unwrap().stall
+    };
+    for (stall, cycles) in [("1 ms", 1), ("2.999 ms", 2), ("0.01 s", 10), ("50 ms", 50)] {
+        let tolerance = read(&format!("\"{stall}\""));
+        assert_eq!((tolerance.cycles(), tolerance.feedback_gap()), (cycles, cycles + 1), "{stall}");
+    }
+    assert_eq!(Machine::builtin().stall, read("\"10 ms\""));
 }
 
 #[test]

@@ -16,7 +16,8 @@ use crate::report::Report;
 use crate::run_folder::RunFolder;
 use crate::summary::text::length;
 use crate::summary::{
-    ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, Summary,
+    ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, StallSummary,
+    Summary,
 };
 use machine::{Axis, Machine};
 use runtime::thread;
@@ -100,8 +101,18 @@ pub fn summarise(
     }
     if let Some(report) = &ending.drives {
         summary.overruns = report.overruns.saturating_sub(ending.overruns_before);
+        if let Some(stream) = &ending.controller {
+            summary.stalls = StallSummary::of(&report.stalls, stream);
+        }
+        // A clock that slips has the machine wait: the marks are the same.
+        if report.slips == 0 {
+            summary.warnings.extend(summary.stalls.warning());
+        }
     }
     end(&mut summary, machine, ending);
+    if let Some(fault) = &mut summary.fault {
+        fault.blame(&summary.stalls);
+    }
     if let Some(findings) = findings {
         summary.latency = findings.histograms.summary();
         summary.recording = Some(findings.continuity.summary());

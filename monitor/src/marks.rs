@@ -392,15 +392,16 @@ impl<'a> Judge<'a> {
         self.whole_before = stroke;
     }
 
-    /// Marks from part `from` to part `to` of a cycle.
+    /// Marks from part `from` to part `to` of an interval.
     fn light(&mut self, interval: &Interval, stroke: u64, from: f64, to: f64) {
-        let steps = ((to - from) * STEPS).ceil().max(1.0);
+        let cycles = interval.time() / CYCLE_TIME;
+        let steps = ((to - from) * cycles * STEPS).ceil().max(1.0);
         let step = (to - from) / steps;
         for index in 0..=steps as u32 {
             let part = from + step * f64::from(index);
             let tool = interval.tool(part);
             let deviation = interval.deviation(part).map(|deviation| deviation.norm());
-            let time = if index == 0 { 0.0 } else { step * CYCLE_TIME };
+            let time = if index == 0 { 0.0 } else { step * interval.time() };
             // Beside a gap the path between the deadlines is not known well enough to be measured.
             let exact = interval.is_surrounded() || part == 0.0 || part == 1.0;
             let cut = interval.is_first();

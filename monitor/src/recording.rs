@@ -1,7 +1,8 @@
 //! The recording of a run: each feedback with the command that answered it, in order.
 //!
 //! The monitor is best effort, so samples can be lost on the way, and cycles pass while no monitor
-//! lives. [`Recorder`] tells a loss from a command that was never given, and counts it.
+//! lives. [`Recorder`] tells a loss from a command that was never given and from cycles that drives
+//! skipped, and counts it.
 
 pub mod continuity;
 pub mod file;
@@ -139,7 +140,7 @@ impl Recorder {
     /// Whether drives reports a command for `feedback` that never arrived here.
     fn was_in_force(&self, feedback: &Feedback) -> bool {
         self.feedbacks.front().is_some_and(|next| {
-            next.cycle == feedback.cycle.next()
+            next.cycle.0 == feedback.cycle.0 + next.elapsed()
                 && next.command_cycle == feedback.cycle
                 && next.command_published.0 != 0
         })
@@ -200,6 +201,23 @@ mod tests {
     fn counts_lost_feedback() {
         let (records, lost) = record(1000, |cycle| !(300..307).contains(&cycle), |_| true);
         assert_eq!((records.len(), lost), (993, 7));
+    }
+
+    #[test]
+    fn cycles_that_drives_skipped_are_no_loss() {
+        let mut recorder = Recorder::new();
+        for cycle in (0..300).chain(307..400).chain(410..500) {
+            // Before 410, three feedbacks were lost as well.
+            let skipped = match cycle {
+                307 => 7,
+                410 => 7,
+                _ => 0,
+            };
+            recorder.feedback(&Feedback { skipped, ..feedback(cycle) });
+            recorder.command(&command(cycle));
+        }
+        recorder.finish();
+        assert_eq!((recorder.take().len(), recorder.continuity().missing), (483, 3));
     }
 
     #[test]

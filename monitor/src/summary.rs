@@ -4,6 +4,7 @@
 //! SI units and radians, latencies in nanoseconds.
 
 pub mod fault;
+pub mod stalls;
 pub mod text;
 
 use crate::latency::HopLatency;
@@ -15,6 +16,7 @@ use signals::{ControllerReport, RealtimeFacts};
 use std::collections::BTreeMap;
 
 pub use fault::FaultSummary;
+pub use stalls::StallSummary;
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -78,8 +80,11 @@ pub struct Summary {
     pub limits: LimitUse,
     /// Control cycles from the first setpoint to the last.
     pub cycles: u64,
-    /// Cycles whose work did not end before the next deadline, slips included.
+    /// Cycles whose work did not end before the next deadline, slips and skipped cycles included.
     pub overruns: u64,
+    /// Times in which the control cycle stood still.
+    #[serde(default)]
+    pub stalls: StallSummary,
     /// Latencies by hop; empty in virtual time.
     pub latency: BTreeMap<String, HopLatency>,
     /// Real-time set-up of the processes.
@@ -212,6 +217,7 @@ impl Summary {
             limits: LimitUse::default(),
             cycles: 0,
             overruns: 0,
+            stalls: StallSummary::default(),
             latency: BTreeMap::new(),
             realtime: Realtime::default(),
             digest: String::new(),
@@ -285,6 +291,7 @@ mod tests {
             "limits",
             "cycles",
             "overruns",
+            "stalls",
             "latency",
             "realtime",
             "digest",

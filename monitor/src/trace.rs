@@ -12,10 +12,13 @@ use outline::{Outline, OutlinePoint};
 use signals::hop::{Hop, latencies};
 use signals::{LaserCycle, MAX_AXES};
 
-/// Share of a cycle in which the laser marked, 0..=1.
-pub fn lit_share(laser: &LaserCycle) -> f64 {
-    LitSpans::of(laser).share()
+/// Share of so many cycles in which the laser marked, 0..=1.
+pub fn lit_share(laser: &LaserCycle, cycles: u64) -> f64 {
+    LitSpans::of(laser, cycles).share()
 }
+
+/// Skipped cycles that the curves show as a gap at most, a minute; a longer one looks no different.
+const LONGEST_GAP: u64 = 60_000;
 
 /// The curves of a run over time and its paths in the plane.
 #[derive(Debug)]
@@ -76,6 +79,13 @@ impl Trace {
         };
         self.of_records().for_each(|envelope| envelope.skip(absent));
         let answered = record.is_answered();
+        for _ in 0..feedback.skipped.min(LONGEST_GAP) {
+            let curves = [&mut self.following_error, &mut self.current, &mut self.voltage];
+            curves.into_iter().flatten().for_each(|envelope| envelope.push(None));
+            if self.timed {
+                self.latency.iter_mut().for_each(|envelope| envelope.push(None));
+            }
+        }
         for axis in 0..MAX_AXES {
             let pick = |values: &signals::AxisArray| values.get(axis).copied();
             let curves = [
@@ -143,6 +153,15 @@ impl Trace {
     }
 
     fn interval(&mut self, interval: &Interval) {
+        for _ in 1..interval.end.stamp.elapsed.min(LONGEST_GAP) {
+            let curves = [
+                &mut self.power,
+                &mut self.speed,
+                &mut self.deviation_lit,
+                &mut self.deviation_dark,
+            ];
+            curves.into_iter().for_each(|envelope| envelope.push(None));
+        }
         let laser = &interval.end.laser;
         let power = laser.edges().iter().map(|edge| (edge.gate, edge.power));
         let brightest = std::iter::once((laser.gate, laser.power))

@@ -27,6 +27,7 @@ pub mod room;
 pub mod service;
 pub mod signal;
 pub mod socket;
+pub mod stall;
 pub mod thread;
 pub mod wake;
 

@@ -1,5 +1,5 @@
 //! Requests to end as a flag that loops look at: Ctrl-C, SIGTERM, and SIGHUP, which a closed
-//! terminal sends.
+//! terminal sends. Also when the process was last stopped and continued.
 //!
 //! SIGPIPE stays ignored, as Rust's runtime leaves it: a reader that goes away is an error of the
 //! write.
@@ -11,10 +11,15 @@
 //! not be sound: iceoryx2 0.10 follows pointers that lie in those pages.
 
 use std::io;
-use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicI32, AtomicI64, AtomicU32, Ordering};
+
+use signals::Nanoseconds;
+
+use crate::clock;
 
 static COUNT: AtomicU32 = AtomicU32::new(0);
 static LAST: AtomicI32 = AtomicI32::new(0);
+static CONTINUED: AtomicI64 = AtomicI64::new(i64::MIN);
 
 /// A request to end that came as a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,32 +35,35 @@ extern "C" fn note(signal: libc::c_int) {
     COUNT.fetch_add(1, Ordering::Release);
 }
 
-/// Makes SIGINT, SIGTERM and SIGHUP set the flag instead of ending the process. System calls that
-/// wait come back with `EINTR`, so that loops look at the flag at once. A SIGHUP that is ignored
-/// already, as under `nohup`, stays ignored. SIGBUS ends the process still, but says why.
+extern "C" fn note_continued(_: libc::c_int) {
+    CONTINUED.store(clock::now().0, Ordering::Release);
+}
+
+/// Makes SIGINT, SIGTERM and SIGHUP set the flag instead of ending the process, and notes SIGCONT.
+/// System calls that wait come back with `EINTR`, so that loops look at the flag at once. A SIGHUP
+/// that is ignored already, as under `nohup`, stays ignored. SIGBUS ends the process still, but says
+/// why.
 ///
 /// # Errors
 /// Names the signal whose handler the operating system refused.
 pub fn install() -> io::Result<()> {
-    let handler: extern "C" fn(libc::c_int) = note;
     for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP] {
         let before = exchange(signal, None).map_err(|source| refused(signal, &source))?;
         if signal == libc::SIGHUP && before.sa_sigaction == libc::SIG_IGN {
             continue;
         }
-        // SAFETY: all zeros is a valid sigaction (no flags, empty mask), completed below.
-        #[allow(unsafe_code)]
-        let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
-        action.sa_sigaction = handler as libc::sighandler_t;
-        exchange(signal, Some(&action)).map_err(|source| refused(signal, &source))?;
+        handle(signal, note)?;
     }
-    let handler: extern "C" fn(libc::c_int) = explain;
-    // SAFETY: all zeros is a valid sigaction (empty mask), completed below.
+    handle(libc::SIGCONT, note_continued)?;
+    handle(libc::SIGBUS, explain)
+}
+
+fn handle(signal: libc::c_int, handler: extern "C" fn(libc::c_int)) -> io::Result<()> {
+    // SAFETY: all zeros is a valid sigaction (no flags, empty mask), completed below.
     #[allow(unsafe_code)]
     let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
     action.sa_sigaction = handler as libc::sighandler_t;
-    let set = exchange(libc::SIGBUS, Some(&action));
-    set.map(drop).map_err(|source| refused(libc::SIGBUS, &source))
+    exchange(signal, Some(&action)).map(drop).map_err(|source| refused(signal, &source))
 }
 
 extern "C" fn explain(signal: libc::c_int) {
@@ -88,6 +96,12 @@ fn exchange(signal: libc::c_int, action: Option<&libc::sigaction>) -> io::Result
 
 fn refused(signal: libc::c_int, source: &io::Error) -> io::Error {
     io::Error::new(source.kind(), format!("signal {signal} cannot be handled: {source}"))
+}
+
+/// When the process was last continued after it had been stopped (SIGSTOP, SIGTSTP), if it was.
+pub fn continued() -> Option<Nanoseconds> {
+    let at = CONTINUED.load(Ordering::Acquire);
+    (at != i64::MIN).then_some(Nanoseconds(at))
 }
 
 /// The request to end, if one came.

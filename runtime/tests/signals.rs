@@ -6,6 +6,7 @@
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Command, Output};
 
+use runtime::clock;
 use runtime::peer::Peer;
 use runtime::signal::{self, Termination};
 
@@ -60,6 +61,16 @@ fn signalled_process() {
             loop {
                 std::thread::yield_now();
             }
+        }
+        "continues" => {
+            signal::install().unwrap();
+            assert_eq!(signal::continued(), None);
+            let before = clock::now();
+            own.signal(libc::SIGCONT).unwrap();
+            while signal::continued().is_none() {
+                std::thread::yield_now();
+            }
+            assert!(signal::continued().is_some_and(|at| before <= at && at <= clock::now()));
         }
         other => panic!("{other}"),
     }

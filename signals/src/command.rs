@@ -2,10 +2,6 @@
 
 use crate::{AxisArray, Cycle, Fault, LaserCycle, Nanoseconds, sample};
 
-/// Cycles in a row without a fresh command after which drives stops the axes alone. What the
-/// controller finds missing between two feedbacks, it makes up for up to as many.
-pub const MOST_MISSES: u64 = 3;
-
 /// Which of a command's targets drives shall follow. Discriminants are the values in samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u32)]

@@ -8,7 +8,8 @@ pub mod status {
     pub const POWERED: u32 = 1;
     /// `tool` holds the tool position (simulated plant, or a bridge with a tool sensor).
     pub const TOOL_KNOWN: u32 = 1 << 1;
-    /// No fresh command in the cycle that ended: the gate was closed by the watchdog.
+    /// No fresh command in the cycle that begins, or in one skipped before it: the watchdog keeps
+    /// the gate closed.
     pub const COMMAND_MISSED: u32 = 1 << 2;
     /// Drives stops or has stopped the axes by itself.
     pub const STOPPED_ALONE: u32 = 1 << 3;
@@ -20,11 +21,14 @@ pub mod status {
 
 sample! {
     /// One measurement, taken at the deadline of `cycle`.
-    Feedback = "graver.Feedback.v1" {
+    Feedback = "graver.Feedback.v2" {
         /// Identifies this run of drives: its start on the monotonic clock [ns].
         epoch: u64,
         /// The cycle that starts with this measurement.
         cycle: Cycle,
+        /// Cycles left out between the feedback before and this one: drives was too late for their
+        /// deadlines. Nobody measured in them, and the gate was closed.
+        skipped: u64,
         /// The absolute deadline of the cycle.
         deadline: Nanoseconds,
         /// When the measurement was taken.
@@ -43,7 +47,8 @@ sample! {
         command_applied: Nanoseconds,
         /// Cycles so far in which no fresh command arrived in time.
         missed: u64,
-        /// Cycles so far whose work did not end before the next deadline, slips included.
+        /// Cycles so far whose work did not end before the next deadline, slips and skipped cycles
+        /// included.
         overruns: u64,
         /// Bits of [`status`].
         status: u32,
@@ -53,13 +58,14 @@ sample! {
         counts: [i64; MAX_AXES],
         /// Motor position from the encoder [rad].
         position: AxisArray,
-        /// Motor velocity over the last cycle [rad/s].
+        /// Motor velocity since the feedback before, on average [rad/s].
         velocity: AxisArray,
         /// Motor current [A].
         current: AxisArray,
         /// Tool centre point in the machine frame, if `status` says it is known [m].
         tool: [f64; 3],
-        /// What the laser really did in the cycle that ended with this measurement.
+        /// What the laser really did since the feedback before: in its cycle, and in those skipped
+        /// after it, in which a source goes out. Offsets count from that feedback's deadline.
         laser: LaserCycle,
         /// The fault of the drives, if any.
         fault: Fault,
@@ -67,6 +73,11 @@ sample! {
 }
 
 impl Feedback {
+    /// Cycles since the feedback before.
+    pub fn elapsed(&self) -> u64 {
+        self.skipped.saturating_add(1)
+    }
+
     /// Whether all the status bits in `bits` are set.
     pub fn has(&self, bits: u32) -> bool {
         self.status & bits == bits

@@ -8,7 +8,8 @@ pub const MAX_EDGES: usize = 16;
 sample! {
     /// One change of the laser inside a cycle.
     GateEdge = "graver.GateEdge.v1" {
-        /// Time from the start of the cycle [ns], below the period.
+        /// Time from the start of the cycle [ns]; below the period in a command, and in a feedback
+        /// that skipped no cycle.
         offset: u32,
         /// The gate from here on: 0 closed, otherwise open and marking the stroke with this number.
         gate: u32,

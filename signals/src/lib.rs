@@ -26,6 +26,7 @@ pub mod report;
 pub mod run_folder;
 pub mod sample;
 pub mod setpoint;
+pub mod stall;
 pub mod state;
 pub mod time;
 
@@ -40,5 +41,6 @@ pub use progress::Progress;
 pub use report::{ControllerReport, DrivesReport, RealtimeFacts};
 pub use sample::Sample;
 pub use setpoint::Setpoint;
+pub use stall::{StallCause, Stalls};
 pub use state::ControllerState;
 pub use time::{Cycle, Nanoseconds};

@@ -1,6 +1,6 @@
 //! Final reports: what each stage alone can know, sent when a stream ends and every second.
 
-use crate::{AxisArray, Cycle, Fault, sample};
+use crate::{AxisArray, Cycle, Fault, Stalls, sample};
 
 /// Bits of [`RealtimeFacts::refused`].
 pub mod refused {
@@ -94,10 +94,10 @@ sample! {
 
 sample! {
     /// What drives counted since it started.
-    DrivesReport = "graver.DrivesReport.v1" {
+    DrivesReport = "graver.DrivesReport.v2" {
         /// The newest cycle.
         cycle: Cycle,
-        /// Cycles whose work did not end before the next deadline, slips included.
+        /// Cycles whose work did not end before the next deadline, slips and skipped cycles included.
         overruns: u64,
         /// Overruns that were waited for because the drives are simulated.
         slips: u64,
@@ -113,6 +113,8 @@ sample! {
         lit: u32,
         /// The fault of the drives, if any.
         fault: Fault,
+        /// Times in which the cycle stood still, since the newest stream began.
+        stalls: Stalls,
         /// Real-time set-up of the drives' thread.
         realtime: RealtimeFacts,
     }

@@ -186,6 +186,7 @@ mod tests {
             crate::ControllerReport::LAYOUT,
             crate::DrivesReport::LAYOUT,
             crate::RealtimeFacts::LAYOUT,
+            crate::Stalls::LAYOUT,
             crate::OperatorRequest::LAYOUT,
             crate::OperatorReply::LAYOUT,
         ];

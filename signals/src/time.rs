@@ -22,7 +22,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 pub struct Nanoseconds(pub i64);
 
 /// The number of a control cycle since drives started; the deadline of cycle `n` is
-/// `start + n × period`.
+/// `start + n × period`, and later where the clock may slip.
 #[derive(
     Debug,
     Clone,
@@ -54,6 +54,16 @@ impl Nanoseconds {
     /// This duration in seconds.
     pub fn seconds(self) -> f64 {
         self.0 as f64 / NANOSECONDS_PER_SECOND
+    }
+
+    /// The whole cycles in this duration; 0 for a negative one.
+    pub fn cycles(self) -> u64 {
+        (self.0 / CYCLE_PERIOD.0).max(0).unsigned_abs()
+    }
+
+    /// The duration of this many cycles.
+    pub fn of_cycles(cycles: u64) -> Self {
+        Self(i64::try_from(cycles).unwrap_or(i64::MAX).saturating_mul(CYCLE_PERIOD.0))
     }
 
     /// `seconds` [s] rounded to the nearest nanosecond.

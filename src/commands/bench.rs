@@ -195,7 +195,7 @@ fn measure(
         command_batch.clear();
         while let Some(feedback) = feedbacks.receive().map_err(Failure::service)? {
             if let Some(previous) = previous
-                && feedback.cycle == previous.cycle.next()
+                && feedback.cycle.0 == previous.cycle.0 + feedback.elapsed()
             {
                 measured.periods.push((feedback.measured - previous.measured).0);
             }

@@ -27,10 +27,12 @@ pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
         }
         Role::Drives => {
             let Driven::Simulated = configuration.drives;
+            let machine = configuration.source.machine()?;
             let port = SimulatedPlant::new(&configuration.source.plant()?, PlantOptions::default())
                 .map_err(Failure::bad_input)?;
             let options = drives::service::ServiceOptions {
                 deadlines: configuration.deadlines(),
+                stall: machine.stall,
                 realtime: configuration.realtime_options(DRIVES_PRIORITY),
             };
             drives::service::run(&domain, port, &options)

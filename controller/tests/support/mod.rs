@@ -4,13 +4,13 @@
 #![allow(dead_code, unreachable_pub, missing_docs, clippy::unwrap_used)]
 
 use controller::{Controller, Inputs, Outputs, Peers};
-use machine::{Axis, Machine};
+use machine::{Axis, Machine, StallTolerance};
 use signals::feedback::status;
 use signals::setpoint::flags;
 use signals::time::CYCLE_PERIOD;
 use signals::{
     Command, CommandMode, ControllerReport, ControllerState, Feedback, GateEdge, LaserCycle,
-    OperatorReply, OperatorRequest, OperatorVerb, Setpoint,
+    Nanoseconds, OperatorReply, OperatorRequest, OperatorVerb, Setpoint,
 };
 
 /// Steps in which the motor is integrated [s]; its half is the largest shift in time, 0.25 µm at
@@ -222,6 +222,11 @@ pub fn two_marks(machine: &Machine, speed: f64, power: f64) -> Job {
     job(machine, 1, &parts, power)
 }
 
+/// The built-in machine, bearing stalls of `tolerance`.
+pub fn stalling(tolerance: Nanoseconds) -> Machine {
+    Machine { stall: StallTolerance::new(tolerance).unwrap(), ..Machine::builtin() }
+}
+
 /// Joints of a CoreXY at home.
 pub fn home(machine: &Machine) -> [f64; 2] {
     let [x, y, _] = machine.home;
@@ -257,6 +262,7 @@ pub struct Bench {
     /// Commands that will come too late for their cycle.
     pub late: u32,
     latched: Command,
+    in_force: Command,
     ticket: u32,
 }
 
@@ -281,6 +287,7 @@ impl Bench {
             supply: usize::MAX,
             late: 0,
             latched: Command::default(),
+            in_force: Command::default(),
             ticket: 0,
         }
     }
@@ -309,6 +316,7 @@ impl Bench {
         feedback.cycle = feedback.cycle.next();
         feedback.deadline = feedback.deadline + CYCLE_PERIOD;
         feedback.measured = feedback.deadline;
+        let elapsed = feedback.elapsed() as f64 * CYCLE_TIME;
         feedback.status =
             if self.latched.mode() == CommandMode::Disabled { 0 } else { status::POWERED };
         for (index, motor) in self.motors.iter_mut().enumerate() {
@@ -316,7 +324,7 @@ impl Bench {
             let resolution = motor.axis.encoder.resolution();
             feedback.counts[index] = counts;
             feedback.position[index] = counts as f64 * resolution;
-            feedback.velocity[index] = (counts - motor.counts) as f64 * resolution / CYCLE_TIME;
+            feedback.velocity[index] = (counts - motor.counts) as f64 * resolution / elapsed;
             feedback.current[index] = motor.current;
             motor.counts = counts;
         }
@@ -338,6 +346,7 @@ impl Bench {
         };
         let mut outputs = Outputs::default();
         self.controller.step(now, &inputs, &mut outputs);
+        self.feedback.skipped = 0;
         self.reports.extend(outputs.report);
         let joints: Vec<f64> =
             self.motors.iter().map(|motor| motor.angle * motor.axis.ratio).collect();
@@ -371,6 +380,25 @@ impl Bench {
         }
     }
 
+    /// Cycles that drives skips: the newest command comes to nothing, in them and in the cycle after,
+    /// and nobody measures. The records keep what the controller had promised.
+    pub fn stall(&mut self, cycles: u64) {
+        self.latched = self.in_force;
+        self.records.last_mut().unwrap().command.laser = LaserCycle::OFF;
+        self.miss();
+        for _ in 0..cycles {
+            self.feedback.cycle = self.feedback.cycle.next();
+            self.feedback.deadline = self.feedback.deadline + CYCLE_PERIOD;
+            self.feedback.skipped += 1;
+            self.feedback.overruns += 1;
+            self.run_motors();
+            self.miss();
+            let mut record = *self.last();
+            record.command.stream_time += CYCLE_TIME * record.command.rate;
+            self.records.push(record);
+        }
+    }
+
     /// As drives do: the axes go on with what they have, in the dark.
     fn miss(&mut self) {
         self.feedback.missed += 1;
@@ -378,6 +406,7 @@ impl Bench {
     }
 
     fn run_motors(&mut self) {
+        self.in_force = self.latched;
         for (index, motor) in self.motors.iter_mut().enumerate() {
             let voltage = match self.latched.mode() {
                 CommandMode::Disabled => None,

@@ -8,15 +8,18 @@ use super::doubts;
 use super::mechanism::{self, Built};
 use super::motors;
 use super::relations;
-use super::tables::{AreaTable, AxisTable, LaserTable, MachineTable, OriginsTable, PathTable};
+use super::tables::{
+    AreaTable, AxisTable, LaserTable, MachineTable, OriginsTable, PathTable, RealtimeTable,
+};
 use crate::actuator::Axis;
 use crate::document::{
     Document, DocumentError, Findings, Located, Named, Place, Point, ProblemKind, nearest,
 };
-use crate::limits::{PathLimits, WorkArea};
+use crate::limits::{PathLimits, StallTolerance, WorkArea};
 use crate::machine::Machine;
 use crate::mechanisms::MechanismKind;
 use crate::process::{GcodeSettings, LaserSource, ZMeaning};
+use signals::Nanoseconds;
 
 pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let (table, mut findings) = document.decode_within::<MachineTable>(BOUNDS)?;
@@ -37,6 +40,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     refuse_rigid_backlash(&mechanism, &table.axis, &mut findings);
     check_z(&table, &mechanism, &mut findings);
     let laser = laser(&table.laser, &mut findings);
+    let stall = stall(&table.realtime, &mut findings);
     let PathTable { speed, rapid, acceleration, jerk, tolerance, place: _ } = &table.path;
     let gcode = &table.gcode;
     let machine = Machine {
@@ -53,6 +57,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
             jerk: jerk.value,
             tolerance: tolerance.value,
         },
+        stall,
         laser,
         gcode: GcodeSettings {
             full_scale: gcode.full_scale.value,
@@ -154,6 +159,22 @@ fn laser(table: &LaserTable, findings: &mut Findings) -> LaserSource {
         }
     }
     LaserSource { on_delay: table.on_delay.value, off_delay: table.off_delay.value }
+}
+
+/// Refuses a tolerance shorter than a cycle, or longer than any axis could bear.
+fn stall(table: &RealtimeTable, findings: &mut Findings) -> StallTolerance {
+    let time = Nanoseconds::from_seconds(table.stall.value);
+    StallTolerance::new(time).unwrap_or_else(|| {
+        let [shortest, longest] = [StallTolerance::SHORTEST, StallTolerance::LONGEST]
+            .map(|bound| bound.time().seconds() * 1e3);
+        findings.refuse(
+            ProblemKind::OutOfRange,
+            table.stall.place,
+            format!("a `stall` of {} s cannot be tolerated", table.stall.value),
+            Some(format!("write a time from {shortest} ms, one cycle, to {longest} ms")),
+        );
+        StallTolerance::SHORTEST
+    })
 }
 
 /// The area as a box; z is from 0 to 0 where it has no range.

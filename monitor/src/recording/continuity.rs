@@ -18,12 +18,14 @@ pub struct Stamp {
     epoch: u64,
     /// Its cycle.
     pub cycle: u64,
+    /// Cycles since the feedback before: 1, unless drives skipped some, which nobody could record.
+    pub elapsed: u64,
 }
 
 impl Stamp {
     /// Of a feedback.
     pub fn of(feedback: &Feedback) -> Self {
-        Self { epoch: feedback.epoch, cycle: feedback.cycle.0 }
+        Self { epoch: feedback.epoch, cycle: feedback.cycle.0, elapsed: feedback.elapsed().max(1) }
     }
 
     /// Whether `other`, of the same run of drives, is this cycle or one before it.
@@ -48,10 +50,10 @@ impl Succession {
     pub fn between(before: Stamp, after: Stamp) -> Self {
         if before.epoch != after.epoch || after.cycle <= before.cycle {
             Self::Apart
-        } else if after.cycle == before.cycle + 1 {
+        } else if after.cycle <= before.cycle.saturating_add(after.elapsed) {
             Self::Next
         } else {
-            Self::After(Gap { first: before.cycle + 1, last: after.cycle - 1 })
+            Self::After(Gap { first: before.cycle + 1, last: after.cycle - after.elapsed })
         }
     }
 }
@@ -152,6 +154,9 @@ mod tests {
             (stamp(1, 4), stamp(1, 2), Apart),
             (stamp(1, 4), stamp(2, 5), Apart),
             (stamp(1, u64::MAX - 1), stamp(1, u64::MAX), Next),
+            // Drives skipped three cycles before 8, which it says.
+            (stamp(1, 4), Stamp { elapsed: 4, ..stamp(1, 8) }, Next),
+            (stamp(1, 3), Stamp { elapsed: 4, ..stamp(1, 8) }, After(Gap { first: 4, last: 4 })),
         ] {
             assert_eq!(Succession::between(before, after), expect, "{before:?} {after:?}");
         }

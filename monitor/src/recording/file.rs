@@ -344,7 +344,7 @@ mod tests {
         assert!(matches!(RecordingReader::new(&bytes[..5]), Err(RecordingError::NotARecording)));
         bytes[24] ^= 1; // the feedback's layout hash
         let error = RecordingReader::new(&bytes[..]).unwrap_err();
-        assert!(error.to_string().contains("graver.Feedback.v1"), "{error}");
+        assert!(error.to_string().contains(Feedback::NAME), "{error}");
         bytes[0] = b'X';
         assert!(matches!(RecordingReader::new(&bytes[..]), Err(RecordingError::NotARecording)));
     }

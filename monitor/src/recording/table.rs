@@ -10,7 +10,7 @@ use std::io::{self, Write};
 /// Writes one line a record under a line of column names.
 ///
 /// `cycle` counts from the start of drives; `stream_time` [s], `rate` and `stroke` are the
-/// command's. `lit` is the share of the cycle before in which the laser marked, 0..=1; `tool_x`,
+/// command's. `lit` is the share of the time since the record before in which the laser marked, 0..=1; `tool_x`,
 /// `tool_y`, `tool_z` and `planned_…` are places in the machine frame [m]. Then per axis reference
 /// and position at the motor [rad], current measured [A] and voltage commanded, in volts.
 ///
@@ -49,7 +49,7 @@ impl<W: Write> TableWriter<W> {
         self.field(answered, command.stream_time)?;
         self.field(answered, command.rate)?;
         self.field(answered, command.stroke)?;
-        self.field(true, lit_share(&feedback.laser))?;
+        self.field(true, lit_share(&feedback.laser, feedback.elapsed()))?;
         for value in feedback.tool {
             self.field(feedback.has(status::TOOL_KNOWN), value)?;
         }

@@ -1,9 +1,11 @@
 //! A fault in words: what was found, with its quantity and unit, and the limit that it broke.
 
+use super::StallSummary;
 use machine::{Axis, JointUnit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use signals::fault::FaultUnit;
+use signals::time::CYCLE_TIME;
 use signals::{Fault, FaultCode, FaultQuantity};
 
 /// A fault as summaries tell it.
@@ -27,6 +29,14 @@ impl FaultSummary {
             detail: detail(fault, axis.map(|axis| axis.unit)),
         })
     }
+
+    /// Adds the longest stall and its causes to a fault that says that something came too late.
+    pub fn blame(&mut self, stalls: &StallSummary) {
+        let late = [FaultCode::StaleCommand, FaultCode::StaleFeedback, FaultCode::Overrun];
+        if stalls.count > 0 && late.iter().any(|code| code.name() == self.code) {
+            self.detail += &format!("; the longest stall was {}", stalls.longest_text());
+        }
+    }
 }
 
 impl std::fmt::Display for FaultSummary {
@@ -49,9 +59,13 @@ fn detail(fault: &Fault, joint: Option<JointUnit>) -> String {
         }
         _ => {
             let (name, unit) = quantity.name();
-            let found = format!("{name} {}", amount(fault.value, unit, joint));
+            let amount = |value: f64| match quantity {
+                FaultQuantity::Cycles | FaultQuantity::Overruns => in_time(value),
+                _ => amount(value, unit, joint),
+            };
+            let found = format!("{name} {}", amount(fault.value));
             match fault.limit() {
-                Some(limit) => format!("{found}, limit {}", amount(limit, unit, joint)),
+                Some(limit) => format!("{found}, limit {}", amount(limit)),
                 None => found,
             }
         }
@@ -69,6 +83,11 @@ fn without_value(code: FaultCode) -> &'static str {
         FaultCode::DriveFault => "the drives or the motors refuse",
         _ => "no value was reported",
     }
+}
+
+/// A number of cycles, and the time that they take.
+fn in_time(cycles: f64) -> String {
+    format!("{cycles} ({} ms)", cycles * (CYCLE_TIME * 1e3))
 }
 
 /// A value in the unit that people read it in: millimetres for places along a line.
@@ -126,7 +145,10 @@ mod tests {
             "setpoint 12 came where setpoint 10 was due",
         );
         let overrun = Fault::new(FaultCode::Overrun);
-        check(overrun.beyond(Quantity::Overruns, 4.0, 3.0), "overruns in a row 4, limit 3");
+        check(
+            overrun.beyond(Quantity::Overruns, 4.0, 3.0),
+            "late cycles in a row 4 (4 ms), limit 3 (3 ms)",
+        );
     }
 
     #[test]
@@ -143,10 +165,29 @@ mod tests {
         check(Fault::new(FaultCode::DriveFault), "the drives or the motors refuse");
         check(stale(0.0), "feedback did not go on");
         check(stale(1.0), "feedback came of another run of drives");
-        check(stale(4.0), "cycles gone by 4, limit 3");
+        check(stale(4.0), "cycles gone by 4 (4 ms), limit 3 (3 ms)");
         let number = Fault::new(FaultCode::NotFinite).on(0).with(Quantity::Number, f64::NAN);
         check(number, "number in a sample NaN");
         assert_eq!(FaultSummary::of(&Fault::default(), &axes()), None);
+    }
+
+    #[test]
+    fn a_fault_of_lateness_names_the_longest_stall() {
+        let causes = vec!["steal".to_owned()];
+        let stalls =
+            StallSummary { count: 1, longest: 31e-3, longest_causes: causes, ..Default::default() };
+        let told = |fault: Fault, stalls: &StallSummary| {
+            let mut summary = FaultSummary::of(&fault, &axes()).unwrap();
+            summary.blame(stalls);
+            summary.detail
+        };
+        let stale = Fault::new(FaultCode::StaleCommand).beyond(Quantity::Cycles, 31.0, 10.0);
+        let found = "cycles gone by 31 (31 ms), limit 10 (10 ms)";
+        assert_eq!(told(stale, &StallSummary::default()), found);
+        let why = "the longest stall was 31.0 ms: the hypervisor took the CPU (steal time)";
+        assert_eq!(told(stale, &stalls), format!("{found}; {why}"));
+        let lost = Fault::new(FaultCode::PlannerLost);
+        assert_eq!(told(lost, &stalls), "the planner process died or left");
     }
 
     #[test]

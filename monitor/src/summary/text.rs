@@ -133,6 +133,14 @@ impl Rows {
 
     fn cycles(&mut self, summary: &Summary) {
         self.add("cycles", format!("{}, {} overruns", summary.cycles, summary.overruns));
+        let stalls = &summary.stalls;
+        if stalls.count > 0 {
+            let total = stalls.total * 1e3;
+            let at = stalls.longest_at.unwrap_or_default();
+            let longest = stalls.longest_text();
+            let count = stalls.count;
+            self.add("stalls", format!("{count}, {total:.1} ms in all; at {at:.3} s {longest}"));
+        }
         if let Some(recording) = summary.recording.filter(|recording| recording.gaps > 0) {
             let RecordingSummary { cycles, gaps, missing, longest } = recording;
             let stretches = if gaps == 1 { "1 gap".to_owned() } else { format!("{gaps} gaps") };
@@ -204,6 +212,20 @@ mod tests {
         assert!(text.starts_with("outcome           stopped\n"), "{text}");
         assert!(text.contains("job               letters NASO, 5 strokes, 234.500 mm\n"), "{text}");
         assert!(text.ends_with("warning           no SCHED_FIFO\n"), "{text}");
+    }
+
+    #[test]
+    fn stalls_have_a_line_when_there_are_any() {
+        let job = JobSummary::default();
+        let mut summary = Summary::new(Outcome::Completed, job, MachineSummary::default());
+        assert!(!summary.text().contains("stalls"));
+        summary.stalls.count = 2;
+        (summary.stalls.total, summary.stalls.longest) = (9e-3, 8e-3);
+        (summary.stalls.longest_at, summary.stalls.longest_causes) =
+            (Some(1.25), vec!["steal".into()]);
+        let line =
+            "stalls            2, 9.0 ms in all; at 1.250 s 8.0 ms: the hypervisor took the CPU";
+        assert!(summary.text().contains(line), "{}", summary.text());
     }
 
     #[test]

@@ -37,7 +37,7 @@ pub enum FaultQuantity {
     Number = 14,
     /// Cycles.
     Cycles = 15,
-    /// Overruns in a row.
+    /// Cycles in a row in which drives was late.
     Overruns = 16,
     /// Times in a row that light was lost about one place.
     Losses = 17,
@@ -120,7 +120,7 @@ impl FaultQuantity {
             Self::PulseRate => ("pulse rate", Plain("1/s")),
             Self::Number => ("number in a sample", Plain("")),
             Self::Cycles => ("cycles gone by", Plain("")),
-            Self::Overruns => ("overruns in a row", Plain("")),
+            Self::Overruns => ("late cycles in a row", Plain("")),
             Self::Losses => ("times that light was lost in one place", Plain("")),
             Self::Edges => ("gate edges in a cycle", Plain("")),
             Self::Setpoint => ("number of the setpoint", Plain("")),

@@ -1,0 +1,149 @@
+//! From where a stall left the axes back to the plan, without a step.
+//!
+//! An axis that hears nothing goes on at about the speed that it had, a stepper by its pulses, a motor
+//! by its voltage and back-EMF; the plan goes on as planned. What lies between the two, in position and
+//! in speed, is faded out of the positions that steppers are told. Where the loops are closed here it
+//! is a following error, and the loops take it back. Either takes time, which light has to wait for.
+
+use crate::feedforward::Planned;
+use machine::{Machine, Motor};
+use signals::math;
+use signals::time::CYCLE_TIME;
+use signals::{AxisArray, MAX_AXES};
+
+/// Cycles to fade over. An axis that kept its speed for 10 ms, while the plan accelerated at 10 m/s²,
+/// takes as much acceleration again to come back; over half of this it would take twice that.
+const CYCLES: u32 = 48;
+
+/// Share of the largest following error within which an axis counts as on the plan: 5 µm of 1 mm.
+const ON_PLAN: f64 = 0.005;
+
+/// How many times [`ON_PLAN`] an axis may be off before the velocity loop's integral is wound up by it,
+/// which takes longer to unwind: its tail is waited for with [`WOUND_UP`].
+const LARGE: f64 = 8.0;
+
+/// How many times closer than [`ON_PLAN`] the position loop alone would be by then.
+const WOUND_UP: f64 = 5.0;
+
+/// Time for which a wrong speed lasts until the loops have it back [s]: about two cycles.
+const SPEED_LOSS: f64 = 2.0 * CYCLE_TIME;
+
+/// What is left of the distance.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CatchUp {
+    /// Distance at the start of the fading [rad].
+    offset: AxisArray,
+    /// How fast it grew there [rad/s].
+    slope: AxisArray,
+    left: u32,
+}
+
+impl CatchUp {
+    /// From `coasted`, where the axes are at an instant, to `planned`, where the plan has them.
+    pub fn new(coasted: &Planned, planned: &Planned) -> Self {
+        let difference = |from: &AxisArray, to: &AxisArray| -> AxisArray {
+            core::array::from_fn(|index| from[index] - to[index])
+        };
+        let offset = difference(&coasted.angle, &planned.angle);
+        let slope = difference(&coasted.speed, &planned.speed);
+        let aligned = offset.iter().chain(&slope).all(|value| *value == 0.0);
+        Self { offset, slope, left: if aligned { 0 } else { CYCLES } }
+    }
+
+    /// Cycles until the axes of `machine` are back on the plan but for [`ON_PLAN`]; 0 where they are.
+    pub fn settling(&self, machine: &Machine) -> u64 {
+        let axes = machine.axes.iter().zip(self.offset.iter().zip(&self.slope)).take(MAX_AXES);
+        let settling = axes.map(|(axis, (offset, slope))| {
+            let off = (offset.abs() + slope.abs() * SPEED_LOSS) * axis.ratio.abs();
+            let left = off / (ON_PLAN * axis.limits.following_error);
+            match axis.motor {
+                _ if left <= 1.0 => 0.0,
+                Motor::Stepper(_) => f64::from(CYCLES),
+                // The position loop leaves e^(−ω·t) of it.
+                Motor::Dc(_) => {
+                    let left = if left > LARGE { left * WOUND_UP } else { left };
+                    (math::ln(left) / (axis.gains.position * CYCLE_TIME)).ceil()
+                }
+            }
+        });
+        settling.fold(0.0, f64::max) as u64
+    }
+
+    /// Goes on by one cycle, and adds what is left to `planned`.
+    pub fn apply(&mut self, planned: &mut Planned) {
+        if self.left == 0 {
+            return;
+        }
+        self.left -= 1;
+        let duration = f64::from(CYCLES) * CYCLE_TIME;
+        let at = 1.0 - f64::from(self.left) / f64::from(CYCLES);
+        let (square, cube) = (at * at, at * at * at);
+        // The quintics that begin with a position, and with a speed, without acceleration, and end at
+        // rest in 0; and their slopes.
+        let position = 1.0 + cube * (at * (15.0 - 6.0 * at) - 10.0);
+        let position_slope = -30.0 * square * (1.0 - at) * (1.0 - at);
+        let speed = at + cube * (at * (8.0 - 3.0 * at) - 6.0);
+        let speed_slope = 1.0 + square * (at * (32.0 - 15.0 * at) - 18.0);
+        let planned = planned.angle.iter_mut().zip(&mut planned.speed);
+        for ((angle, rate), (offset, slope)) in planned.zip(self.offset.iter().zip(&self.slope)) {
+            *angle += offset * position + slope * duration * speed;
+            *rate += offset / duration * position_slope + slope * speed_slope;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn it_begins_with_position_and_speed_and_ends_on_the_plan_without_a_step() {
+        let mut coasted = Planned::default();
+        (coasted.angle[0], coasted.speed[0], coasted.angle[1]) = (0.3, -8.0, 0.02);
+        let mut fading = CatchUp::new(&coasted, &Planned::default());
+        let (mut before, mut speed_before) = (coasted.angle, coasted.speed);
+        for _ in 0..CYCLES {
+            let mut planned = Planned::default();
+            fading.apply(&mut planned);
+            for axis in 0..2 {
+                // The speed is the derivative of the angle: the trapezoid differs by jerk·T³/12.
+                let moved = planned.angle[axis] - before[axis];
+                let mean = (planned.speed[axis] + speed_before[axis]) / 2.0;
+                assert!((moved - mean * CYCLE_TIME).abs() < 1e-4, "{moved} {mean}");
+                let step = planned.speed[axis] - speed_before[axis];
+                assert!(step.abs() < 1.5, "{step}");
+            }
+            (before, speed_before) = (planned.angle, planned.speed);
+        }
+        assert!(before.iter().chain(&speed_before).all(|rest| rest.abs() < 1e-12));
+        let mut planned = Planned::default();
+        fading.apply(&mut planned);
+        assert_eq!(planned, Planned::default());
+    }
+
+    #[test]
+    fn light_waits_for_as_long_as_the_axes_are_off_the_plan() {
+        let mut machine = Machine::builtin();
+        let axis = &machine.axes[1];
+        let (ratio, bandwidth) = (axis.ratio, axis.gains.position);
+        let on_plan = 5e-6 / ratio;
+        let planned = Planned { angle: [3.0; MAX_AXES], ..Planned::default() };
+        let settling = |machine: &Machine, offset: f64, slope: f64| {
+            let mut coasted = planned;
+            coasted.angle[1] += offset;
+            coasted.speed[1] -= slope;
+            CatchUp::new(&coasted, &planned).settling(machine)
+        };
+        assert_eq!(settling(&machine, 0.0, 0.0), 0);
+        assert_eq!(settling(&machine, -0.99 * on_plan, 0.0), 0);
+        let cycles = |times: f64| (math::ln(times) / bandwidth / CYCLE_TIME).ceil() as u64;
+        assert_eq!(settling(&machine, -6.0 * on_plan, 0.0), cycles(6.0));
+        assert_eq!(settling(&machine, 0.0, 6.0 * on_plan / SPEED_LOSS), cycles(6.0));
+        assert_eq!(settling(&machine, -20.0 * on_plan, 0.0), cycles(20.0 * WOUND_UP));
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../machines");
+        machine = Machine::load(&folder.join("cartesian_steppers.toml"), &[]).unwrap();
+        let turned = 6e-6 / machine.axes[1].ratio;
+        assert_eq!(settling(&machine, turned, 0.0), u64::from(CYCLES));
+    }
+}

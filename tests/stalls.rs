@@ -1,0 +1,218 @@
+//! Stalls of drives through the whole chain, in virtual time: planner, controller, bridge, plant and
+//! the judgement of the marks. What is tolerated costs no mark and lights none where nothing was
+//! commanded, on motors and on steppers; what is longer stops the machine.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use controller::{Controller, Inputs, Outputs, Peers};
+use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
+use machine::Machine;
+use monitor::marks::{Judge, Marks};
+use monitor::recording::{CycleRecord, Recorder};
+use monitor::trace::lit_share;
+use planner::job::Job;
+use planner::{Plan, plan};
+use signals::feedback::status;
+use signals::random::SplitMix64;
+use signals::time::CYCLE_PERIOD;
+use signals::{
+    ControllerReport, ControllerState, FaultCode, Nanoseconds, OperatorRequest, OperatorVerb,
+    RealtimeFacts, Setpoint,
+};
+
+/// The cycle in which the job starts.
+const START: u64 = 100;
+
+/// What a run came to.
+struct Played {
+    marks: Marks,
+    report: ControllerReport,
+    /// Stalls that drives counted.
+    stalls: u64,
+    /// Cycles that it skipped.
+    skipped: u64,
+    state: ControllerState,
+}
+
+fn planned(machine: &Machine) -> Plan {
+    plan(machine, &Job::builtin(&[], machine).unwrap()).unwrap()
+}
+
+/// Plays the sample job; `stall` says after each cycle, by its number, how many are skipped.
+fn play(machine: &Machine, plan: &Plan, mut stall: impl FnMut(u64) -> u64) -> Played {
+    let mut setpoints = plan.setpoints(1);
+    let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
+    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
+    let mut bridge = Bridge::new(port, options);
+    let mut controller = Controller::new(machine);
+    let mut outputs = Outputs::default();
+    let (mut judge, mut recorder) = (Judge::new(&plan.artwork), Recorder::new());
+    let (mut skipped, mut deadline) = (0, Nanoseconds(0));
+    let mut report = ControllerReport::default();
+    let mut left = u64::MAX;
+    for step in 1..60_000_u64 {
+        deadline = deadline + CYCLE_PERIOD;
+        bridge.begin(deadline, deadline);
+        let feedback = *bridge.feedback();
+        skipped += feedback.skipped;
+        assert_no_light_uncommanded(&feedback);
+        let verb = match step {
+            2 => Some((OperatorVerb::Enable, 0.0)),
+            START => Some((OperatorVerb::Start, 1.0)),
+            _ => None,
+        };
+        let request =
+            verb.map(|(verb, value)| OperatorRequest { verb: verb as u32, ticket: 1, value });
+        let room = if step > START { controller.room().min(16) } else { 0 };
+        let batch: Vec<Setpoint> = setpoints.by_ref().take(room).collect();
+        let peers = Peers::default();
+        let inputs =
+            Inputs { feedback: &feedback, received: deadline, setpoints: &batch, request, peers };
+        controller.step(deadline, &inputs, &mut outputs);
+        bridge.latch(&outputs.command, deadline);
+        bridge.finish(deadline);
+        recorder.feedback(&feedback);
+        recorder.command(&outputs.command);
+        judge.push(&CycleRecord { feedback, command: outputs.command });
+        if let Some(ended) = outputs.report.filter(|report| report.is_final == 1) {
+            (report, left) = (ended, 4);
+        }
+        left -= 1;
+        if left == 0 {
+            recorder.finish();
+            assert_eq!(recorder.lost(), 0, "what drives skipped is no loss");
+            let stalls = bridge.report(RealtimeFacts::default()).stalls;
+            let state = outputs.command.state();
+            let marks = judge.finish().unwrap();
+            return Played { marks, report, stalls: stalls.count, skipped, state };
+        }
+        deadline = deadline + Nanoseconds::of_cycles(stall(step));
+    }
+    panic!("the job does not end");
+}
+
+/// Asserts that skipped cycles were dark; only the one before them may have been lit.
+fn assert_no_light_uncommanded(feedback: &signals::Feedback) {
+    let lit = lit_share(&feedback.laser, feedback.elapsed()) * feedback.elapsed() as f64;
+    assert!(lit <= 1.0 + 1e-9, "{lit} cycles lit, {} skipped", feedback.skipped);
+    let edges = feedback.laser.edges().iter();
+    let beyond = |edge: &&signals::GateEdge| i64::from(edge.offset) >= CYCLE_PERIOD.0;
+    assert!(edges.filter(beyond).all(|edge| edge.gate == 0), "{:?}", feedback.laser);
+}
+
+fn load(name: &str) -> Machine {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("machines");
+    Machine::load(&folder.join(name), &[]).unwrap()
+}
+
+/// Asserts that a run with stalls marked everything once, about as well as one without.
+fn assert_whole(played: &Played, plain: &Played, case: &str) {
+    let report = &played.report;
+    assert_eq!(
+        (report.completed, report.fault.is_some()),
+        (1, false),
+        "{case}: {:?}",
+        report.fault
+    );
+    assert_eq!(played.state, ControllerState::Idle, "{case}");
+    let (marks, plain) = (&played.marks, &plain.marks);
+    assert_eq!((marks.strokes_lost, marks.stray), (0, 0.0), "{case}");
+    // Where the light was taken up again is an end of its own, as accurate as after a hold.
+    assert!(marks.error_max < plain.error_max + 12e-6, "{case}: {:e} m off", marks.error_max);
+    assert!(marks.missing < plain.missing + 60e-6, "{case}: {:e} m missing", marks.missing);
+    assert!(marks.double < plain.double + 60e-6, "{case}: {:e} m double", marks.double);
+}
+
+#[test]
+fn tolerated_stalls_at_any_time_cost_no_mark_on_motors_and_steppers() {
+    for name in ["corexy.toml", "cartesian_steppers.toml", "five_bar.toml"] {
+        let machine = load(name);
+        let plan = planned(&machine);
+        let plain = play(&machine, &plan, |_| 0);
+        assert_eq!((plain.stalls, plain.skipped), (0, 0));
+        for seed in 0..6 {
+            let mut random = SplitMix64::new(seed);
+            let mut next = START + random.bits() % 300;
+            let longest = machine.stall.cycles() - 1;
+            let played = play(&machine, &plan, |step| {
+                if step < next {
+                    return 0;
+                }
+                // So far apart that no place loses its light more often than is borne.
+                next = step + 450 + random.bits() % 500;
+                1 + random.bits() % longest
+            });
+            assert!(played.stalls >= 3 && played.skipped >= played.stalls, "{name}");
+            assert_whole(&played, &plain, &format!("{name}, seed {seed}"));
+        }
+    }
+}
+
+#[test]
+fn a_stall_is_a_fault_exactly_when_it_is_longer_than_the_machine_file_says() {
+    let mut machine = Machine::builtin();
+    for tolerated in [1, 4, 10] {
+        machine.stall = machine::StallTolerance::new(Nanoseconds::of_cycles(tolerated)).unwrap();
+        let plan = planned(&machine);
+        for moment in [START + 30, START + 200, START + 700] {
+            // The cycle that drives is in time for lacks a fresh command too.
+            for (skipped, borne) in [(tolerated - 1, true), (tolerated, false), (300, false)] {
+                let played = play(&machine, &plan, |step| if step == moment { skipped } else { 0 });
+                let case = format!("{skipped} skipped of {tolerated} at {moment}");
+                let fault = played.report.fault;
+                assert_eq!(fault.code() == FaultCode::None, borne, "{case}: {fault:?}");
+                assert_eq!(played.report.completed, u32::from(borne), "{case}");
+                if !borne {
+                    assert_eq!(fault.code(), FaultCode::StaleCommand, "{case}");
+                    assert_eq!(
+                        (fault.value, fault.limit),
+                        (skipped as f64 + 1.0, tolerated as f64)
+                    );
+                    assert_eq!(played.state, ControllerState::Faulted, "{case}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_time_of_a_run_counts_what_was_skipped() {
+    let machine = Machine::builtin();
+    let plan = planned(&machine);
+    let plain = play(&machine, &plan, |_| 0);
+    // In the dark and at rest, before anything moves: nothing has to be made up for.
+    let stalled = play(&machine, &plan, |step| if step == START + 3 { 6 } else { 0 });
+    assert_eq!(stalled.report.cycles, plain.report.cycles);
+    assert_eq!(stalled.skipped, 6);
+    let cycles = |report: &ControllerReport| report.last_cycle.0 - report.first_cycle.0 + 1;
+    assert_eq!(cycles(&stalled.report), stalled.report.cycles);
+}
+
+#[test]
+fn the_feedback_after_a_stall_says_that_commands_were_missed() {
+    let machine = Machine::builtin();
+    let port = SimulatedPlant::new(&machine, PlantOptions::default()).unwrap();
+    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
+    let mut bridge = Bridge::new(port, options);
+    let mut controller = Controller::new(&machine);
+    let mut outputs = Outputs::default();
+    let mut deadline = Nanoseconds(0);
+    for skipped in [0, 0, 0, 4, 0, 0] {
+        deadline = deadline + Nanoseconds::of_cycles(1 + skipped);
+        bridge.begin(deadline, deadline);
+        let feedback = *bridge.feedback();
+        assert_eq!(feedback.has(status::COMMAND_MISSED), skipped > 0);
+        let inputs = Inputs {
+            feedback: &feedback,
+            received: deadline,
+            setpoints: &[],
+            request: None,
+            peers: Peers::default(),
+        };
+        controller.step(deadline, &inputs, &mut outputs);
+        bridge.latch(&outputs.command, deadline);
+        bridge.finish(deadline);
+    }
+}
