@@ -9,7 +9,7 @@ use std::path::Path;
 use controller::{Controller, Inputs, Outputs, Peers};
 use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
 use machine::Machine;
-use monitor::marks::{Judge, Marks};
+use monitor::marks::{Judge, Marks, StreamEnd};
 use monitor::recording::{CycleRecord, Recorder};
 use monitor::trace::lit_share;
 use planner::job::Job;
@@ -82,11 +82,11 @@ fn play(machine: &Machine, plan: &Plan, mut stall: impl FnMut(u64) -> u64) -> Pl
         left -= 1;
         if left == 0 {
             recorder.finish();
-            assert_eq!(recorder.lost(), 0, "what drives skipped is no loss");
+            assert_eq!(recorder.continuity().missing, 0, "what drives skipped is no loss");
             let stalls = bridge.report(RealtimeFacts::default()).stalls;
             let state = outputs.command.state();
-            let marks = judge.finish().unwrap();
-            return Played { marks, report, stalls: stalls.count, skipped, state };
+            let marks = judge.finish(StreamEnd::Reported(&report)).unwrap().marks;
+            return Played { marks, report, stalls: stalls.count, skipped: skipped.into(), state };
         }
         deadline = deadline + Nanoseconds::of_cycles(stall(step));
     }

@@ -171,7 +171,7 @@ impl Drivers {
         // What is measured is where they are at the deadline: a cycle before the end of all that.
         self.ahead = coasting.map(|speed| speed * 1e-3);
         self.feedback.cycle.0 += cycles;
-        self.feedback.skipped = cycles;
+        self.feedback.skipped = u16::try_from(cycles).unwrap();
         self.feedback.missed += cycles + 1;
         self.feedback.deadline = self.feedback.deadline + Nanoseconds::of_cycles(cycles);
     }

@@ -179,7 +179,7 @@ impl Bridge {
 
         self.feedback.cycle = self.cycle_after(skipped);
         let feedback = &mut self.feedback;
-        feedback.skipped = skipped;
+        feedback.skipped = u16::try_from(skipped).unwrap_or(u16::MAX);
         feedback.deadline = deadline;
         feedback.measured = now;
         feedback.published = now;

@@ -96,7 +96,7 @@ pub struct Measurement {
     /// Tool centre point in the machine frame [m], where the port knows it.
     pub tool: Option<[f64; 3]>,
     /// Digital inputs, one bit each.
-    pub inputs: u32,
+    pub inputs: u16,
     /// What the laser did since the previous exchange; offsets count from there, through the cycles
     /// that passed since.
     pub laser: LaserCycle,

@@ -104,7 +104,7 @@ fn cycle_numbers_are_the_time_whatever_was_skipped() {
         let skipped = (random.bits() % 49).saturating_sub(40) as i64;
         let feedback = run.stall(skipped);
         cycle += 1 + skipped as u64;
-        assert_eq!((feedback.cycle, feedback.skipped), (Cycle(cycle), skipped as u64));
+        assert_eq!((feedback.cycle, feedback.skipped), (Cycle(cycle), skipped as u16));
         assert_eq!(feedback.deadline.0, START + PERIOD * cycle as i64);
         assert_eq!(feedback.has(status::COMMAND_MISSED), skipped > 0);
         assert!(!feedback.has(status::STOPPED_ALONE));

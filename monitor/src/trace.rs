@@ -79,7 +79,7 @@ impl Trace {
         };
         self.of_records().for_each(|envelope| envelope.skip(absent));
         let answered = record.is_answered();
-        for _ in 0..feedback.skipped.min(LONGEST_GAP) {
+        for _ in 0..u64::from(feedback.skipped).min(LONGEST_GAP) {
             let curves = [&mut self.following_error, &mut self.current, &mut self.voltage];
             curves.into_iter().flatten().for_each(|envelope| envelope.push(None));
             if self.timed {

@@ -26,9 +26,6 @@ sample! {
         epoch: u64,
         /// The cycle that starts with this measurement.
         cycle: Cycle,
-        /// Cycles left out between the feedback before and this one: drives was too late for their
-        /// deadlines. Nobody measured in them, and the gate was closed.
-        skipped: u64,
         /// The absolute deadline of the cycle.
         deadline: Nanoseconds,
         /// When the measurement was taken.
@@ -53,7 +50,11 @@ sample! {
         /// Bits of [`status`].
         status: u32,
         /// Digital inputs, one bit each.
-        inputs: u32,
+        inputs: u16,
+        /// Cycles left out between the feedback before and this one: drives was too late for their
+        /// deadlines. Nobody measured in them, and the gate was closed. The largest number stands
+        /// for all above it: so long a stall is a fault in any case.
+        skipped: u16,
         /// Encoder counts since power-on.
         counts: [i64; MAX_AXES],
         /// Motor position from the encoder [rad].
@@ -75,7 +76,7 @@ sample! {
 impl Feedback {
     /// Cycles since the feedback before.
     pub fn elapsed(&self) -> u64 {
-        self.skipped.saturating_add(1)
+        u64::from(self.skipped) + 1
     }
 
     /// Whether all the status bits in `bits` are set.

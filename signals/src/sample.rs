@@ -36,7 +36,7 @@ macro_rules! number {
     };
 }
 
-number!(u8, u32, u64, i32, i64, f64, crate::Nanoseconds, crate::Cycle);
+number!(u8, u16, u32, u64, i32, i64, f64, crate::Nanoseconds, crate::Cycle);
 
 impl<T: Field, const N: usize> Field for [T; N] {
     const SHAPE: u64 = fnv1a_on(T::SHAPE, &(N as u64).to_le_bytes());
