@@ -39,7 +39,7 @@ impl Sources {
             )));
         }
         let file = File::create(path).map_err(|error| {
-            Failure::bad_input(format!("{argument} {}: {error}", path.display()))
+            Failure::bad_input(format!("{argument}: cannot write {}: {error}", path.display()))
         })?;
         self.files.push((path.to_owned(), "another output of this command"));
         Ok(file)

@@ -216,6 +216,11 @@ impl Bridge {
         Freshness::Fresh
     }
 
+    /// Cycles in a row, to now, without a fresh command.
+    pub fn misses(&self) -> u64 {
+        self.watchdog.misses()
+    }
+
     /// Says that no command is to be expected any more in this cycle.
     pub fn miss(&mut self) {
         self.latched = None;

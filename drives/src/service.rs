@@ -33,6 +33,9 @@ const STRICT_BOUND: Nanoseconds = Nanoseconds(300_000);
 /// How long simulated drives wait for the command of a controller that is alive.
 const SLIPPING_BOUND: Nanoseconds = Nanoseconds(100_000_000);
 
+/// How often in a row they wait so long in vain before they take it for one that hangs.
+const SLIPS_IN_VAIN: u64 = 3;
+
 /// Cycles between two reports.
 const REPORT_INTERVAL: u64 = 100;
 
@@ -207,10 +210,12 @@ impl ServiceCycle {
 
     /// Latches the answer to this cycle's feedback, or lets the bound pass.
     fn await_command(&mut self, vitality: Vitality) -> Result<(), ServiceError> {
-        // A controller that is not followed any more is not worth waiting for.
+        // A controller that is not followed any more is not worth waiting for, nor one that has
+        // been waited for in vain.
         let patient = self.deadlines == Deadlines::Slipping
             && vitality.controller == PeerState::Alive
-            && !self.bridge.feedback().has(status::STOPPED_ALONE);
+            && !self.bridge.feedback().has(status::STOPPED_ALONE)
+            && self.bridge.misses() < SLIPS_IN_VAIN;
         let Feedback { deadline, published, .. } = *self.bridge.feedback();
         let until = if patient {
             deadline + SLIPPING_BOUND

@@ -135,7 +135,7 @@ impl Place {
             .stderr(File::create(&error).unwrap())
             .spawn()
             .unwrap();
-        Running { child: Some(child), output, error }
+        Running { child: Some(child), code: None, output, error }
     }
 
     /// Starts `graver run` of a job into `out` here, with JSON.
@@ -247,6 +247,8 @@ pub(crate) fn services(status: &Value) -> Vec<Peer> {
 pub(crate) struct Running {
     /// `None` once it has ended.
     child: Option<Child>,
+    /// Its exit code then.
+    code: Option<i32>,
     output: PathBuf,
     error: PathBuf,
 }
@@ -254,7 +256,8 @@ pub(crate) struct Running {
 impl Running {
     /// One whose output goes elsewhere than into files.
     pub(crate) fn of(child: Child) -> Self {
-        Self { child: Some(child), output: "/dev/null".into(), error: "/dev/null".into() }
+        let (output, error) = ("/dev/null".into(), "/dev/null".into());
+        Self { child: Some(child), code: None, output, error }
     }
 
     /// Its process.
@@ -270,9 +273,10 @@ impl Running {
 
     /// Its exit code if it has ended; `Some(None)` after a signal.
     pub(crate) fn try_code(&mut self) -> Option<Option<i32>> {
-        let status = self.child.as_mut().expect("it has ended").try_wait().unwrap()?;
+        let Some(child) = &mut self.child else { return Some(self.code) };
+        self.code = child.try_wait().unwrap()?.code();
         self.child = None;
-        Some(status.code())
+        Some(self.code)
     }
 
     /// Waits for its end, and gives what came through its pipes.

@@ -19,7 +19,8 @@ const fn row(
 }
 
 /// The bounds of every number of a machine file, but for the delays of the laser, whose one limit
-/// stands at [`crate::LaserSource::LONGEST_DELAY`].
+/// stands at [`crate::LaserSource::LONGEST_DELAY`], and for the stall that is tolerated, whose range
+/// stands at [`crate::StallTolerance`].
 #[rustfmt::skip]
 pub const BOUNDS: &[Bounds] = &[
     // Where things are, and how large they are.
