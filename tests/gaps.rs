@@ -70,7 +70,7 @@ fn check(recorded: &Recorded, whole: &Judgement, gaps: &[std::ops::Range<usize>]
     let whole = &whole.marks;
     let what = || format!("{gaps:?}: {marks:#?}");
     let balance = |marks: &monitor::marks::Marks| {
-        marks.length + marks.missing + marks.unrecorded - marks.double - recorded.artwork.length()
+        marks.length + marks.missing - marks.double - recorded.artwork.length()
     };
     // Each side of a gap, and each stroke in it, may be off by the accuracy of a stroke's end.
     let tolerance = 5e-6 * (gaps.len() + recorded.artwork.strokes.len()) as f64;
@@ -83,7 +83,7 @@ fn check(recorded: &Recorded, whole: &Judgement, gaps: &[std::ops::Range<usize>]
         (marks.speed_max, whole.speed_max),
         (marks.double_end_max, whole.double_end_max),
         (marks.missing_end_max, whole.missing_end_max),
-        (marks.missing, whole.missing + 1e-9),
+        (marks.missing - marks.unrecorded, whole.missing + 1e-9),
         (marks.double, whole.double + 1e-9),
     ] {
         assert!(value <= most, "{value:e} above {most:e}; {}", what());

@@ -6,8 +6,8 @@
 //! names, so that light which comes late is found where it falls. A hold that backs up and resumes
 //! adds a run of light to its stroke: a gap between the runs is missing, an overlap is double.
 //!
-//! What passed while nobody recorded is neither marked nor missing: it is *unrecorded*, from where
-//! the job had come before a gap to where light first fell or was due after it.
+//! What passed while nobody recorded is *unrecorded*, from where the job had come before a gap to
+//! where light first fell or was due after it: missing, because nobody saw it marked.
 //!
 //! The [`Judge`] takes records as they come; it remembers runs of light, not samples.
 
@@ -43,10 +43,9 @@ pub enum Source {
 pub struct Marks {
     /// Length of the tool's true path with the laser on [m].
     pub length: f64,
-    /// Length of the job that was never marked [m].
+    /// Length of the job that is not known to be marked [m].
     pub missing: f64,
-    /// Length of the job that passed while nobody recorded [m]: whether it was marked is not known.
-    /// It counts neither as marked nor as missing nor as double.
+    /// How much of `missing` passed while nobody recorded [m]: it may be marked all the same.
     #[serde(default)]
     pub unrecorded: f64,
     /// Length marked more than once, beyond the end of a stroke, or without a stroke [m].
@@ -299,7 +298,7 @@ impl<'a> Judge<'a> {
                 let first = unrecorded_strokes.map_or(number, |(first, _)| first);
                 unrecorded_strokes = Some((first, number));
             }
-            marks.missing += extent.missing;
+            marks.missing += extent.missing + extent.unrecorded;
             marks.unrecorded += extent.unrecorded;
             // A dot has no length to mark twice; straying from it is its error.
             if stroke.length() > 0.0 {

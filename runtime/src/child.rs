@@ -68,6 +68,11 @@ impl ChildProcess {
         self.peer.is_alive()
     }
 
+    /// Whether somebody has stopped it, by SIGSTOP or a debugger.
+    pub fn is_stopped(&self) -> bool {
+        self.peer.is_stopped()
+    }
+
     /// Its exit status if it has ended; reaps it.
     pub fn try_wait(&mut self) -> io::Result<Option<ExitStatus>> {
         if self.status.is_none() {

@@ -9,12 +9,14 @@ use drives::PlantOptions;
 use monitor::conclusion::{self, Ending};
 use monitor::examination::{Clock, Examination};
 use monitor::marks::StreamEnd;
+use monitor::recording::CycleRecord;
 use monitor::recording::file::RecordingWriter;
 use monitor::run_folder::RunFolder;
 use signals::run_folder;
 use signals::time::CYCLE_TIME;
 use std::fs::File;
 use std::io::{self, BufWriter};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Runs the command.
@@ -37,21 +39,18 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     let folder = folder.map_err(Failure::bad_input)?;
     let _claim = folder.as_ref().map(Claim::of).transpose()?;
     folder.as_ref().map_or(Ok(()), RunFolder::clear).map_err(Failure::bad_input)?;
-    let mut writer = folder.as_ref().map(recording).transpose().map_err(Failure::service)?;
-    let mut failed: io::Result<()> = Ok(());
+    let mut recording = folder.as_ref().map(Recording::begin);
     let mut examination = Examination::new(&plan.artwork, Clock::Virtual);
     let options = PlantOptions { seed: arguments.seed, ..PlantOptions::default() };
     let simulated = simulate(&input.machine, &input.plant, &plan, options, |records| {
         records.iter().for_each(|record| examination.push(record));
-        if let (Some(writer), Ok(())) = (&mut writer, &failed) {
-            failed = writer.write(records);
+        if let Some(recording) = &mut recording {
+            recording.write(records);
         }
     })
     .map_err(Failure::bad_input)?;
-    failed.map_err(Failure::service)?;
-    if let Some(writer) = writer {
-        writer.finish().map_err(Failure::service)?;
-    }
+    let mut warnings = input.machine.job_warnings();
+    warnings.extend(recording.and_then(Recording::finish));
 
     let examining = Instant::now();
     let findings = examination.finish(StreamEnd::Reported(&simulated.controller));
@@ -60,7 +59,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
         controller: Some(simulated.controller),
         drives: Some(simulated.drives),
         plan_time,
-        warnings: input.machine.job_warnings(),
+        warnings,
         realtime_factor: Some(time / simulated.stepping.as_secs_f64()),
         ..Ending::default()
     };
@@ -70,13 +69,37 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     summary.report_time = examining.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
     if let Some(folder) = &folder {
-        let artwork = serde_json::to_vec(&plan.artwork).map_err(Failure::service)?;
-        folder.write(run_folder::ARTWORK, artwork).map_err(Failure::service)?;
+        if let Err(error) = folder.write_json(run_folder::ARTWORK, &plan.artwork) {
+            summary.warnings.push(format!("cannot write {error}"));
+        }
         conclusion::write(folder, &input.machine, &plan.artwork, &mut summary, Some(&findings));
     }
     Ok(output::summary(&summary, arguments.json))
 }
 
-fn recording(folder: &RunFolder) -> io::Result<RecordingWriter<BufWriter<File>>> {
-    RecordingWriter::new(BufWriter::new(File::create(folder.file(run_folder::SAMPLES))?))
+/// The recording of a simulation, as far as it can be written: the simulation goes on without.
+struct Recording {
+    path: PathBuf,
+    writer: io::Result<RecordingWriter<BufWriter<File>>>,
+}
+
+impl Recording {
+    fn begin(folder: &RunFolder) -> Self {
+        let path = folder.file(run_folder::SAMPLES);
+        Self { writer: RecordingWriter::create(&path), path }
+    }
+
+    fn write(&mut self, records: &[CycleRecord]) {
+        if let Ok(writer) = &mut self.writer
+            && let Err(error) = writer.write(records)
+        {
+            self.writer = Err(error);
+        }
+    }
+
+    /// Why there is no recording, or not all of it.
+    fn finish(self) -> Option<String> {
+        let finished = self.writer.and_then(RecordingWriter::finish);
+        finished.err().map(|error| format!("cannot write {}: {error}", self.path.display()))
+    }
 }

@@ -308,7 +308,12 @@ impl<'a> JobRun<'a> {
         let message = format!("{ended}{consequence}");
         message::tell(&message);
         match ended.remedy {
-            Remedy::Stop => self.end_with(message),
+            Remedy::Stop => {
+                if !self.ending.latched.is_some() {
+                    self.ending.latched = Fault::new(death_of(ended.role));
+                }
+                self.end_with(message);
+            }
             _ => self.ending.warnings.push(message),
         }
     }
@@ -435,6 +440,17 @@ impl<'a> JobRun<'a> {
             drives.fault = Fault::new(FaultCode::ControllerLost).at(drives.fault.at);
         }
         drives
+    }
+}
+
+/// The fault that the death of a service is.
+fn death_of(role: Role) -> FaultCode {
+    match role {
+        Role::Planner => FaultCode::PlannerLost,
+        Role::Controller => FaultCode::ControllerLost,
+        Role::Drives => FaultCode::DrivesLost,
+        Role::Domain => FaultCode::SupervisorLost,
+        Role::Monitor | Role::Observer => FaultCode::None,
     }
 }
 

@@ -297,10 +297,11 @@ impl Pipeline {
 
     /// Laser off and axes to rest, then unpowered; as far as somebody is there to do it.
     fn bring_to_rest(&mut self) {
-        if !self.has(Role::Controller) || !self.has(Role::Drives) {
+        let able = self.has(Role::Controller) && self.has(Role::Drives);
+        if !able || stopped_alone(&self.heard) {
             return;
         }
-        // Without an answer the controller hangs, and drives has stopped alone.
+        // Without an answer the controller hangs, and drives stops alone.
         let _ = self.link.request_within(OperatorVerb::Stop, 0.0, LAST_ANSWER);
         self.wait(|heard| !is_moving(heard) || stopped_alone(heard));
         let _ = self.link.request_within(OperatorVerb::Disable, 0.0, LAST_ANSWER);

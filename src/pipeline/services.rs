@@ -7,7 +7,7 @@ use runtime::{Domain, message};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// The order in which services start.
 const ROLES: [Role; 4] = [Role::Monitor, Role::Planner, Role::Controller, Role::Drives];
@@ -18,6 +18,9 @@ const STOPPING: [Role; 4] = [Role::Planner, Role::Controller, Role::Drives, Role
 
 /// How long a service may take to end after it was told to.
 const END_PATIENCE: Duration = Duration::from_secs(5);
+
+/// How long one that was stopped from outside may take.
+const STOPPED_PATIENCE: Duration = Duration::from_millis(100);
 
 /// This program as the kernel has it open. Its path may lead to another build by now, or nowhere.
 const THIS_PROGRAM: &str = "/proc/self/exe";
@@ -144,10 +147,23 @@ impl Services {
             let Some(mut child) = service.child.take() else { continue };
             // A child that is gone can be told nothing, and that is no harm.
             let _ = child.terminate();
-            if !matches!(child.wait_within(END_PATIENCE), Ok(Some(_))) {
+            if !has_ended(&mut child) {
                 let _ = child.kill();
                 let _ = child.wait_within(END_PATIENCE);
             }
+        }
+    }
+}
+
+/// Waits for the end of a child that was told to end. One that somebody has stopped hears nothing,
+/// and is not waited for long.
+fn has_ended(child: &mut ChildProcess) -> bool {
+    let told = Instant::now();
+    loop {
+        match child.wait_within(STOPPED_PATIENCE) {
+            Ok(Some(_)) => return true,
+            Ok(None) if !child.is_stopped() && told.elapsed() < END_PATIENCE => {}
+            _ => return false,
         }
     }
 }

@@ -98,7 +98,7 @@ impl Rows {
         if marks.unrecorded > 0.0 {
             self.add(
                 "unrecorded",
-                format!("{}, neither marked nor missing", length(marks.unrecorded)),
+                format!("{} of what is missing: it may be marked", length(marks.unrecorded)),
             );
         }
         if marks.strokes_lost > 0 {
