@@ -15,7 +15,7 @@ pub enum Exit {
     BadInput = 2,
     /// A fault stopped the machine.
     Fault = 3,
-    /// A service could not start or died, or the instance is in use.
+    /// A service could not start or died, no pipeline runs or answers, or the instance is in use.
     Service = 4,
 }
 
@@ -33,7 +33,7 @@ impl Exit {
             Self::BadInput => "bad arguments, machine file or job",
             Self::Fault => "a fault stopped the machine",
             Self::Service => {
-                "a service could not start or died, or the instance is in use (its pid is named)"
+                "a service could not start or died, no pipeline runs or answers, or the instance is in use (its pid is named)"
             }
         }
     }

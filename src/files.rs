@@ -52,7 +52,8 @@ fn identity(path: &Path) -> Option<(u64, u64)> {
     Some((metadata.dev(), metadata.ino()))
 }
 
-/// A run folder that no other run may write into; dropping it gives the folder free, and so does
+/// A run folder that no other run may write into. A directory can only be opened for reading, so this
+/// is flock(2) and not the lock of `runtime`, which needs a file open for writing; dropping it gives the folder free, and so does
 /// the end of the process.
 #[derive(Debug)]
 pub struct Claim {

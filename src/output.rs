@@ -49,7 +49,7 @@ pub fn printed(written: io::Result<()>) -> Result<(), Failure> {
 pub fn summary(summary: &Summary, as_json: bool) -> Exit {
     if as_json {
         for warning in summary.warnings.iter().chain(&summary.realtime.warnings) {
-            say!("graver: warning: {warning}");
+            message::tell(&format!("warning: {warning}"));
         }
         if let Err(failure) = json(summary) {
             message::tell(failure.refusal.text.trim());

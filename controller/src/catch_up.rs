@@ -69,9 +69,14 @@ impl CatchUp {
         settling.fold(0.0, f64::max) as u64
     }
 
+    /// Whether nothing is left.
+    pub fn is_done(&self) -> bool {
+        self.left == 0
+    }
+
     /// Goes on by one cycle, and adds what is left to `planned`.
     pub fn apply(&mut self, planned: &mut Planned) {
-        if self.left == 0 {
+        if self.is_done() {
             return;
         }
         self.left -= 1;

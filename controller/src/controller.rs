@@ -323,6 +323,7 @@ impl Controller {
             for cascade in self.cascades.iter_mut().flatten() {
                 cascade.reset();
             }
+            self.catch_up = CatchUp::default();
             return;
         }
         if self.playing == 0 {

@@ -33,7 +33,7 @@ const STRICT_BOUND: Nanoseconds = Nanoseconds(300_000);
 /// How long simulated drives wait for the command of a controller that is alive.
 const SLIPPING_BOUND: Nanoseconds = Nanoseconds(100_000_000);
 
-/// How often in a row they wait so long in vain before they take it for one that hangs.
+/// After how many such waits in a row without an answer drives takes the controller to hang.
 const SLIPS_IN_VAIN: u64 = 3;
 
 /// Cycles between two reports.
@@ -147,10 +147,11 @@ impl ServiceCycle {
         let mut clock = PeriodicClock::new(CYCLE_PERIOD, margin);
         loop {
             clock.wait();
+            let vitality = self.look_after_peers();
+            // The last thing before the exchange: what is late then must not act as if it were not.
             if self.deadlines == Deadlines::Strict {
                 clock.skip();
             }
-            let vitality = self.look_after_peers();
             self.begin(clock.deadline())?;
             self.await_command(vitality)?;
             self.bridge.finish(clock::now());

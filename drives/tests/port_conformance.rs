@@ -1,6 +1,7 @@
 //! What every port must do, whatever stands behind it: the contract of [`drives::port`] as tests.
 //! A new port adds itself to [`subjects`].
 #![allow(clippy::unwrap_used)]
+#![allow(clippy::print_stdout, reason = "the report of a failing test")]
 
 use drives::{Actuation, Freshness, Measurement, PlantOptions, Port, Power, SimulatedPlant};
 use machine::transmission::{Elasticity, screw::at_nut};

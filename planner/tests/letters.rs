@@ -86,7 +86,7 @@ fn h2_takes_the_golden_times() {
 
 #[test]
 fn curves_beat_the_table() {
-    // Issue: at most these shares of table 3-1, A 10 m/s², J 500 m/s³, V ≤ 0.25 m/s.
+    // At most these shares of table 3-1, A 10 m/s², J 500 m/s³, V ≤ 0.25 m/s.
     let machine = Machine::builtin();
     let heights = [0.01, 0.02, 0.05];
     let letters = [

@@ -31,6 +31,10 @@ pub struct Termination {
 }
 
 extern "C" fn note(signal: libc::c_int) {
+    // A terminal that closes sends it twice, and the second says nothing more.
+    if signal == libc::SIGHUP && COUNT.load(Ordering::Relaxed) > 0 {
+        return;
+    }
     LAST.store(signal, Ordering::Relaxed);
     COUNT.fetch_add(1, Ordering::Release);
 }

@@ -28,6 +28,9 @@ pub const ANSWER_PATIENCE: Duration = Duration::from_secs(4);
 /// How often a client that follows a request looks up from it.
 const FOLLOW_PERIOD: Duration = Duration::from_millis(100);
 
+/// How long a client may leave what it is told unread, once all buffers are full.
+const CLIENT_PATIENCE: Duration = Duration::from_secs(1);
+
 /// How often the accepting thread looks whether it shall end.
 const LOOK_PERIOD: Duration = Duration::from_millis(20);
 
@@ -187,6 +190,10 @@ where
         };
         let (handler, stopped) = (handler.clone(), stop.clone());
         let Ok(own) = stream.try_clone() else { continue };
+        // A client that reads nothing, because it is stopped, must not keep the holder from its end.
+        if stream.set_write_timeout(Some(CLIENT_PATIENCE)).is_err() {
+            continue;
+        }
         let serve = move || {
             // The client has gone; there is nobody to tell.
             let _ = converse(&stream, handler.as_ref(), &stopped);

@@ -5,6 +5,7 @@
 //! none, such a test has nothing to say and passes.
 
 #![allow(clippy::unwrap_used)]
+#![allow(clippy::print_stdout, reason = "children tell their parent")]
 
 mod scratch;
 

@@ -38,7 +38,7 @@ fn signalled_process() {
             default_hang_up();
             signal::install().unwrap();
             assert_eq!(signal::termination(), None);
-            for (count, number) in [(1, libc::SIGTERM), (2, libc::SIGINT), (3, libc::SIGHUP)] {
+            for (count, number) in [(1, libc::SIGHUP), (2, libc::SIGTERM), (3, libc::SIGINT)] {
                 own.signal(number).unwrap();
                 assert_eq!(told(count), Termination { signal: number, count });
             }

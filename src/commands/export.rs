@@ -3,10 +3,10 @@
 use crate::arguments::ExportArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::Sources;
-use crate::output::say;
 use monitor::recording::file::{RecordingError, RecordingReader};
 use monitor::recording::table::TableWriter;
 use monitor::summary::Summary;
+use runtime::message;
 use signals::{MAX_AXES, run_folder};
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, ErrorKind, Write};
@@ -64,7 +64,7 @@ fn export(
             }
             // All records before the torn one are whole.
             Err(error @ RecordingError::Truncated { .. }) => {
-                say!("graver: warning: {}: {error}", recording.display());
+                message::tell(&format!("warning: {}: {error}", recording.display()));
             }
             Err(error) => return Err(at(recording, error)),
         }
@@ -80,7 +80,7 @@ fn axes(summary: &Path) -> Vec<String> {
             .and_then(|text| Ok(serde_json::from_slice::<Summary>(&text)?))
             .inspect_err(|error| {
                 let path = summary.display();
-                say!("graver: warning: {path}: {error}: the axes are numbered");
+                message::tell(&format!("warning: {path}: {error}: the axes are numbered"));
             })
             .ok(),
     };

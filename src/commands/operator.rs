@@ -61,13 +61,13 @@ fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure
         }
         Ok(Exit::Done)
     } else {
-        say!("graver: refused: not possible while the machine is {state}");
+        message::tell(&format!("refused: not possible while the machine is {state}"));
         Ok(Exit::Stopped)
     }
 }
 
-/// Asks the controller itself, past a supervisor that does not answer: a stop or a hold must not
-/// fail for want of a process that moves nothing.
+/// Asks the controller directly when the supervisor does not answer: a stop or a hold must not fail
+/// for want of a process that moves nothing.
 fn ask_controller(
     request: &Request,
     instance: &Instance,
@@ -84,9 +84,11 @@ fn ask_controller(
         Ok(VerbReply::from(reply))
     };
     let reply = asked().map_err(|error| {
-        Failure::service(format!("{silent}, and neither did the rest: {error}"))
+        Failure::service(format!(
+            "{silent}; the controller could not be asked directly either: {error}"
+        ))
     })?;
-    message::tell(&format!("{silent}; the controller was asked past it"));
+    message::tell(&format!("{silent}; the controller was asked directly"));
     serde_json::to_value(reply).map_err(Failure::service)
 }
 
@@ -178,12 +180,12 @@ impl Follower<'_> {
         let before = std::mem::replace(&mut self.told, signals);
         line.clear();
         if before > 0 {
-            return ControlFlow::Break(format!("job {job} is left to come to rest alone"));
+            return ControlFlow::Break(format!("job {job} comes to rest without being waited for"));
         }
         match send(&Request::Withdraw { job }, self.instance) {
-            Ok(_) => {
-                message::tell(&format!("stopping job {job}; once more leaves it to stop alone"))
-            }
+            Ok(_) => message::tell(&format!(
+                "stopping job {job}; another Ctrl-C leaves without waiting for it"
+            )),
             Err(error) => {
                 return ControlFlow::Break(format!("job {job} could not be stopped: {error}"));
             }

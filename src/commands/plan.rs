@@ -8,6 +8,7 @@ use crate::output::say;
 use crate::{inputs, output};
 use machine::Machine;
 use planner::{Plan, PlanFacts};
+use runtime::message;
 use serde::Serialize;
 use signals::Setpoint;
 use signals::time::CYCLE_TIME;
@@ -67,7 +68,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         written(path, pulses::write(file, &input.machine, &plan))?;
     }
     for warning in input.machine.job_warnings() {
-        say!("graver: warning: {warning}");
+        message::tell(&format!("warning: {warning}"));
     }
     let report = PlanReport {
         machine: input.machine.name.clone(),

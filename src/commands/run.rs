@@ -3,7 +3,6 @@
 use crate::arguments::{DomainArguments, RunArguments};
 use crate::exit::{Exit, Failure};
 use crate::files::Claim;
-use crate::output::say;
 use crate::pipeline::configuration::Configuration;
 use crate::pipeline::job_run::JobRun;
 use crate::pipeline::operators::{self, Submission};
@@ -62,7 +61,7 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
     let configuration = Configuration::new(source, &arguments.drives)?;
     signal::install().map_err(Failure::service)?;
     let mut pipeline = Pipeline::start(&instance, &configuration, Starter::Others)?;
-    say!("graver: instance {} waits for its services and jobs", instance.name());
+    message::tell(&format!("instance {} waits for its services and jobs", instance.name()));
     while signal::termination().is_none() {
         pipeline.look()?;
         if let Some(submission) = pipeline.submission() {
@@ -86,7 +85,7 @@ fn run_submission(pipeline: &mut Pipeline, submission: Submission) {
             Ok(run.follow())
         })
     } else {
-        Err(Failure::stopped("the job was taken back before its turn came"))
+        Err(Failure::stopped("the job was withdrawn before its turn came"))
     };
     if let Err(failure) = ran {
         message::tell(failure.refusal.text.trim());

@@ -13,7 +13,7 @@ use monitor::summary::{ErrorSummary, Outcome, Summary};
 use planner::request::{JobRequest, Refusal};
 use runtime::domain::Role;
 use runtime::{message, signal};
-use signals::{DrivesReport, Fault, FaultCode, OperatorVerb, PlannerPhase, run_folder};
+use signals::{Cycle, DrivesReport, Fault, FaultCode, OperatorVerb, PlannerPhase, run_folder};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -23,6 +23,13 @@ const REST_PATIENCE: Duration = Duration::from_secs(10);
 /// How long the controller's last word may follow when the axes rest: it comes with the next cycle,
 /// unless the controller hangs or is dead.
 const WORD_PATIENCE: Duration = Duration::from_millis(250);
+
+/// How long the axes may take to stand of a job that was never played: they only held.
+const UNPLAYED_PATIENCE: Duration = Duration::from_millis(500);
+
+/// How long drives may say nothing while a job is played; its clock may slip by some tenths of a
+/// second.
+const DRIVES_PATIENCE: Duration = Duration::from_secs(5);
 
 /// How long the monitor may take to open its recording: without it the job runs unrecorded.
 const OPENING_PATIENCE: Duration = Duration::from_secs(2);
@@ -63,6 +70,8 @@ pub struct JobRun<'a> {
     refused: Option<Instant>,
     /// Since when nothing can move any more, whatever the controller says.
     quiet: Option<Instant>,
+    /// The newest cycle of drives that was heard of, and when.
+    drives_heard: (Cycle, Instant),
     started: Instant,
     ending: Ending,
     submission: Option<Submission>,
@@ -96,6 +105,7 @@ impl<'a> JobRun<'a> {
             played: false,
             refused: None,
             quiet: None,
+            drives_heard: (Cycle::default(), Instant::now()),
             started,
             ending,
             submission,
@@ -226,17 +236,24 @@ impl<'a> JobRun<'a> {
 
     /// Whether the controller has said how the job ended, or nothing more can be expected of it.
     fn is_over(&mut self) -> bool {
-        let heard = &self.pipeline.heard;
-        let report = heard.controller;
+        let report = self.pipeline.heard.controller;
         if Some(report.stream) == self.stream && report.is_final == 1 {
             self.ending.controller = Some(report);
             return true;
         }
+        self.hear_drives();
         let since = match self.stage {
-            Stage::Resting(_) if !self.played => return true,
+            // What was never played only holds, or is being stopped.
+            Stage::Resting(since) if !self.played => {
+                let holds = self.pipeline.has(Role::Controller) && !self.ending.latched.is_some();
+                let gone = !self.pipeline.has(Role::Drives);
+                let at_rest = is_dark_and_at_rest(&self.pipeline.heard);
+                return holds || gone || at_rest || since.elapsed() > UNPLAYED_PATIENCE;
+            }
             Stage::Resting(since) => Some(since),
             _ => None,
         };
+        let heard = &self.pipeline.heard;
         // Without drives nothing moves, and axes that drives has stopped rest by themselves.
         let gone = !self.pipeline.has(Role::Drives);
         let at_rest =
@@ -248,6 +265,19 @@ impl<'a> JobRun<'a> {
             self.fail(heard.drives.fault);
         }
         silent || since.is_some_and(|since| since.elapsed() > REST_PATIENCE)
+    }
+
+    /// Gives a job up that is being played while drives says nothing: it reports ten times a second.
+    fn hear_drives(&mut self) {
+        let cycle = self.pipeline.heard.drives.cycle;
+        if cycle != self.drives_heard.0 {
+            self.drives_heard = (cycle, Instant::now());
+        } else if self.drives_heard.1.elapsed() > DRIVES_PATIENCE {
+            self.end_with(format!(
+                "drives said nothing for {} s: it is stopped or hangs",
+                DRIVES_PATIENCE.as_secs()
+            ));
+        }
     }
 
     /// The fault that the controller or drives holds.
@@ -296,7 +326,7 @@ impl<'a> JobRun<'a> {
     /// A service has ended by itself: says so at once, and what is done about it.
     fn note_ended(&mut self, ended: &Ended) {
         let consequence = match (ended.role, self.stage) {
-            (Role::Monitor, _) => ": the marks go on unharmed",
+            (Role::Monitor, _) => "; the job goes on without harm",
             (_, Stage::Starting(_)) => " while starting",
             (Role::Planner, _) => {
                 ": laser off, the controller brings the axes to rest along the path"

@@ -290,7 +290,8 @@ impl Pipeline {
         }
     }
 
-    /// Ends in order: laser, axes, processes.
+    /// Ends in order: laser, axes, processes. The same as dropping it, named so that the order is
+    /// seen.
     pub fn shut_down(self) {
         drop(self);
     }
@@ -302,9 +303,12 @@ impl Pipeline {
             return;
         }
         // Without an answer the controller hangs, and drives stops alone.
-        let _ = self.link.request_within(OperatorVerb::Stop, 0.0, LAST_ANSWER);
+        let _ = self.request(OperatorVerb::Stop, 0.0, LAST_ANSWER);
+        // What was heard before may be older than the last thing that was asked.
+        std::thread::sleep(LOOK);
+        let _ = self.look();
         self.wait(|heard| !is_moving(heard) || stopped_alone(heard));
-        let _ = self.link.request_within(OperatorVerb::Disable, 0.0, LAST_ANSWER);
+        let _ = self.request(OperatorVerb::Disable, 0.0, LAST_ANSWER);
         self.wait(is_dark_and_at_rest);
     }
 

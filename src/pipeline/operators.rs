@@ -199,7 +199,7 @@ impl Operators {
                 Request::Status => json!(answers.board.read()),
                 Request::Withdraw { job } => {
                     answers.control.withdraw(job);
-                    json!(VerbReply::accepted("preparing"))
+                    json!({})
                 }
                 Request::Verb { verb, value } => answers.carry_out(verb, value),
             }

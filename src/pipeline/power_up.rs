@@ -12,6 +12,9 @@ const START_PATIENCE: Duration = Duration::from_secs(30);
 /// How long the controller may take to power the motors, or to end what it does.
 const POWER_PATIENCE: Duration = Duration::from_secs(10);
 
+/// How long the controller may take to answer.
+const ANSWER_PATIENCE: Duration = Duration::from_millis(250);
+
 /// Why the motors are not powered.
 #[derive(Debug, thiserror::Error)]
 pub enum NotReady {
@@ -63,8 +66,8 @@ impl PowerUp {
     /// A service that stays silent, a fault, or a controller that does not become ready.
     pub fn advance(&mut self, pipeline: &Pipeline) -> Result<bool, NotReady> {
         match self.step {
-            // A controller that powers the motors sooner meets drives that know nobody yet, and
-            // they stop for good.
+            // Not before all have spoken: drives that do not know their peers yet would take them
+            // for lost, and stay stopped.
             Step::Services => match silent(pipeline) {
                 None => {
                     pipeline.allocate()?;
@@ -81,12 +84,13 @@ impl PowerUp {
                 match state {
                     ControllerState::Idle => return Ok(true),
                     ControllerState::Faulted => return Err(NotReady::Faulted(progress.fault)),
-                    ControllerState::Disabled if !asked => {
-                        let asked = pipeline.ask(OperatorVerb::Enable, 0.0);
-                        self.step = Step::Motors { asked };
-                    }
                     _ if self.since.elapsed() > POWER_PATIENCE => {
                         return Err(NotReady::Busy(state));
+                    }
+                    ControllerState::Disabled if !asked => {
+                        let answer = pipeline.request(OperatorVerb::Enable, 0.0, ANSWER_PATIENCE);
+                        let asked = answer.is_ok_and(|reply| reply.accepted == 1);
+                        self.step = Step::Motors { asked };
                     }
                     _ => {}
                 }

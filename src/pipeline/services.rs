@@ -19,7 +19,7 @@ const STOPPING: [Role; 4] = [Role::Planner, Role::Controller, Role::Drives, Role
 /// How long a service may take to end after it was told to.
 const END_PATIENCE: Duration = Duration::from_secs(5);
 
-/// How long one that was stopped from outside may take.
+/// How long one that somebody has stopped is waited for: it hears nothing.
 const STOPPED_PATIENCE: Duration = Duration::from_millis(100);
 
 /// This program as the kernel has it open. Its path may lead to another build by now, or nowhere.

@@ -26,7 +26,7 @@ impl Controller {
             // Drives may not have found all peers yet.
             State::Idle if feedback.has(status::GATE_INHIBITED) => {}
             State::Idle if self.intake.is_ready() => self.begin(now, feedback.cycle),
-            State::Running if self.is_over() && self.player.is_at_rest() => {
+            State::Running if self.is_over() && self.stands_on_plan() => {
                 self.finish(true);
                 self.state = State::Idle;
             }
@@ -39,13 +39,13 @@ impl Controller {
             State::Holding(AfterRest::Supply { waited }) if self.player.is_at_rest() => {
                 self.await_supply(now, waited);
             }
-            State::Stopping if self.player.is_at_rest() && self.alignment.is_done() => {
+            State::Stopping if self.stands_on_plan() && self.alignment.is_done() => {
                 self.finish(false);
                 self.state = State::Idle;
             }
             State::Failing { tracking, waited } => {
                 let at_rest = match tracking {
-                    Tracking::Sound => self.player.is_at_rest() && self.alignment.is_done(),
+                    Tracking::Sound => self.stands_on_plan() && self.alignment.is_done(),
                     Tracking::Lost => self.supervision.standing() >= STANDING,
                 };
                 self.state = State::Failing { tracking, waited: waited + 1 };
@@ -134,6 +134,11 @@ impl Controller {
         self.intake.finish();
         self.player.rewind();
         self.ended = Some(self.statistics.finish(completed, self.fault));
+    }
+
+    /// Whether the stream rests, and what a stall left is made up for: what followed would jump by it.
+    fn stands_on_plan(&self) -> bool {
+        self.player.is_at_rest() && self.catch_up.is_done()
     }
 
     /// Whether the stream in hand has been played to its last setpoint, no light being owed.

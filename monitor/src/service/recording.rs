@@ -143,6 +143,9 @@ impl Recording {
         if self.stage.continuity().gaps > self.gaps_noted {
             // A successor must know of it.
             self.gaps_noted = self.stage.continuity().gaps;
+            // The records first: a successor counts what follows the last one.
+            let flushed = self.writer.flush();
+            flushed.map_err(|source| self.refused(run_folder::SAMPLES, source))?;
             self.note(Progress::Open, "").write(&self.folder)?;
         }
         Ok(())
