@@ -3,7 +3,7 @@
 //! *Possible* is wide: beyond it no machine is, and arithmetic may fail, so it is an error. *Usual* is
 //! what machines for laser marking, engraving and light cutting are built of; beyond it a value is
 //! likely a slip of unit or of a digit, and is warned of. What only shows between two values stands in
-//! [`super::relations`].
+//! `file/relations.rs`.
 //!
 //! `docs/machine-files.md` prints this table; a test keeps both the same.
 
