@@ -276,3 +276,34 @@ fn a_stepper_comes_back_from_a_stall_without_a_step() {
         assert!((stands - 0.06).abs() < 1e-9, "{stands}");
     }
 }
+
+#[test]
+fn a_stream_that_a_stall_met_at_its_end_is_over_when_its_steppers_stand_on_it() {
+    let machine = machine();
+    let mut setpoints = setpoints(&machine);
+    // The move out alone.
+    setpoints.truncate(setpoints.len() / 2 + 1);
+    let last = setpoints.last_mut().unwrap();
+    last.flags = flags::LAST;
+    for before_the_end in [45, 30, 20] {
+        let mut drivers = Drivers::new(&machine);
+        for _ in 0..3 {
+            drivers.cycle(&[], None);
+        }
+        drivers.cycle(&[], Some(OperatorVerb::Enable));
+        drivers.until(&[], ControllerState::Idle);
+        drivers.cycle(&setpoints, Some(OperatorVerb::Start));
+        drivers.until(&setpoints, ControllerState::Running);
+        for _ in 0..setpoints.len() - before_the_end {
+            drivers.cycle(&setpoints, None);
+        }
+        drivers.stall(9);
+        drivers.until(&setpoints, ControllerState::Idle);
+        for _ in 0..100 {
+            drivers.cycle(&setpoints, None);
+            assert_eq!(drivers.newest.1, [0.0; MAX_AXES], "{before_the_end}");
+        }
+        let stands = drivers.told.last().unwrap()[0] - machine.home[0];
+        assert!((stands - 0.06).abs() < 1e-9, "{stands} at {before_the_end}");
+    }
+}
