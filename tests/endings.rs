@@ -221,6 +221,37 @@ fn a_controller_that_hangs_for_good_is_a_fault_of_drives() {
 }
 
 #[test]
+fn a_controller_that_hangs_before_the_motors_are_powered_ends_the_job() {
+    let place = Place::new();
+    let name = place.instance().name().to_owned();
+    let mut domain = place.start(&["domain", "--no-realtime", "--instance", &name]);
+    place.await_status(&mut domain, "domain", |_| true);
+    let roles = ["planner", "controller", "drives"];
+    let started = roles.map(|role| place.start(&[role, "--instance", &name]));
+    let status = place.await_status(&mut domain, "services", |status| {
+        roles.iter().all(|role| status["services"][role].is_number())
+            && status["cycles"].as_u64() > Some(0)
+    });
+    let controller = service(&status, "controller");
+    controller.signal(STOP).unwrap();
+    let job = place.file("job.ngc", &lines(1));
+    let out = place.path("run");
+    let arguments = ["submit", job.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()];
+    let summary = place.ask(&arguments).json(4);
+    assert_eq!(summary["outcome"], "aborted", "{summary:#}");
+    let message = summary["error"]["message"].as_str().unwrap();
+    assert!(message.contains("controller did not"), "{message}");
+    controller.signal(CONTINUE).unwrap();
+    domain.signal(TERMINATE);
+    assert_eq!(domain.wait().code, Some(0));
+    for process in started {
+        process.signal(TERMINATE);
+        process.wait();
+    }
+    place.assert_nothing_left(&[]);
+}
+
+#[test]
 fn a_planner_that_dies_while_it_plans_aborts_the_job() {
     let place = Place::new();
     let mut running = start(&place, SLOW, &[]);

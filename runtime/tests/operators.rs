@@ -99,3 +99,23 @@ fn an_ended_pipeline_ends_its_operators() {
         Err(SocketError::NotRunning { .. })
     ));
 }
+
+#[test]
+fn a_client_that_reads_nothing_does_not_keep_the_holder_from_its_end() {
+    let scratch = Scratch::new();
+    let holder = Domain::create(scratch.instance()).unwrap();
+    let (told, ended) = std::sync::mpsc::channel();
+    let server = OperatorServer::bind(&holder, move |_, conversation: &mut Conversation<'_>| {
+        let part = json!("a".repeat(100_000));
+        while conversation.tell(&part).is_ok() {}
+        let _ = told.send(());
+        Value::Null
+    })
+    .unwrap();
+    let mut client = UnixStream::connect(scratch.instance().socket_path()).unwrap();
+    client.write_all(b"\"follow\"\n").unwrap();
+    // Whatever it has to say has filled all buffers by then.
+    ended.recv_timeout(Duration::from_secs(60)).unwrap();
+    drop(server);
+    drop(client);
+}

@@ -42,6 +42,10 @@ fn signalled_process() {
                 own.signal(number).unwrap();
                 assert_eq!(told(count), Termination { signal: number, count });
             }
+            // A terminal that closes sends it once more: that is no haste.
+            own.signal(libc::SIGHUP).unwrap();
+            own.signal(libc::SIGTERM).unwrap();
+            assert_eq!(told(4), Termination { signal: libc::SIGTERM, count: 4 });
         }
         "nohup" => {
             signal::install().unwrap();
