@@ -50,7 +50,7 @@ impl CatchUp {
         Self { offset, slope, left: if aligned { 0 } else { CYCLES } }
     }
 
-    /// Cycles until the axes of `machine` are back on the plan but for `ON_PLAN`; 0 where they are.
+    /// Cycles until the axes of `machine` are back on the plan but for micrometres; 0 where they are.
     pub fn settling(&self, machine: &Machine) -> u64 {
         let axes = machine.axes.iter().zip(self.offset.iter().zip(&self.slope)).take(MAX_AXES);
         let settling = axes.map(|(axis, (offset, slope))| {

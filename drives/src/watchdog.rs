@@ -118,7 +118,7 @@ impl Watchdog {
     }
 
     /// `cycles` were skipped before the one that begins `now`, which will lack a fresh command too:
-    /// gives what was in force in each of them, in order, to `passed`. Beyond `MOST_PASSED` they are
+    /// gives what was in force in each of them, in order, to `passed`. Beyond a second they are
     /// only counted.
     pub fn skip(&mut self, cycles: u64, now: Nanoseconds, mut passed: impl FnMut(&Actuation)) {
         let lacking = self.misses.saturating_add(cycles).saturating_add(1);
