@@ -95,12 +95,14 @@ fn a_second_signal_waits_for_nothing_that_hangs() {
     let mut running = start(&place, &lines(4), &[]);
     let status = place.await_played(&mut running, 400);
     let all = services(&status);
-    service(&status, "monitor").signal(STOP).unwrap();
+    let monitor = service(&status, "monitor");
+    monitor.signal(STOP).unwrap();
     running.signal(INTERRUPT);
     place.await_status(&mut running, "coming to rest", |status| status["state"] != "running");
     running.signal(INTERRUPT);
     let summary = running.wait().json(1);
     assert_eq!(summary["outcome"], "stopped");
+    monitor.signal(CONTINUE).unwrap();
     place.assert_nothing_left(&all);
 }
 
@@ -214,9 +216,14 @@ fn a_controller_that_hangs_for_good_is_a_fault_of_drives() {
     let mut running = start(&place, &lines(4), &[]);
     let status = place.await_played(&mut running, 400);
     let all = services(&status);
-    service(&status, "controller").signal(STOP).unwrap();
-    let summary = assert_ended(&place, &running.wait(), 3, "faulted");
+    let controller = service(&status, "controller");
+    controller.signal(STOP).unwrap();
+    let ended = running.wait();
+    let summary = assert_ended(&place, &ended, 3, "faulted");
     assert_eq!(summary["fault"]["code"], "stale_command", "{summary:#}");
+    // Whoever stopped it may have reasons; the next start would name it.
+    assert!(ended.error.contains("keeps the instance until it is continued"), "{}", ended.error);
+    controller.signal(CONTINUE).unwrap();
     place.assert_nothing_left(&all);
 }
 

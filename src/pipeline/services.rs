@@ -136,8 +136,8 @@ impl Services {
             .collect()
     }
 
-    /// Tells all to end, one after the other, and makes sure that they do: a service that does not
-    /// even then, because it is stopped or hangs, is killed. The axes must be at rest.
+    /// Tells all to end, one after the other, and makes sure that they do: a service that hangs is
+    /// killed; one that somebody has stopped is left alone. The axes must be at rest.
     pub fn stop(&mut self) {
         for role in STOPPING {
             let Some(service) = self.services.iter_mut().find(|service| service.role == role)
@@ -147,23 +147,41 @@ impl Services {
             let Some(mut child) = service.child.take() else { continue };
             // A child that is gone can be told nothing, and that is no harm.
             let _ = child.terminate();
-            if !has_ended(&mut child) {
-                let _ = child.kill();
-                let _ = child.wait_within(END_PATIENCE);
+            match await_end(&mut child) {
+                End::Came => {}
+                // It ends by itself as soon as it is continued, and removes what is left then.
+                End::Stopped => message::tell(&format!(
+                    "{role} (pid {pid}) was stopped by somebody, and keeps the instance until it is \
+                     continued (`kill -CONT {pid}`) or killed",
+                    pid = child.pid()
+                )),
+                End::Missing => {
+                    let _ = child.kill();
+                    let _ = child.wait_within(END_PATIENCE);
+                }
             }
         }
     }
 }
 
-/// Waits for the end of a child that was told to end. One that somebody has stopped hears nothing,
-/// and is not waited for long.
-fn has_ended(child: &mut ChildProcess) -> bool {
+/// What became of a child that was told to end.
+enum End {
+    Came,
+    /// Somebody has stopped it, by SIGSTOP or a debugger: it hears nothing.
+    Stopped,
+    /// It runs and does not end.
+    Missing,
+}
+
+/// Waits for the end of a child that was told to end; for one that somebody has stopped, not long.
+fn await_end(child: &mut ChildProcess) -> End {
     let told = Instant::now();
     loop {
         match child.wait_within(STOPPED_PATIENCE) {
-            Ok(Some(_)) => return true,
-            Ok(None) if !child.is_stopped() && told.elapsed() < END_PATIENCE => {}
-            _ => return false,
+            Ok(Some(_)) => return End::Came,
+            Ok(None) if child.is_stopped() => return End::Stopped,
+            Ok(None) if told.elapsed() < END_PATIENCE => {}
+            _ => return End::Missing,
         }
     }
 }
