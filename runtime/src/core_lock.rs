@@ -154,13 +154,22 @@ mod tests {
         format!("graver/test-core/{test}/{}", std::process::id())
     }
 
+    /// Asserts that the name is free, but for the instant in which a child of another test, between
+    /// fork and exec, has what was closed.
+    fn assert_free(name: &str) {
+        let started = std::time::Instant::now();
+        while CoreLock::claim_named(NOWHERE, name).unwrap().squatter().is_some() {
+            assert!(started.elapsed() < Duration::from_secs(30), "{name} stays taken");
+        }
+    }
+
     #[test]
     fn a_core_is_claimed_and_given_free() {
         let name = name("free");
         let claim = CoreLock::claim_named(NOWHERE, &name).unwrap();
         assert_eq!((claim.core(), claim.squatter()), (NOWHERE, None));
         drop(claim);
-        assert_eq!(CoreLock::claim_named(NOWHERE, &name).unwrap().squatter(), None);
+        assert_free(&name);
     }
 
     #[test]
@@ -175,7 +184,7 @@ mod tests {
         drop(first);
         assert_eq!(CoreLock::claim_named(NOWHERE, &name).unwrap().squatter(), Some(own));
         drop(second);
-        assert_eq!(CoreLock::claim_named(NOWHERE, &name).unwrap().squatter(), None);
+        assert_free(&name);
     }
 
     #[test]
