@@ -105,6 +105,19 @@ impl Drivers {
         }
     }
 
+    /// Enabled, and playing `setpoints`.
+    fn running(machine: &Machine, setpoints: &[Setpoint]) -> Self {
+        let mut drivers = Self::new(machine);
+        for _ in 0..3 {
+            drivers.cycle(&[], None);
+        }
+        drivers.cycle(&[], Some(OperatorVerb::Enable));
+        drivers.until(&[], ControllerState::Idle);
+        drivers.cycle(setpoints, Some(OperatorVerb::Start));
+        drivers.until(setpoints, ControllerState::Running);
+        drivers
+    }
+
     fn cycle(&mut self, setpoints: &[Setpoint], verb: Option<OperatorVerb>) {
         self.feedback.cycle = self.feedback.cycle.next();
         self.feedback.deadline = self.feedback.deadline + CYCLE_PERIOD;
@@ -199,14 +212,7 @@ impl Drivers {
 fn a_loaded_steppers_position_has_no_step() {
     let machine = machine();
     let setpoints = setpoints(&machine);
-    let mut drivers = Drivers::new(&machine);
-    for _ in 0..3 {
-        drivers.cycle(&[], None);
-    }
-    drivers.cycle(&[], Some(OperatorVerb::Enable));
-    drivers.until(&[], ControllerState::Idle);
-    drivers.cycle(&setpoints, Some(OperatorVerb::Start));
-    drivers.until(&setpoints, ControllerState::Running);
+    let mut drivers = Drivers::running(&machine, &setpoints);
     for _ in 0..100 {
         drivers.cycle(&setpoints, None);
     }
@@ -246,14 +252,7 @@ fn a_stepper_comes_back_from_a_stall_without_a_step() {
     let setpoints = setpoints(&machine);
     // While it speeds up, cruises, and slows down.
     for moment in [30, 150, 290] {
-        let mut drivers = Drivers::new(&machine);
-        for _ in 0..3 {
-            drivers.cycle(&[], None);
-        }
-        drivers.cycle(&[], Some(OperatorVerb::Enable));
-        drivers.until(&[], ControllerState::Idle);
-        drivers.cycle(&setpoints, Some(OperatorVerb::Start));
-        drivers.until(&setpoints, ControllerState::Running);
+        let mut drivers = Drivers::running(&machine, &setpoints);
         for _ in 0..moment {
             drivers.cycle(&setpoints, None);
         }
@@ -286,14 +285,7 @@ fn a_stream_that_a_stall_met_at_its_end_is_over_when_its_steppers_stand_on_it() 
     let last = setpoints.last_mut().unwrap();
     last.flags = flags::LAST;
     for before_the_end in [45, 30, 20] {
-        let mut drivers = Drivers::new(&machine);
-        for _ in 0..3 {
-            drivers.cycle(&[], None);
-        }
-        drivers.cycle(&[], Some(OperatorVerb::Enable));
-        drivers.until(&[], ControllerState::Idle);
-        drivers.cycle(&setpoints, Some(OperatorVerb::Start));
-        drivers.until(&setpoints, ControllerState::Running);
+        let mut drivers = Drivers::running(&machine, &setpoints);
         for _ in 0..setpoints.len() - before_the_end {
             drivers.cycle(&setpoints, None);
         }
