@@ -70,6 +70,20 @@ pub enum Action {
     },
     /// Wait, at rest and in the dark, for a person to resume.
     Pause,
+    /// How corners are passed from here on.
+    Corners(Corners),
+}
+
+/// How the corners of a path are passed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Corners {
+    /// As the machine file says, within its tolerance.
+    AsMachine,
+    /// At rest, exactly.
+    Exact,
+    /// On the way, rounded within this distance of the drawn line; `None` for the machine's
+    /// tolerance [m].
+    Blend(Option<f64>),
 }
 
 /// Laser power along a mark.

@@ -192,6 +192,7 @@ pub(crate) fn itinerary(
             Action::Dwell { time, .. } => Item::Rest(*time),
             Action::Output { bit, on } => Item::Output { bit: *bit, on: *on },
             Action::Pause => Item::Pause,
+            Action::Corners(_) => continue,
         };
         stops.push(Stop { item, line });
     }

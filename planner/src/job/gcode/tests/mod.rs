@@ -55,7 +55,7 @@ fn check_sound(program: &Program, input: &str) {
                 assert!(time > 0.0, "{step:?}\n{input}");
                 continue;
             }
-            Action::Output { .. } | Action::Pause => continue,
+            Action::Output { .. } | Action::Pause | Action::Corners(_) => continue,
         };
         if let Curve::Arc { centre, major, .. } = curve {
             largest = centre.iter().chain(&major).fold(largest, furthest);
