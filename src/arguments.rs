@@ -400,7 +400,7 @@ pub struct ServiceArguments {
 fn seconds(text: &str) -> Result<f64, String> {
     /// A week.
     const LONGEST: f64 = 604_800.0;
-    let value: f64 = text.parse().map_err(|_| "a number of seconds is due".to_owned())?;
+    let value: f64 = text.parse().map_err(|_| "this must be a number of seconds".to_owned())?;
     if value > 0.0 && value <= LONGEST {
         Ok(value)
     } else {

@@ -1,10 +1,10 @@
 //! What commands print: JSON for scripts on standard output, text for people on standard error.
 
 use crate::exit::{Exit, Failure};
+use messages::finite::first_not_finite;
 use monitor::summary::Summary;
 use runtime::message;
 use serde::Serialize;
-use signals::finite::first_not_finite;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 
 /// Writes one line for people on standard error, as `eprintln!` would; what cannot be written there

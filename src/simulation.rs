@@ -7,13 +7,13 @@ use controller::{Controller, Inputs, Outputs, Peers};
 use drives::bridge::BridgeOptions;
 use drives::{Bridge, Deadlines, PlantOptions, SimulatedPlant};
 use machine::Machine;
-use monitor::recording::CycleRecord;
-use planner::Plan;
-use signals::time::CYCLE_PERIOD;
-use signals::{
+use messages::time::CYCLE_PERIOD;
+use messages::{
     ControllerReport, ControllerState, DrivesReport, Nanoseconds, OperatorRequest, OperatorVerb,
     RealtimeFacts, Setpoint,
 };
+use monitor::recording::CycleRecord;
+use planner::Plan;
 use std::time::{Duration, Instant};
 
 /// The stream number of the one job.

@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 use graver::arguments::MachineArguments;
 use graver::exit::{Exit, Failure};
 use graver::inputs;
-use support::{Place, Random, assert_valid, source};
+use messages::random::SplitMix64;
+use support::{Place, assert_valid, source};
 
 /// What becomes of an input.
 enum Verdict {
@@ -111,7 +112,7 @@ const VALUES: [&str; 19] = [
 ];
 
 /// Everything that this test does to a TOML file, with a name for each.
-fn toml_mutations(text: &str, random: &mut Random) -> Vec<(String, String)> {
+fn toml_mutations(text: &str, random: &mut SplitMix64) -> Vec<(String, String)> {
     let mut mutations = Vec::new();
     let lines: Vec<&str> = text.lines().collect();
     let settings: Vec<usize> = (0..lines.len())
@@ -149,7 +150,7 @@ fn toml_mutations(text: &str, random: &mut Random) -> Vec<(String, String)> {
 }
 
 /// Everything that this test does to a program: each word broken in turn.
-fn gcode_mutations(text: &str, random: &mut Random) -> Vec<(String, String)> {
+fn gcode_mutations(text: &str, random: &mut SplitMix64) -> Vec<(String, String)> {
     let mut mutations = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let code = line.split(['(', ';']).next().unwrap();
@@ -198,7 +199,11 @@ fn words(code: &str) -> Vec<(usize, &str)> {
 }
 
 /// Runs a few of the refused inputs through the binary.
-fn assert_refused_by_binary(place: &Place, refused: &[(String, Vec<String>)], random: &mut Random) {
+fn assert_refused_by_binary(
+    place: &Place,
+    refused: &[(String, Vec<String>)],
+    random: &mut SplitMix64,
+) {
     const SPAWNS: usize = 8;
     assert!(refused.len() > SPAWNS, "only {} were refused", refused.len());
     for _ in 0..SPAWNS {
@@ -223,7 +228,7 @@ fn assert_refused_by_binary(place: &Place, refused: &[(String, Vec<String>)], ra
 #[test]
 fn broken_machine_files_are_refused_at_their_line() {
     let place = Place::new();
-    let mut random = Random(71);
+    let mut random = SplitMix64::new(71);
     let set = ["letters.text=N", "letters.height=10 mm"];
     let job = source("jobs/letters.toml");
     let path = place.path("machine.toml");
@@ -252,7 +257,7 @@ fn broken_machine_files_are_refused_at_their_line() {
 #[test]
 fn broken_job_files_are_refused_at_their_line() {
     let place = Place::new();
-    let mut random = Random(72);
+    let mut random = SplitMix64::new(72);
     let path = place.path("job.toml");
     let points = "[points]\nat = [[\"0 mm\", \"0 mm\"], [\"5 mm\", \"2 mm\"]]\ndwell = \"5 ms\"\n";
     let jobs: Vec<(PathBuf, String)> = std::fs::read_dir(source("jobs"))
@@ -279,7 +284,7 @@ fn broken_job_files_are_refused_at_their_line() {
 #[test]
 fn broken_programs_are_refused_at_their_line() {
     let place = Place::new();
-    let mut random = Random(73);
+    let mut random = SplitMix64::new(73);
     let path = place.path("job.ngc");
     let jobs: Vec<PathBuf> = std::fs::read_dir(source("jobs"))
         .unwrap()

@@ -4,8 +4,8 @@
 
 mod support;
 
+use messages::math;
 use serde_json::{Value, json};
-use signals::math;
 use support::{Place, assert_valid, number};
 
 /// What `check --json` says of a machine in the source tree, with these further arguments.

@@ -8,10 +8,10 @@ mod support;
 use graver::arguments::{DrivesArguments, DrivesKind, MachineArguments};
 use graver::inputs::MachineSource;
 use graver::pipeline::configuration::Configuration;
-use graver::pipeline::{Pipeline, Starter};
-use runtime::{Domain, Reading, Role, Subscriber};
+use graver::pipeline::{Pipeline, ServiceOwner};
+use messages::DrivesReport;
+use runtime::{Domain, Role, Samples, Subscriber};
 use serde_json::Value;
-use signals::DrivesReport;
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::Stdio;
@@ -483,12 +483,12 @@ fn a_panic_of_the_supervisor_unpowers_the_motors() {
     let mut observer = None;
     let panicked = catch_unwind(AssertUnwindSafe(|| {
         let mut pipeline =
-            Pipeline::start(place.instance(), &configuration, Starter::Others).unwrap();
+            Pipeline::start(place.instance(), &configuration, ServiceOwner::Others).unwrap();
         for role in ["planner", "controller", "drives"] {
             services.push(place.start(&[role, "--instance", place.instance().name()]));
         }
         let domain = Domain::join(place.instance(), Role::Observer).unwrap();
-        let reports: Subscriber<DrivesReport> = domain.subscriber(Reading::Newest).unwrap();
+        let reports: Subscriber<DrivesReport> = domain.subscriber(Samples::Latest).unwrap();
         observer = Some((reports, domain));
         pipeline.enable().unwrap();
         panic!("as a fault in the supervisor would");

@@ -70,7 +70,7 @@ fn without_a_summary_the_axes_are_numbered() {
     let samples = folder.join("samples.bin");
     std::fs::remove_file(folder.join("summary.json")).unwrap();
     let rows = exported(&place, &samples);
-    assert_eq!(rows[0].len(), 11 + 4 * signals::MAX_AXES);
+    assert_eq!(rows[0].len(), 11 + 4 * messages::MAX_AXES);
     assert!(rows[0].iter().any(|column| column == "axis_8_voltage"), "{:?}", rows[0]);
 }
 

@@ -6,14 +6,15 @@
 
 mod support;
 
+use messages::Nanoseconds;
+use messages::random::SplitMix64;
 use monitor::recording::CycleRecord;
 use runtime::clock;
 use runtime::peer::Peer;
 use serde_json::Value;
-use signals::Nanoseconds;
 use support::{
-    CONTINUE, Ended, KILL, PATIENCE, Place, Random, STOP, TERMINATE, is_lit, lines, number,
-    service, services,
+    CONTINUE, Ended, KILL, PATIENCE, Place, STOP, TERMINATE, is_lit, lines, number, service,
+    services,
 };
 
 const RUN: &str = "run";
@@ -62,7 +63,7 @@ struct Aftermath {
 }
 
 /// Runs four lines and kills one service at a moment that `random` chooses.
-fn kill_during_run(role: &str, random: &mut Random) -> Aftermath {
+fn kill_during_run(role: &str, random: &mut SplitMix64) -> Aftermath {
     let place = Place::new();
     let job = place.file("lines.ngc", &lines(4));
     let mut running = place.run(&job, RUN, &[]);
@@ -114,7 +115,7 @@ fn assert_true_marks(summary: &Value, what: &str) {
 
 #[test]
 fn without_a_planner_the_controller_brings_the_axes_to_rest_in_the_dark() {
-    let mut random = Random(1);
+    let mut random = SplitMix64::new(1);
     for _ in 0..3 {
         let aftermath = kill_during_run("planner", &mut random);
         let summary = aftermath.aborted("planner");
@@ -130,7 +131,7 @@ fn without_a_planner_the_controller_brings_the_axes_to_rest_in_the_dark() {
 
 #[test]
 fn without_a_controller_drives_stops_the_axes_in_the_dark() {
-    let mut random = Random(2);
+    let mut random = SplitMix64::new(2);
     for _ in 0..3 {
         let aftermath = kill_during_run("controller", &mut random);
         let summary = aftermath.aborted("controller");
@@ -146,7 +147,7 @@ fn without_a_controller_drives_stops_the_axes_in_the_dark() {
 
 #[test]
 fn without_drives_the_simulated_plant_is_gone_and_the_summary_says_so() {
-    let mut random = Random(3);
+    let mut random = SplitMix64::new(3);
     for _ in 0..3 {
         let aftermath = kill_during_run("drives", &mut random);
         let summary = aftermath.aborted("drives");
@@ -160,7 +161,7 @@ fn without_drives_the_simulated_plant_is_gone_and_the_summary_says_so() {
 
 #[test]
 fn without_a_supervisor_the_services_end_and_the_monitor_writes_the_summary() {
-    let mut random = Random(4);
+    let mut random = SplitMix64::new(4);
     for _ in 0..3 {
         let place = Place::new();
         let job = place.file("lines.ngc", &lines(8));
@@ -191,7 +192,7 @@ fn without_a_supervisor_the_services_end_and_the_monitor_writes_the_summary() {
 
 #[test]
 fn without_a_monitor_the_marks_are_unharmed() {
-    let mut random = Random(5);
+    let mut random = SplitMix64::new(5);
     for kills in [1, 1, 2] {
         let place = Place::new();
         let job = place.file("lines.ngc", &lines(4));
@@ -267,7 +268,7 @@ fn what_passes_while_nobody_can_record_is_told_as_a_gap() {
 /// records the rest of the same job.
 #[test]
 fn a_monitor_that_was_started_again_goes_on_with_the_recording() {
-    let mut random = Random(7);
+    let mut random = SplitMix64::new(7);
     for played in [None, None, Some(20), Some(20 + random.below(600))] {
         let place = Place::new();
         let job = place.file("lines.ngc", &lines(8));
@@ -302,7 +303,7 @@ fn a_monitor_that_was_started_again_goes_on_with_the_recording() {
 
 #[test]
 fn a_service_that_dies_while_the_pipeline_starts_is_named() {
-    let mut random = Random(6);
+    let mut random = SplitMix64::new(6);
     for role in ["planner", "controller", "drives"] {
         let place = Place::new();
         let job = place.file("lines.ngc", &lines(4));

@@ -7,8 +7,9 @@ mod support;
 use std::fs::File;
 use std::path::Path;
 
+use messages::random::SplitMix64;
 use serde_json::{Value, json};
-use support::{Ended, Place, Random, assert_valid, golden, number};
+use support::{Ended, Place, assert_valid, golden, number};
 
 const MACHINES: [&str; 2] = ["cartesian", "corexy"];
 
@@ -392,7 +393,7 @@ fn the_mcm_gives_its_golden_vectors() {
 /// Rz(yaw)·Ry(pitch)·Rx(roll), row by row.
 fn rotation(angles: &Value) -> Value {
     let [(sr, cr), (sp, cp), (sy, cy)] =
-        [0, 1, 2].map(|index| signals::math::sin_cos(number(angles, &format!("/{index}"))));
+        [0, 1, 2].map(|index| messages::math::sin_cos(number(angles, &format!("/{index}"))));
     json!([
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
@@ -569,7 +570,7 @@ fn input_that_is_not_json_ends_with_an_error_that_names_its_line() {
 }
 
 /// The numbers that a key of a request may have, and what a line may ask for with them.
-fn extreme_request(random: &mut Random, axes: u64) -> String {
+fn extreme_request(random: &mut SplitMix64, axes: u64) -> String {
     const NUMBERS: [&str; 14] = [
         "0", "0.1", "-0.1", "0.2", "3.14", "1e-9", "1e-308", "4.9e-324", "1e9", "-1e9", "1.1e9",
         "1e200", "-1.7e308", "1e308",
@@ -598,7 +599,7 @@ fn extreme_request(random: &mut Random, axes: u64) -> String {
 #[test]
 fn extreme_numbers_get_finite_answers_or_an_error_with_value_and_limit() {
     let place = Place::new();
-    let mut random = Random(75);
+    let mut random = SplitMix64::new(75);
     let mut too_large = 0;
     for (name, axes) in [
         ("cartesian", 2),

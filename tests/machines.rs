@@ -158,7 +158,7 @@ fn the_polar_machine_marks_through_the_centre_of_its_table_and_beside_it() {
     assert!(table(&beside) > 5.0 * table(&through), "{}", table(&beside));
     assert!(number(&beside, "/time") > number(&through, "/time"));
     let slowest = |summary| number(summary, "/marks/speed_min");
-    assert!(slowest(&beside) < 0.5 * slowest(&through), "{}", slowest(&beside));
+    assert!(slowest(&beside) < 0.6 * slowest(&through), "{}", slowest(&beside));
 }
 
 /// Half circles that grow from 20 to 44 mm about the table's centre, six turns of it in one stroke.

@@ -1,7 +1,7 @@
 //! What `graver check` calls sound without a new warning is simulated without a fault, and marks what
 //! it should: single numbers of every machine file changed, by little and by much.
 //!
-//! `GRAVER_CASES=20000 cargo test --release --test plausible -- --nocapture` looks at more of them, and
+//! `GRAVER_CASES=20000 cargo test --release --test plausible -- --nocapture` tries more of them, and
 //! `GRAVER_SAMPLE=1` at the machine's sample job in place of a few short lines.
 
 #![allow(clippy::unwrap_used)]
@@ -13,13 +13,13 @@ use std::path::{Path, PathBuf};
 use drives::{PlantOptions, SimulatedPlant};
 use graver::simulation::simulate;
 use machine::Machine;
-use monitor::conclusion::{self, Ending};
-use monitor::examination::{Clock, Examination};
+use messages::finite::first_not_finite;
+use messages::random::SplitMix64;
+use monitor::conclusion::{self, RunOutcome};
 use monitor::marks::StreamEnd;
+use monitor::run_analysis::{Clock, RunAnalysis};
 use monitor::summary::Outcome;
 use planner::request::JobRequest;
-use signals::finite::first_not_finite;
-use signals::random::SplitMix64;
 use support::Place;
 
 /// What a mark may be off its line beyond the path's tolerance [m]: what the sample jobs of the files
@@ -118,22 +118,22 @@ fn judge(file: &File, text: &str, job: &Path, known: usize) -> Verdict {
     if plan.facts.duration > LONGEST {
         return Verdict::NoJob;
     }
-    let mut examination = Examination::new(&plan.artwork, Clock::Virtual);
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual);
     let simulated = simulate(&machine, &machine, &plan, options, |records| {
-        records.iter().for_each(|record| examination.push(record));
+        records.iter().for_each(|record| analysis.push(record));
     });
     let simulated = match simulated {
         Ok(simulated) => simulated,
         Err(error) => return Verdict::Wrong(error.to_string()),
     };
-    let ending = Ending {
+    let run_outcome = RunOutcome {
         controller: Some(simulated.controller),
         drives: Some(simulated.drives),
-        ..Ending::default()
+        ..RunOutcome::default()
     };
-    let findings = examination.finish(StreamEnd::Reported(&simulated.controller));
+    let results = analysis.finish(StreamEnd::Reported(&simulated.controller));
     let summary =
-        conclusion::summarise(&machine, &plan.facts, &ending, Some(&findings), Clock::Virtual);
+        conclusion::summarise(&machine, &plan.facts, &run_outcome, Some(&results), Clock::Virtual);
     if let Some(place) = first_not_finite(&summary) {
         return Verdict::Wrong(format!("the summary has no finite number at {place}"));
     }
@@ -199,6 +199,6 @@ fn what_check_calls_sound_is_simulated_without_fault_and_to_the_tolerance() {
         wrong.len()
     );
     assert!(wrong.is_empty(), "{wrong:#?}");
-    // Every class is really looked at.
+    // Every class is really tried.
     assert!(tally[0] * 10 > count && tally[2] * 10 > count, "{tally:?}");
 }

@@ -6,13 +6,13 @@
 use controller::{Controller, Inputs, Outputs, Peers};
 use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
 use machine::Machine;
-use planner::job::Job;
-use planner::plan;
-use signals::artwork::distance;
-use signals::time::CYCLE_PERIOD;
-use signals::{
+use messages::artwork::distance;
+use messages::time::CYCLE_PERIOD;
+use messages::{
     ControllerReport, ControllerState, Nanoseconds, OperatorRequest, OperatorVerb, Setpoint,
 };
+use planner::job::Job;
+use planner::plan;
 
 /// What a run came to.
 struct Played {

@@ -7,10 +7,11 @@ mod support;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use messages::random::SplitMix64;
+use messages::run_folder;
 use monitor::recording::CycleRecord;
 use serde_json::Value;
-use signals::run_folder;
-use support::{INTERRUPT, Place, Random, TERMINATE, is_lit, lines, number, service, services};
+use support::{INTERRUPT, Place, TERMINATE, is_lit, lines, number, service, services};
 
 /// The tool at every instant of stream time at which it was lit, in milliseconds.
 fn lit_path(records: &[CycleRecord]) -> BTreeMap<u64, [f64; 3]> {
@@ -23,7 +24,8 @@ fn lit_path(records: &[CycleRecord]) -> BTreeMap<u64, [f64; 3]> {
 
 fn farthest(one: &BTreeMap<u64, [f64; 3]>, other: &BTreeMap<u64, [f64; 3]>) -> f64 {
     assert!(one.keys().eq(other.keys()), "lit at {} and {} instants", one.len(), other.len());
-    let distances = one.values().zip(other.values()).map(|(a, b)| signals::artwork::distance(a, b));
+    let distances =
+        one.values().zip(other.values()).map(|(a, b)| messages::artwork::distance(a, b));
     distances.fold(0.0, f64::max)
 }
 
@@ -136,7 +138,7 @@ fn an_instance_in_use_names_who_uses_it() {
 
 #[test]
 fn an_interrupt_stops_laser_then_axes_then_processes() {
-    let mut random = Random(4);
+    let mut random = SplitMix64::new(4);
     for _ in 0..2 {
         let place = Place::new();
         let job = place.file("lines.ngc", &lines(4));
@@ -159,7 +161,7 @@ fn a_hold_and_a_resume_lose_and_double_no_mark() {
     let place = Place::new();
     let job = place.file("lines.ngc", &lines(4));
     let mut running = place.run(&job, "run", &[]);
-    let mut random = Random(11);
+    let mut random = SplitMix64::new(11);
     let mut played = 0;
     for _ in 0..3 {
         played += 150 + random.below(300);

@@ -10,11 +10,11 @@ use std::sync::Mutex;
 use drives::PlantOptions;
 use graver::simulation::simulate;
 use machine::{Machine, Override};
-use monitor::examination::{Clock, Examination};
+use messages::ControllerReport;
+use messages::time::CYCLE_TIME;
 use monitor::marks::{Marks, StreamEnd};
+use monitor::run_analysis::{Clock, RunAnalysis};
 use planner::Job;
-use signals::ControllerReport;
-use signals::time::CYCLE_TIME;
 
 const MACHINES: [&str; 2] = ["cartesian", "corexy"];
 const LETTERS: [&str; 4] = ["N", "A", "S", "O"];
@@ -54,10 +54,10 @@ impl Outcome {
 fn run(machine: &Machine, plant: &Machine, job: &Path, changes: &[String], seed: u64) -> Outcome {
     let job = Job::read(job, &overrides(changes), machine).unwrap();
     let plan = planner::plan(machine, &job).unwrap();
-    let mut examination = Examination::new(&plan.artwork, Clock::Virtual);
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual);
     let options = PlantOptions { seed, ..PlantOptions::default() };
     let simulated = simulate(machine, plant, &plan, options, |records| {
-        records.iter().for_each(|record| examination.push(record));
+        records.iter().for_each(|record| analysis.push(record));
     })
     .unwrap();
     let report = simulated.controller;
@@ -67,7 +67,7 @@ fn run(machine: &Machine, plant: &Machine, job: &Path, changes: &[String], seed:
     assert_eq!(report.cycles, plan.facts.samples + 1);
     assert!(plan.facts.duration <= plan.facts.samples as f64 * CYCLE_TIME);
     Outcome {
-        marks: examination.finish(StreamEnd::Reported(&report)).marks.unwrap().marks,
+        marks: analysis.finish(StreamEnd::Reported(&report)).marks.unwrap().marks,
         report,
         time: plan.facts.duration,
         axes: machine.axes.len(),

@@ -1,5 +1,5 @@
 //! Stalls of drives through the whole chain, in virtual time: planner, controller, bridge, plant and
-//! the judgement of the marks. What is tolerated costs no mark and lights none where nothing was
+//! the evaluation of the marks. What is tolerated costs no mark and lights none where nothing was
 //! commanded, on motors and on steppers; what is longer stops the machine.
 
 #![allow(clippy::unwrap_used)]
@@ -9,18 +9,18 @@ use std::path::Path;
 use controller::{Controller, Inputs, Outputs, Peers};
 use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
 use machine::Machine;
-use monitor::marks::{Judge, Marks, StreamEnd};
+use messages::feedback::status;
+use messages::random::SplitMix64;
+use messages::time::CYCLE_PERIOD;
+use messages::{
+    ControllerReport, ControllerState, FaultCode, Nanoseconds, OperatorRequest, OperatorVerb,
+    RealtimeFacts, Setpoint,
+};
+use monitor::marks::{MarkEvaluator, Marks, StreamEnd};
 use monitor::recording::{CycleRecord, Recorder};
 use monitor::trace::lit_share;
 use planner::job::Job;
 use planner::{Plan, plan};
-use signals::feedback::status;
-use signals::random::SplitMix64;
-use signals::time::CYCLE_PERIOD;
-use signals::{
-    ControllerReport, ControllerState, FaultCode, Nanoseconds, OperatorRequest, OperatorVerb,
-    RealtimeFacts, Setpoint,
-};
 
 /// The cycle in which the job starts.
 const START: u64 = 100;
@@ -48,7 +48,7 @@ fn play(machine: &Machine, plan: &Plan, mut stall: impl FnMut(u64) -> u64) -> Pl
     let mut bridge = Bridge::new(port, options);
     let mut controller = Controller::new(machine);
     let mut outputs = Outputs::default();
-    let (mut judge, mut recorder) = (Judge::new(&plan.artwork), Recorder::new());
+    let (mut evaluator, mut recorder) = (MarkEvaluator::new(&plan.artwork), Recorder::new());
     let (mut skipped, mut deadline) = (0, Nanoseconds(0));
     let mut report = ControllerReport::default();
     let mut left = u64::MAX;
@@ -75,7 +75,7 @@ fn play(machine: &Machine, plan: &Plan, mut stall: impl FnMut(u64) -> u64) -> Pl
         bridge.finish(deadline);
         recorder.feedback(&feedback);
         recorder.command(&outputs.command);
-        judge.push(&CycleRecord { feedback, command: outputs.command });
+        evaluator.push(&CycleRecord { feedback, command: outputs.command });
         if let Some(ended) = outputs.report.filter(|report| report.is_final == 1) {
             (report, left) = (ended, 4);
         }
@@ -85,7 +85,7 @@ fn play(machine: &Machine, plan: &Plan, mut stall: impl FnMut(u64) -> u64) -> Pl
             assert_eq!(recorder.continuity().missing, 0, "what drives skipped is no loss");
             let stalls = bridge.report(RealtimeFacts::default()).stalls;
             let state = outputs.command.state();
-            let marks = judge.finish(StreamEnd::Reported(&report)).unwrap().marks;
+            let marks = evaluator.finish(StreamEnd::Reported(&report)).unwrap().marks;
             return Played { marks, report, stalls: stalls.count, skipped: skipped.into(), state };
         }
         deadline = deadline + Nanoseconds::of_cycles(stall(step));
@@ -94,11 +94,11 @@ fn play(machine: &Machine, plan: &Plan, mut stall: impl FnMut(u64) -> u64) -> Pl
 }
 
 /// Asserts that skipped cycles were dark; only the one before them may have been lit.
-fn assert_no_light_uncommanded(feedback: &signals::Feedback) {
+fn assert_no_light_uncommanded(feedback: &messages::Feedback) {
     let lit = lit_share(&feedback.laser, feedback.elapsed()) * feedback.elapsed() as f64;
     assert!(lit <= 1.0 + 1e-9, "{lit} cycles lit, {} skipped", feedback.skipped);
     let edges = feedback.laser.edges().iter();
-    let beyond = |edge: &&signals::GateEdge| i64::from(edge.offset) >= CYCLE_PERIOD.0;
+    let beyond = |edge: &&messages::GateEdge| i64::from(edge.offset) >= CYCLE_PERIOD.0;
     assert!(edges.filter(beyond).all(|edge| edge.gate == 0), "{:?}", feedback.laser);
 }
 

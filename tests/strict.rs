@@ -8,11 +8,11 @@ mod support;
 
 use std::time::{Duration, Instant};
 
+use messages::feedback::status;
+use messages::time::CYCLE_PERIOD;
 use monitor::recording::CycleRecord;
 use runtime::peer::Peer;
 use serde_json::Value;
-use signals::feedback::status;
-use signals::time::CYCLE_PERIOD;
 use support::{PATIENCE, Place, Running, lines, number, service};
 
 /// SIGCONT, SIGSTOP; signal(7).

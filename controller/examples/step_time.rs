@@ -8,9 +8,9 @@ use std::time::Instant;
 
 use controller::{Controller, Inputs, Outputs, Peers};
 use machine::Machine;
-use signals::feedback::status;
-use signals::time::CYCLE_TIME;
-use signals::{
+use messages::feedback::status;
+use messages::time::CYCLE_TIME;
+use messages::{
     CommandMode, ControllerState, Cycle, Feedback, Nanoseconds, OperatorRequest, OperatorVerb,
     Setpoint, math,
 };

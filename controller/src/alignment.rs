@@ -6,8 +6,8 @@
 use crate::feedforward::Planned;
 use machine::Machine;
 use machine::motor::StepperMotor;
-use signals::time::CYCLE_TIME;
-use signals::{AxisArray, Fault, FaultCode, FaultQuantity, MAX_AXES};
+use messages::time::CYCLE_TIME;
+use messages::{AxisArray, Fault, FaultCode, FaultQuantity, MAX_AXES};
 
 use crate::supervision::Finding;
 

@@ -6,7 +6,7 @@
 //! output, already multiplied by their gain, so that changing a gain does not move the output.
 
 use machine::{DcMotor, LoopGains};
-use signals::time::CYCLE_TIME;
+use messages::time::CYCLE_TIME;
 
 /// A proportional-integral controller with a limited output.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,7 +160,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use machine::{Axis, Machine};
-    use signals::math;
+    use messages::math;
 
     fn of(axis: &Axis) -> Cascade {
         Cascade::new(axis.motor.dc().unwrap(), &axis.gains)

@@ -7,9 +7,9 @@
 
 use crate::feedforward::Planned;
 use machine::{Machine, Motor};
-use signals::math;
-use signals::time::CYCLE_TIME;
-use signals::{AxisArray, MAX_AXES};
+use messages::math;
+use messages::time::CYCLE_TIME;
+use messages::{AxisArray, MAX_AXES};
 
 /// Cycles to fade over. An axis that kept its speed for 10 ms, while the plan accelerated at 10 m/s²,
 /// takes as much acceleration again to come back; over half of this it would take twice that.

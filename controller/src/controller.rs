@@ -53,8 +53,8 @@ use crate::stream_time::{ONE, StreamTime};
 use crate::supervision::{Elapsed, Finding, Supervision, Tracking};
 use answer::PROGRESS_INTERVAL;
 use machine::{Axis, Machine, Motor};
-use signals::feedback::status;
-use signals::{
+use messages::feedback::status;
+use messages::{
     CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity, Feedback, LaserCycle, MAX_AXES,
     Nanoseconds, RealtimeFacts,
 };
@@ -156,7 +156,7 @@ impl Controller {
         if let Some(finding) = finding {
             self.fail(finding, now);
         }
-        self.make_up(elapsed, now);
+        self.compensate_missed(elapsed, now);
         outputs.reply = inputs.request.map(|request| self.request(&request, feedback.cycle));
         self.transition(now, feedback);
         self.go_on(elapsed, feedback, now);
@@ -213,7 +213,7 @@ impl Controller {
         let seen = self.supervision.feedback(feedback);
         let elapsed = seen.unwrap_or(Elapsed::ONE);
         if self.state.mode() == CommandMode::Disabled {
-            // Unpowered, nothing that drives says is a fault; enabling looks again.
+            // Unpowered, nothing that drives says is a fault; enabling checks again.
             return (elapsed, None);
         }
         let gone =
@@ -232,24 +232,24 @@ impl Controller {
             told,
             inhibited.then(|| Finding::sound(Fault::new(FaultCode::DriveFault))),
         ];
-        // A peer that is lost stays lost: what is worse must be heard beside it.
+        // A lost peer stays lost in every cycle after: it must not hide the loss of an axis, which is worse.
         let worse = |finding: &Finding| finding.tracking == Tracking::Lost;
         let found = || findings.iter().flatten();
         (elapsed, found().find(|finding| worse(finding)).or_else(|| found().next()).copied())
     }
 
-    /// Where drives kept cycles dark for want of a command, the light lost in them is owed.
-    fn make_up(&mut self, elapsed: Elapsed, now: Nanoseconds) {
+    /// Drives kept cycles dark for want of a command: the light lost in them is made up for.
+    fn compensate_missed(&mut self, elapsed: Elapsed, now: Nanoseconds) {
         if self.playing == 0 {
             return;
         }
         if let Some(from) = self.player.miss(elapsed, self.intake.lookahead()) {
-            self.owe_light(from, now);
+            self.go_back_for_light(from, now);
         }
     }
 
     /// Light is left out from here on: holds, to go back for it.
-    fn owe_light(&mut self, from: StreamTime, now: Nanoseconds) {
+    fn go_back_for_light(&mut self, from: StreamTime, now: Nanoseconds) {
         let same_place = self.losses > 0 && from < self.lost_at + ONE_PLACE;
         self.losses = if same_place { self.losses + 1 } else { 1 };
         self.lost_at = from;
@@ -309,7 +309,7 @@ impl Controller {
             && self.playing != 0
             && let Some(from) = self.player.unsettle(settling, self.intake.lookahead())
         {
-            self.owe_light(from, now);
+            self.go_back_for_light(from, now);
         }
     }
 

@@ -5,7 +5,7 @@
 //! runs of one job without any difference on the workpiece; and the voltage, which answers what
 //! was measured and not only what was planned.
 
-use signals::Command;
+use messages::Command;
 
 /// A running hash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,7 +58,7 @@ impl Default for Digest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use signals::{Cycle, GateEdge, Nanoseconds};
+    use messages::{Cycle, GateEdge, Nanoseconds};
 
     fn digest(change: impl Fn(&mut Command)) -> u64 {
         let mut command = Command::default();

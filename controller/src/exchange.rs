@@ -1,6 +1,6 @@
 //! What goes into a controller step and what comes out of it.
 
-use signals::{
+use messages::{
     Command, ControllerReport, Feedback, Nanoseconds, OperatorReply, OperatorRequest, Progress,
     Setpoint,
 };

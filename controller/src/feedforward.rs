@@ -16,8 +16,8 @@ use crate::lookahead::Lookahead;
 use crate::player::Instant;
 use crate::winding::Winding;
 use machine::{Axis, Machine, Motor};
-use signals::time::CYCLE_TIME;
-use signals::{AxisArray, MAX_AXES};
+use messages::time::CYCLE_TIME;
+use messages::{AxisArray, MAX_AXES};
 
 /// Planned speed below which a motor counts as standing [rad/s]: less than a count of any usual
 /// encoder in a minute. However slowly it creeps above that, friction is against it.
@@ -228,9 +228,7 @@ impl Feedforward {
         let mean_current = (first + last) / 2.0 + friction * mean;
         let current_change = last - first + friction * (to - from);
         let angle_change = self.after.angle[index] - self.next.angle[index];
-        motor.resistance * mean_current
-            + motor.inductance * current_change / CYCLE_TIME
-            + motor.torque_constant * angle_change / CYCLE_TIME
+        motor.voltage(mean_current, current_change / CYCLE_TIME, angle_change / CYCLE_TIME)
     }
 
     /// Targets for the axis with this index.

@@ -2,8 +2,8 @@
 
 use crate::lookahead::Lookahead;
 use crate::stream_time::{ONE, StreamTime};
-use signals::time::CYCLE_PERIOD;
-use signals::{GateEdge, LaserCycle};
+use messages::time::CYCLE_PERIOD;
+use messages::{GateEdge, LaserCycle};
 
 /// A stretch of stream played in one cycle, at the rate it has on average.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -91,7 +91,7 @@ fn push(cycle: &mut LaserCycle, offset: f64, gate: u32, power: f64) -> Result<()
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use signals::Setpoint;
+    use messages::Setpoint;
 
     /// Dark, then stroke 3 from 1.25 to 3.5 in stream time, at power 0.4.
     fn ring() -> Lookahead {

@@ -9,7 +9,7 @@ use crate::rate_limit::RateLimit;
 use crate::stream_time::StreamTime;
 use crate::supervision::{Finding, Supervision};
 use machine::Machine;
-use signals::{Fault, FaultCode, FaultQuantity, Setpoint};
+use messages::{Fault, FaultCode, FaultQuantity, Setpoint};
 
 /// Setpoints that must be in hand before a stream begins, unless it is shorter.
 pub const BEGINNING: u64 = 250;

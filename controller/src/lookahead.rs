@@ -1,10 +1,10 @@
 //! The setpoints that travel ahead of time, in a fixed ring, with some of the past kept for going
 //! back along the stream.
 
-use crate::rate_limit::LARGEST_RATE;
+use crate::ramp::LARGEST_RATE;
 use crate::stream_time::StreamTime;
-use signals::Setpoint;
-use signals::setpoint::flags;
+use messages::Setpoint;
+use messages::setpoint::flags;
 
 /// Setpoints in the ring; a power of two.
 pub const CAPACITY: usize = 2048;

@@ -12,13 +12,13 @@
 
 use crate::gate::{self, Stretch, TooManyEdges};
 use crate::lookahead::Lookahead;
+use crate::ramp::LARGEST_RATE;
 use crate::ramp::{Ramp, Rate, Slew, rate_before};
-use crate::rate_limit::LARGEST_RATE;
 use crate::stream_time::{ONE, StreamTime};
 use crate::supervision::Elapsed;
-use signals::LaserCycle;
-use signals::setpoint::flags;
-use signals::time::CYCLE_TIME;
+use messages::LaserCycle;
+use messages::setpoint::flags;
+use messages::time::CYCLE_TIME;
 
 /// The slowest that an override goes.
 pub const SMALLEST_RATE: f64 = 0.1;
@@ -84,7 +84,7 @@ pub struct Player {
     marking: bool,
     dark_until: StreamTime,
     /// Where light beyond `dark_until` was first left out.
-    owes_light_from: Option<StreamTime>,
+    unlit_from: Option<StreamTime>,
     /// Whether the stream promises to be at rest here: its start, or a pause.
     at_planned_rest: bool,
     /// Pauses below this sequence number have been kept.
@@ -103,7 +103,7 @@ impl Player {
             activity: Activity::Resting,
             marking: false,
             dark_until: StreamTime::default(),
-            owes_light_from: None,
+            unlit_from: None,
             at_planned_rest: true,
             paused_until: 0,
             wanted: Rate::ONE,
@@ -157,8 +157,8 @@ impl Player {
     }
 
     /// Whether light was left out that the stream has not come back to yet.
-    pub fn owes_light(&self) -> bool {
-        self.owes_light_from.is_some()
+    pub fn has_missed_light(&self) -> bool {
+        self.unlit_from.is_some()
     }
 
     /// Closes the gate from `next` on and comes to rest along the path.
@@ -187,7 +187,7 @@ impl Player {
         }
         self.brake_in_the_dark(from);
         self.marking = false;
-        self.owes_light_from = Some(from);
+        self.unlit_from = Some(from);
         Some(from)
     }
 
@@ -202,7 +202,7 @@ impl Player {
         }
         self.brake_in_the_dark(from);
         self.marking = false;
-        self.owes_light_from = Some(from);
+        self.unlit_from = Some(from);
         Some(from)
     }
 
@@ -210,7 +210,7 @@ impl Player {
     fn brake_in_the_dark(&mut self, from: StreamTime) {
         if from >= self.dark_until {
             self.dark_until = from;
-            self.owes_light_from = None;
+            self.unlit_from = None;
         }
         self.activity = Activity::Braking;
     }
@@ -226,7 +226,7 @@ impl Player {
         let start = Ramp::starting_distance(rate, Slew::STOP) + STEADY;
         let resting = self.at_planned_rest || lookahead.is_resting(here);
         let light_ahead = !resting && lookahead.may_be_lit(here, here + start);
-        let light_from = self.owes_light_from.or(light_ahead.then_some(here));
+        let light_from = self.unlit_from.or(light_ahead.then_some(here));
         match light_from.map(|light| light - start) {
             Some(back) if back < here => self.activity = Activity::Rewinding(back),
             _ => self.set_off(lookahead, resting),
@@ -246,8 +246,8 @@ impl Player {
 
     /// Goes on by one cycle.
     pub fn advance(&mut self, lookahead: &Lookahead) -> Event {
-        if self.marking && self.owes_light_from.is_some_and(|from| from < self.after.time) {
-            self.owes_light_from = None;
+        if self.marking && self.unlit_from.is_some_and(|from| from < self.after.time) {
+            self.unlit_from = None;
         }
         self.now = self.next;
         self.next = self.after;
@@ -327,8 +327,8 @@ impl Player {
         if self.marking {
             return cycle;
         }
-        if cycle.map_or(true, |cycle| cycle.is_lit()) && self.owes_light_from.is_none() {
-            self.owes_light_from = Some(stretch.from.max(self.dark_until));
+        if cycle.map_or(true, |cycle| cycle.is_lit()) && self.unlit_from.is_none() {
+            self.unlit_from = Some(stretch.from.max(self.dark_until));
         }
         Ok(LaserCycle::OFF)
     }

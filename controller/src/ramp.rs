@@ -13,12 +13,14 @@
 //! Overrides change the rate five times as gently: 0.5 m/s² and 60 + 16 m/s³. Above the planned rate
 //! there is room for that inside the limits; see [`rate_limit`](crate::rate_limit).
 
-use crate::rate_limit::LARGEST_RATE;
 use crate::stream_time::{FRACTION_BITS, StreamTime};
-use signals::time::CYCLE_TIME;
+use messages::time::CYCLE_TIME;
 
 /// Cycles of the moving average; a power of two.
 pub const LENGTH: usize = 32;
+
+/// The fastest a stream is ever played.
+pub const LARGEST_RATE: f64 = 2.0;
 
 /// Bits after the binary point of a rate. The sum of [`LENGTH`] rates has five more, and the
 /// mean of two such sums one more: the [`FRACTION_BITS`] of stream time.

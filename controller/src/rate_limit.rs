@@ -5,12 +5,9 @@
 //! `3·a·r·ṙ + v·r̈` to the jerk; room is left for both. As planned is always allowed: the planner's
 //! checker vouches for rate 1.
 
-use crate::ramp::{AVERAGING, OVERRIDE_CHANGE};
+use crate::ramp::{AVERAGING, LARGEST_RATE, OVERRIDE_CHANGE};
 use machine::{Axis, DcMotor, Machine, Motor};
-use signals::Setpoint;
-
-/// The fastest a stream is ever played.
-pub const LARGEST_RATE: f64 = 2.0;
+use messages::Setpoint;
 
 /// Share of the supply that a rate may use up; the rest is left to the winding's inductance and
 /// to the feedback loops.
@@ -112,11 +109,11 @@ impl RateLimit {
 
 impl AxisRate {
     fn new(axis: &Axis) -> Self {
-        let limits = &axis.limits;
+        let velocity = axis.velocity_limit().plan;
         let (velocity, [by_current, by_voltage, back_emf]) = match &axis.motor {
-            Motor::Dc(motor) => (limits.velocity, lines_of_dc(motor, axis.ratio)),
+            Motor::Dc(motor) => (velocity, lines_of_dc(motor, axis.ratio)),
             Motor::Stepper(motor) => {
-                let fastest = limits.velocity.min(motor.largest_speed() * axis.ratio);
+                let fastest = velocity.min(motor.largest_speed() * axis.ratio);
                 // What it still gives at its fastest it gives at every speed below.
                 let torque = motor.pull_out_torque(fastest / axis.ratio) * CURRENT_SHARE;
                 (fastest, [torque, torque, 0.0])
@@ -124,8 +121,8 @@ impl AxisRate {
         };
         Self {
             per_velocity: 1.0 / velocity,
-            per_acceleration: 1.0 / limits.acceleration,
-            per_jerk: 1.0 / limits.jerk,
+            per_acceleration: 1.0 / axis.acceleration_limit().plan,
+            per_jerk: 1.0 / axis.jerk_limit().plan,
             viscous: axis.friction.viscous / axis.ratio,
             coulomb: axis.friction.coulomb,
             by_current,
@@ -148,12 +145,13 @@ impl AxisRate {
 /// Torque that the current gives, that the voltage gives at standstill, and what each unit of joint
 /// speed takes from that.
 fn lines_of_dc(motor: &DcMotor, ratio: f64) -> [f64; 3] {
-    // R·τ/k + k·ω ≤ V, times k/R.
-    let scale = motor.torque_constant / motor.resistance;
+    let settled =
+        |voltage: f64, speed: f64| motor.torque_constant * motor.settled_current(voltage, speed);
     [
-        motor.torque_constant * motor.current * CURRENT_SHARE,
-        scale * motor.voltage * VOLTAGE_SHARE,
-        scale * motor.torque_constant / ratio,
+        motor.largest_torque() * CURRENT_SHARE,
+        settled(motor.voltage * VOLTAGE_SHARE, 0.0),
+        // The torque falls evenly with the speed.
+        -settled(0.0, 1.0 / ratio),
     ]
 }
 
@@ -234,8 +232,7 @@ mod tests {
         let motor = machine.axes[0].motor.dc().unwrap();
         let speed = rate * 0.3 / machine.axes[0].ratio;
         let torque = 0.01 * rate * rate + 5e-3 + 1e-6 * speed;
-        let voltage =
-            motor.resistance * torque / motor.torque_constant + motor.torque_constant * speed;
+        let voltage = motor.voltage(torque / motor.torque_constant, 0.0, speed);
         assert!(rate > 1.0 && rate < 2.0);
         assert!((voltage - 0.9 * motor.voltage).abs() < 1e-9, "{voltage} V at rate {rate}");
     }

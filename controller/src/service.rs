@@ -6,22 +6,22 @@
 use crate::controller::Controller;
 use crate::exchange::{Inputs, Outputs, Peers as PeersPresent, Presence};
 use machine::Machine;
+use messages::{
+    Command, ControllerReport, ControllerState, Feedback, Nanoseconds, OperatorRequest,
+    OperatorVerb, Progress, Setpoint,
+};
 use runtime::clock;
 use runtime::operator::OperatorQueue;
 use runtime::peer::{PeerState, Peers};
 use runtime::thread::{self, RealtimeOptions};
 use runtime::wake::{Listener, Notifier, Wake};
-use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, signal};
-use signals::{
-    Command, ControllerReport, ControllerState, Feedback, Nanoseconds, OperatorRequest,
-    OperatorVerb, Progress, Setpoint,
-};
+use runtime::{Domain, Publisher, Role, Samples, ServiceError, Subscriber, signal};
 
 /// Setpoints taken in one cycle at most: a late planner is caught up with over several cycles.
 const DRAIN: usize = 16;
 
-/// How long to wait for a wake before looking at the peers.
-const LOOK: Nanoseconds = Nanoseconds(100_000_000);
+/// How long to wait for a wake before checking the peers.
+const POLL_INTERVAL: Nanoseconds = Nanoseconds(100_000_000);
 
 /// Runs until it is told to end (SIGTERM), or the supervisor has died and the axes are at rest.
 ///
@@ -38,13 +38,13 @@ pub fn run(
     cycle.controller.set_realtime(realtime.facts);
     cycle.wake.drain()?;
     loop {
-        let woken = cycle.wake.wait_until(clock::now() + LOOK)?;
+        let woken = cycle.wake.wait_until(clock::now() + POLL_INTERVAL)?;
         while let Some(feedback) = cycle.feedbacks.newest()? {
             cycle.answer(&feedback, clock::now())?;
         }
         if !woken {
             cycle.greet()?;
-            cycle.look_after_drives()?;
+            cycle.check_drives()?;
         }
         if cycle.shall_end() {
             return Ok(());
@@ -77,8 +77,8 @@ impl ServiceCycle {
             told_to_stop: false,
             peers: Peers::watch(domain, &[Role::Domain, Role::Planner, Role::Drives])?,
             operators: OperatorQueue::start(domain)?,
-            feedbacks: domain.subscriber(Reading::Newest)?,
-            setpoints: domain.subscriber(Reading::Every)?,
+            feedbacks: domain.subscriber(Samples::Latest)?,
+            setpoints: domain.subscriber(Samples::All)?,
             commands: domain.publisher()?,
             progress: domain.publisher()?,
             reports: domain.publisher()?,
@@ -111,7 +111,7 @@ impl ServiceCycle {
 
     /// No feedback has come for long: if drives is dead none will, and whoever waits for the end of
     /// a stream must hear of it.
-    fn look_after_drives(&mut self) -> Result<(), ServiceError> {
+    fn check_drives(&mut self) -> Result<(), ServiceError> {
         if self.peers.state(Role::Drives) != PeerState::Dead {
             return Ok(());
         }
@@ -162,7 +162,7 @@ impl ServiceCycle {
         }
     }
 
-    /// Told to, or left alone; never while the axes may still be moving, unless nobody moves them.
+    /// Told to end, or without a supervisor; never while the axes may still be moving, unless nobody moves them.
     fn shall_end(&mut self) -> bool {
         let supervisor = self.peers.state(Role::Domain);
         if signal::termination().is_none() && supervisor != PeerState::Dead {

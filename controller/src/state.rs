@@ -1,7 +1,7 @@
 //! The states of the controller, with what each has to remember.
 
 use crate::supervision::Tracking;
-use signals::{CommandMode, ControllerState};
+use messages::{CommandMode, ControllerState};
 
 /// What the controller is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

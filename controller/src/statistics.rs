@@ -5,7 +5,7 @@ use crate::digest::Digest;
 use crate::feedforward::Planned;
 use crate::player::Instant;
 use machine::{Axis, Machine};
-use signals::{
+use messages::{
     Command, ControllerReport, Cycle, Fault, Feedback, MAX_AXES, RealtimeFacts, Setpoint,
 };
 
@@ -35,9 +35,9 @@ impl Statistics {
     /// For this machine, before any stream.
     pub fn new(machine: &Machine) -> Self {
         let shares = |axis: &Axis| Shares {
-            per_velocity: 1.0 / axis.limits.velocity,
-            per_acceleration: 1.0 / axis.limits.acceleration,
-            per_jerk: 1.0 / axis.limits.jerk,
+            per_velocity: 1.0 / axis.velocity_limit().plan,
+            per_acceleration: 1.0 / axis.acceleration_limit().plan,
+            per_jerk: 1.0 / axis.jerk_limit().plan,
             per_current: axis.motor.dc().map_or(0.0, |motor| 1.0 / motor.current),
         };
         Self {

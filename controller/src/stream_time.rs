@@ -4,7 +4,7 @@
 //! stream is at full rate again bit for bit, and "exactly where the gate was closed" is an
 //! equality, not a tolerance.
 
-use signals::time::CYCLE_TIME;
+use messages::time::CYCLE_TIME;
 
 /// Bits after the binary point of a [`StreamTime`].
 pub const FRACTION_BITS: u32 = 30;

@@ -6,10 +6,10 @@
 use machine::trip::Limit;
 use machine::trip::following::{CREEP, DISCONTINUITY, LEAD_STEP};
 use machine::{Axis, DcMotor, Machine, StallTolerance};
-use signals::feedback::status;
-use signals::setpoint::flags;
-use signals::time::CYCLE_TIME;
-use signals::{AxisArray, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, Setpoint};
+use messages::feedback::status;
+use messages::setpoint::flags;
+use messages::time::CYCLE_TIME;
+use messages::{AxisArray, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, Setpoint};
 
 /// Encoder counts per cycle within which an axis counts as standing.
 const STANDING_COUNTS: f64 = 1.5;
@@ -145,12 +145,12 @@ impl Supervision {
     /// Whether drives says that something is wrong on its side, with the motors powered.
     ///
     /// # Errors
-    /// Its own fault, or that it stopped the axes alone.
+    /// Its own fault, or that its watchdog has stopped the axes.
     pub fn drives(&self, feedback: &Feedback) -> Result<(), Finding> {
         if feedback.fault.is_some() {
             return Err(Finding::lost(feedback.fault));
         }
-        if feedback.has(status::STOPPED_ALONE) {
+        if feedback.has(status::WATCHDOG_TRIPPED) {
             return Err(Finding::lost(Fault::new(FaultCode::StaleCommand)));
         }
         if !feedback.has(status::POWERED) {
@@ -164,7 +164,7 @@ impl Supervision {
     /// # Errors
     /// Following error, soft limit or overload, with the axis.
     pub fn motion(&self, feedback: &Feedback, angle: &AxisArray) -> Result<(), Finding> {
-        // A winding stays too warm all the way to rest: an axis that is lost must be heard beside it.
+        // A winding stays too warm until the axes rest: that must not hide the loss of an axis.
         let mut overload = None;
         for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
             let limits = &axis.limits;

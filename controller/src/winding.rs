@@ -1,8 +1,8 @@
 //! What the feedforward voltage makes of a winding's current by the instants of measurement.
 
 use machine::DcMotor;
-use signals::math;
-use signals::time::CYCLE_TIME;
+use messages::math;
+use messages::time::CYCLE_TIME;
 
 /// The current that the feedforward voltage alone drives through one winding.
 ///
@@ -72,7 +72,6 @@ mod tests {
     fn the_winding_is_the_exact_answer_to_an_even_voltage_and_a_tilted_speed() {
         let machine = Machine::builtin();
         let motor = machine.axes[0].motor.dc().unwrap();
-        let DcMotor { resistance, inductance, torque_constant, .. } = *motor;
         let mut winding = Winding::new(motor);
         let (mut current, mut speed) = (0.0, 0.0);
         for cycle in 0..50 {
@@ -83,8 +82,7 @@ mod tests {
             let step = CYCLE_TIME / f64::from(steps);
             for index in 0..steps {
                 let slope = |current: f64, share: f64| {
-                    let emf = torque_constant * (speed + change * share);
-                    (voltage - resistance * current - emf) / inductance
+                    motor.current_rate(voltage, current, speed + change * share)
                 };
                 let share = f64::from(index) / f64::from(steps);
                 let half = current + slope(current, share) * step / 2.0;

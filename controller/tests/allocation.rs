@@ -6,9 +6,9 @@ mod support;
 
 use controller::{Controller, Inputs, Outputs, Peers};
 use machine::Machine;
+use messages::feedback::status;
+use messages::{ControllerState, Cycle, Feedback, Nanoseconds, OperatorRequest, OperatorVerb};
 use runtime::allocation::{Allocations, CountingAllocator};
-use signals::feedback::status;
-use signals::{ControllerState, Cycle, Feedback, Nanoseconds, OperatorRequest, OperatorVerb};
 use support::two_marks;
 
 #[global_allocator]

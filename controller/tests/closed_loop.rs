@@ -5,7 +5,7 @@
 mod support;
 
 use machine::Machine;
-use signals::{ControllerState, OperatorVerb};
+use messages::{ControllerState, OperatorVerb};
 use support::{Bench, lit_stretches, two_marks};
 
 #[test]

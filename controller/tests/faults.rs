@@ -6,9 +6,9 @@ mod support;
 
 use controller::Presence;
 use machine::Machine;
-use signals::feedback::status;
-use signals::setpoint::flags;
-use signals::{
+use messages::feedback::status;
+use messages::setpoint::flags;
+use messages::{
     CommandMode, ControllerState, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds,
     OperatorVerb, Setpoint,
 };
@@ -71,7 +71,9 @@ fn a_feedback_that_cannot_be_trusted_brakes_the_drives() {
     check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.cycle.0 += most);
     check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.cycle.0 -= 1);
     check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.epoch += 1);
-    check(FaultCode::StaleCommand, 0, quick, |feedback| feedback.status |= status::STOPPED_ALONE);
+    check(FaultCode::StaleCommand, 0, quick, |feedback| {
+        feedback.status |= status::WATCHDOG_TRIPPED
+    });
     check(FaultCode::DriveFault, 0, quick, |feedback| feedback.status = 0);
     // 1 mm of following error is 0.8 rad at the motor.
     check(FaultCode::FollowingError, 2, quick, |feedback| feedback.position[1] += 0.81);

@@ -5,7 +5,7 @@
 mod support;
 
 use machine::Machine;
-use signals::{ControllerState, OperatorVerb};
+use messages::{ControllerState, OperatorVerb};
 use support::{Move, Part, Record, check_marks, job, reach, started, two_marks};
 
 /// Largest second difference of the references, as an acceleration of the joints [m/s²].
@@ -92,13 +92,8 @@ fn any_sequence_of_holds_resumes_and_overrides_marks_once() {
     ];
     let job = job(&machine, 1, &parts, 0.4);
     for seed in 1..=12_u64 {
-        let mut random = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let mut next = |below: u64| {
-            random ^= random << 13;
-            random ^= random >> 7;
-            random ^= random << 17;
-            random % below
-        };
+        let mut random = messages::random::SplitMix64::new(seed);
+        let mut next = |below: u64| random.below(below);
         let mut bench = started(&machine, &job);
         let mut asked = Vec::new();
         for _ in 0..14 {

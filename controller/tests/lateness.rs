@@ -6,8 +6,8 @@ mod support;
 
 use controller::{Outputs, Presence};
 use machine::Machine;
-use signals::feedback::status;
-use signals::{CommandMode, ControllerState, FaultCode, Nanoseconds, OperatorVerb};
+use messages::feedback::status;
+use messages::{CommandMode, ControllerState, FaultCode, Nanoseconds, OperatorVerb};
 use support::{Bench, Job, check_marks, reach, started, two_marks};
 
 /// Largest distance of the tool from the plan, with the laser on and off [m].

@@ -6,7 +6,7 @@
 mod support;
 
 use machine::Machine;
-use signals::{CommandMode, ControllerState, OperatorRequest, OperatorVerb};
+use messages::{CommandMode, ControllerState, OperatorRequest, OperatorVerb};
 use support::{Bench, two_marks};
 
 #[test]

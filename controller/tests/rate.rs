@@ -5,7 +5,7 @@
 mod support;
 
 use machine::Machine;
-use signals::{ControllerReport, ControllerState, OperatorVerb};
+use messages::{ControllerReport, ControllerState, OperatorVerb};
 use support::{Bench, Move, Part, job, lit_stretches, two_marks};
 
 /// Plays a gentle job with an override set after `cycles`; its largest rate and its report.

@@ -7,8 +7,8 @@
 mod support;
 
 use machine::Machine;
-use signals::random::SplitMix64;
-use signals::{ControllerState, Nanoseconds, OperatorVerb};
+use messages::random::SplitMix64;
+use messages::{ControllerState, Nanoseconds, OperatorVerb};
 use support::{Bench, Job, check_marks, reach, stalling, started, two_marks};
 
 /// Largest distance of the tool from the plan, with the laser on and off [m].

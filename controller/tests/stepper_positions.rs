@@ -9,10 +9,10 @@ use std::path::Path;
 
 use controller::{Controller, Inputs, Outputs, Peers};
 use machine::Machine;
-use signals::feedback::status;
-use signals::setpoint::flags;
-use signals::time::CYCLE_PERIOD;
-use signals::{
+use messages::feedback::status;
+use messages::setpoint::flags;
+use messages::time::CYCLE_PERIOD;
+use messages::{
     AxisArray, CommandMode, ControllerState, Feedback, MAX_AXES, Nanoseconds, OperatorRequest,
     OperatorVerb, Setpoint,
 };

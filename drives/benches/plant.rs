@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use criterion::{Criterion, criterion_group, criterion_main};
 use drives::{Actuation, Freshness, Measurement, PlantOptions, SimulatedPlant};
 use machine::{Machine, Motor};
-use signals::{CommandMode, MAX_AXES, axis::axis_array};
+use messages::{CommandMode, MAX_AXES, axis::axis_array};
 
 fn machine_files() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../machines");

@@ -8,7 +8,7 @@ use std::time::Instant;
 use drives::plant::PlantError;
 use drives::{Actuation, Freshness, Measurement, PlantOptions, SimulatedPlant};
 use machine::Machine;
-use signals::{CommandMode, axis::axis_array};
+use messages::{CommandMode, axis::axis_array};
 
 fn main() -> Result<(), PlantError> {
     let mut port = SimulatedPlant::new(&Machine::builtin(), PlantOptions::default())?;

@@ -18,11 +18,11 @@
 //! - *Skipped*: a cycle that drives, with strict deadlines, was too late for. Nobody measures in it,
 //!   the gate is closed, the axes go on with what was in force, and the cycle numbers go on with the
 //!   time: the deadline of cycle `n` stays `start + n × period`.
-//! - *Stall*: a time in which the cycle stood still; see [`signals::Stalls`].
+//! - *Stall*: a time in which the cycle stood still; see [`messages::Stalls`].
 
 use machine::StallTolerance;
-use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
-use signals::{
+use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use messages::{
     AxisArray, Command, CommandMode, Cycle, DrivesReport, Fault, FaultCode, Feedback, MAX_AXES,
     Nanoseconds, RealtimeFacts, StallCause, feedback::status,
 };
@@ -189,7 +189,7 @@ impl Bridge {
         feedback.status = bit(status::COMMAND_MISSED, missed)
             | bit(status::POWERED, self.measurement.power == Power::On)
             | bit(status::TOOL_KNOWN, self.measurement.tool.is_some())
-            | bit(status::STOPPED_ALONE, self.watchdog.watch() == Watch::Stopped)
+            | bit(status::WATCHDOG_TRIPPED, self.watchdog.watch() == Watch::Stopped)
             | bit(status::SLIPPING, self.options.deadlines == Deadlines::Slipping)
             | bit(status::GATE_INHIBITED, self.permission == GatePermission::Inhibited);
         self.phase = Phase::Begun;

@@ -25,31 +25,36 @@
 //! substep asked for gets a finer one.
 
 pub mod brake;
+mod contacts;
 pub mod coupling;
 pub mod dynamics;
 pub mod friction;
+pub mod motors;
 pub mod source;
+pub mod state;
 pub mod stepping;
 pub mod winding;
 
 use machine::kinematics::{Joints, KinematicsError};
 use machine::motor::BeyondTorque;
-use machine::transmission::rest;
+use machine::transmission::equilibrium;
 use machine::{Axis, LaserSource, Machine, Mechanism, MechanismVisitor};
-use nalgebra::SVector;
-use signals::random::SplitMix64;
-use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
-use signals::{
+use messages::random::SplitMix64;
+use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use messages::{
     AxisArray, CommandMode, Fault, FaultCode, FaultQuantity, GateEdge, LaserCycle, MAX_AXES,
     Nanoseconds,
 };
+use nalgebra::SVector;
 
 use crate::port::{Actuation, Freshness, Measurement, Port, Power};
 use crate::watchdog::impossible_light;
 use brake::Brake;
 use coupling::Unsolvable;
-use dynamics::{Dynamics, Motors, Phases, State};
+use dynamics::Dynamics;
+use motors::Motors;
 use source::Source;
+use state::{Phases, State};
 use stepping::Stepping;
 use winding::Weights;
 
@@ -198,20 +203,20 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             .map_err(|_| PlantError::AxisCount { expected: N, found: axes.len() })?;
         let branch = mechanism.branch();
         let load = Joints::from_fn(|row, _| home.get(row).copied().unwrap_or(f64::NAN));
-        let assembly = mechanism.assemble(&load, branch, None).map_err(PlantError::Home)?;
+        let chain = mechanism.solve(&load, branch, None).map_err(PlantError::Home)?;
 
-        let gravity = mechanism.gravity(&assembly);
+        let gravity = mechanism.gravity(&chain);
         let motors = Motors::of(&axes);
-        let ahead = rest::rotors_ahead(&mechanism, &axes, &gravity);
+        let ahead = equilibrium::rotors_ahead(&mechanism, &axes, &gravity);
         let angle = (load + ahead).component_div(&motors.ratio);
         let mut origin = angle;
         for (row, axis) in axes.iter().enumerate() {
-            let ahead = rest::field_ahead(axis, gravity[row]).map_err(PlantError::Hold)?;
+            let ahead = equilibrium::field_ahead(axis, gravity[row]).map_err(PlantError::Hold)?;
             origin[row] += ahead / axis.ratio;
         }
         let stepping = Stepping::of(&axes, origin);
         let field = stepping.as_ref().map(|stepping| stepping.field(angle));
-        let dynamics = Dynamics::new(mechanism, motors, assembly)?.with_field(field);
+        let dynamics = Dynamics::new(mechanism, motors, chain)?.with_field(field);
 
         let rate = dynamics.fastest();
         let substeps = (CYCLE_TIME / substep - 1e-9).max(rate * CYCLE_TIME / STABLE_PRODUCT).ceil();
@@ -297,7 +302,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
                     self.state = state;
                 }
                 Err(unsolvable) => {
-                    self.jam(&unsolvable);
+                    self.on_unsolvable(&unsolvable);
                     return;
                 }
             }
@@ -309,7 +314,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
 
     /// The mechanism is driven where it cannot go: it stops short of that as at a wall, a fault
     /// until it is reset.
-    fn jam(&mut self, unsolvable: &Unsolvable) {
+    fn on_unsolvable(&mut self, unsolvable: &Unsolvable) {
         self.state = State {
             current: SVector::zeros(),
             speed: SVector::zeros(),
@@ -323,7 +328,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
     }
 
     /// What of `actuation` this plant carries out: all of it, or nothing but the brake.
-    fn admit(&mut self, actuation: &Actuation) -> Actuation {
+    fn validate(&mut self, actuation: &Actuation) -> Actuation {
         if actuation.mode == CommandMode::Disabled {
             self.fault = Fault::default();
             return Actuation { laser: LaserCycle::OFF, ..*actuation };
@@ -466,22 +471,22 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
 
     /// Puts `actuation` in force, as far as this plant carries it out; the mode that is.
     fn engage(&mut self, actuation: &Actuation) -> CommandMode {
-        let mut admitted = self.admit(actuation);
+        let mut accepted = self.validate(actuation);
         if let Some(stepping) = &mut self.stepping
-            && let Err(beyond) = stepping.engage(&admitted, &self.state)
+            && let Err(beyond) = stepping.engage(&accepted, &self.state)
         {
             self.fail(beyond);
-            admitted = self.stopped();
+            accepted = self.stopped();
             if let Some(stepping) = &mut self.stepping {
                 stepping.brake();
             }
         }
         let braking = |mode| matches!(mode, Some(CommandMode::QuickStop));
-        if braking(Some(admitted.mode)) && !braking(self.in_force.map(|before| before.mode)) {
+        if braking(Some(accepted.mode)) && !braking(self.in_force.map(|before| before.mode)) {
             self.brake.engage(&self.state);
         }
-        self.in_force = Some(admitted);
-        admitted.mode
+        self.in_force = Some(accepted);
+        accepted.mode
     }
 }
 

@@ -22,7 +22,7 @@
 //!   [`CommandMode::Disabled`].
 //! - No allocation, lock, print or panic in an exchange.
 
-use signals::{AxisArray, CommandMode, Fault, LaserCycle, MAX_AXES, Nanoseconds};
+use messages::{AxisArray, CommandMode, Fault, LaserCycle, MAX_AXES, Nanoseconds};
 
 /// Whether an actuation comes from a command that answers the newest feedback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

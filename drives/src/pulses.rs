@@ -6,8 +6,8 @@
 //! nanosecond, along the cubic that joins the angles and speeds at both ends of the cycle.
 
 use machine::pulses::{crossings, nearest};
-use signals::Nanoseconds;
-use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
+use messages::Nanoseconds;
+use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
 
 /// A commanded angle through one cycle.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -240,7 +240,7 @@ mod tests {
         let mut last = 0;
         for index in 1..=200_i64 {
             let phase = 0.063 * index as f64;
-            let (sine, cosine) = signals::math::sin_cos(phase);
+            let (sine, cosine) = messages::math::sin_cos(phase);
             // An odd amplitude, and a drift, so that no angle falls on a pulse.
             let angle = 0.037 * sine + 1.3e-3 * index as f64;
             segment = segment.then(angle, (0.037 * 0.063 * cosine + 1.3e-3) / CYCLE_TIME);

@@ -1,7 +1,7 @@
 //! The drives service: owns the clock of the machine and moves samples between the bridge and the
 //! channels.
 //!
-//! A cycle: sleep until the deadline, look whether the peers live, let the bridge apply and
+//! A cycle: sleep until the deadline, check whether the peers live, let the bridge apply and
 //! measure, publish the feedback, wait for the command with a bound, latch it. The bound is strict
 //! on hardware and with `--strict`; simulated drives wait longer for a controller that is alive and
 //! followed, and move the later deadlines by what that took. Strict deadlines never move: those after
@@ -15,16 +15,16 @@
 use crate::bridge::{Bridge, BridgeOptions, Deadlines, GatePermission};
 use crate::port::{Freshness, Port};
 use machine::StallTolerance;
+use messages::feedback::status;
+use messages::report::refused;
+use messages::time::CYCLE_PERIOD;
+use messages::{Command, DrivesReport, FaultCode, Feedback, Nanoseconds, RealtimeFacts};
 use runtime::clock::{self, PeriodicClock};
 use runtime::peer::{PeerState, Peers};
 use runtime::stall::{StallNote, StallWatch};
 use runtime::thread::{self, RealtimeOptions};
 use runtime::wake::{Listener, Notifier, Wake};
-use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, message, signal};
-use signals::feedback::status;
-use signals::report::refused;
-use signals::time::CYCLE_PERIOD;
-use signals::{Command, DrivesReport, FaultCode, Feedback, Nanoseconds, RealtimeFacts};
+use runtime::{Domain, Publisher, Role, Samples, ServiceError, Subscriber, message, signal};
 
 /// How long drives waits for a command in its cycle, from the deadline or the feedback, whichever was
 /// later, when it is strict: what made drives late is not the controller's to make up for.
@@ -82,7 +82,7 @@ pub fn run(
     result
 }
 
-/// Who is there, as one look at the peers tells.
+/// Who is there, as one check of the peers tells.
 #[derive(Debug, Clone, Copy)]
 struct Vitality {
     planner: PeerState,
@@ -130,7 +130,7 @@ impl ServiceCycle {
             peers: Peers::watch(domain, &[Role::Domain, Role::Planner, Role::Controller])?,
             feedbacks: domain.publisher()?,
             reports: domain.publisher()?,
-            commands: domain.subscriber(Reading::Newest)?,
+            commands: domain.subscriber(Samples::Latest)?,
             feedback_wake: domain.notifier(Wake::Feedback)?,
             command_wake: domain.listener(Wake::Command)?,
             stalls: StallWatch::start().ok(),
@@ -147,7 +147,7 @@ impl ServiceCycle {
         let mut clock = PeriodicClock::new(CYCLE_PERIOD, margin);
         loop {
             clock.wait();
-            let vitality = self.look_after_peers();
+            let vitality = self.check_peers();
             // The last thing before the exchange: what is late then must not act as if it were not.
             if self.deadlines == Deadlines::Strict {
                 clock.skip();
@@ -173,7 +173,7 @@ impl ServiceCycle {
 
     /// A peer that does not live closes the gate at this very deadline, and so does the end of this
     /// service; without a controller the axes are stopped here, because nobody else can.
-    fn look_after_peers(&mut self) -> Vitality {
+    fn check_peers(&mut self) -> Vitality {
         let vitality = Vitality {
             planner: self.peers.state(Role::Planner),
             controller: self.peers.state(Role::Controller),
@@ -215,7 +215,7 @@ impl ServiceCycle {
         // been waited for in vain.
         let patient = self.deadlines == Deadlines::Slipping
             && vitality.controller == PeerState::Alive
-            && !self.bridge.feedback().has(status::STOPPED_ALONE)
+            && !self.bridge.feedback().has(status::WATCHDOG_TRIPPED)
             && self.bridge.misses() < SLIPS_IN_VAIN;
         let Feedback { deadline, published, .. } = *self.bridge.feedback();
         let until = if patient {
@@ -237,7 +237,7 @@ impl ServiceCycle {
         }
     }
 
-    /// While waiting long for a controller, look every period whether it still lives.
+    /// While waiting long for a controller, check every period whether it still lives.
     fn next_look(&self, until: Nanoseconds, patient: bool) -> Nanoseconds {
         if patient { until.min(clock::now() + CYCLE_PERIOD) } else { until }
     }

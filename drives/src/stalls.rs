@@ -1,7 +1,7 @@
 //! The account of stalls: how many, how long, and why, since the newest stream began.
 
-use signals::stall::CAUSES;
-use signals::{Cycle, Nanoseconds, StallCause, Stalls};
+use messages::stall::CAUSES;
+use messages::{Cycle, Nanoseconds, StallCause, Stalls};
 
 /// One stall that has ended, or that stopped the axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

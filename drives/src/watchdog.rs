@@ -23,7 +23,7 @@
 //! the motors' safe torque off are wired.
 
 use machine::StallTolerance;
-use signals::{
+use messages::{
     AxisArray, Command, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, MAX_EDGES,
     Nanoseconds, axis::MAX_AXES,
 };
@@ -50,7 +50,7 @@ pub enum Watch {
     Waiting,
     /// Each fresh command is carried out.
     Following,
-    /// Stopped alone, until a person resets.
+    /// Stopped by the watchdog, until a person resets.
     Stopped,
 }
 

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
 use machine::{Machine, Motor};
+use messages::{Command, CommandMode, LaserCycle, Nanoseconds, RealtimeFacts, axis::axis_array};
 use runtime::allocation::{Allocations, CountingAllocator};
-use signals::{Command, CommandMode, LaserCycle, Nanoseconds, RealtimeFacts, axis::axis_array};
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;

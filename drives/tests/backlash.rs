@@ -1,8 +1,10 @@
 //! The plant's backlash: hysteresis, coasting, and that a gap gives no energy away.
 #![allow(clippy::unwrap_used)]
 
-use drives::plant::dynamics::{Dynamics, Motors, Phases, State};
+use drives::plant::dynamics::Dynamics;
 use drives::plant::friction;
+use drives::plant::motors::Motors;
+use drives::plant::state::{Phases, State};
 use machine::transmission::Elasticity;
 use machine::{Axis, Cartesian, CoreXy, Friction, Machine, Mechanism};
 use nalgebra::Vector2;
@@ -28,7 +30,7 @@ fn carriages(damping: f64) -> Cartesian<2> {
     Cartesian { mass: [0.33, 1.06], elasticity: Some(springs(damping)) }
 }
 
-fn dynamics<M: Mechanism<2, Assembly = Vector2<f64>>>(
+fn dynamics<M: Mechanism<2, ChainState = Vector2<f64>>>(
     mechanism: M,
     axes: &[Axis; 2],
 ) -> Dynamics<2, M> {
@@ -91,7 +93,7 @@ fn a_load_in_its_gap_coasts() {
 }
 
 /// Energy in rotors, carriages and springs [J].
-fn energy<M: Mechanism<2, Assembly = Vector2<f64>>>(
+fn energy<M: Mechanism<2, ChainState = Vector2<f64>>>(
     dynamics: &Dynamics<2, M>,
     state: &State<2>,
     wound: &Vector2<f64>,
@@ -105,7 +107,7 @@ fn energy<M: Mechanism<2, Assembly = Vector2<f64>>>(
 }
 
 /// Carriages that bounce to and fro between undamped flanks, and crossed belts that do.
-fn bounce<M: Mechanism<2, Assembly = Vector2<f64>>>(mechanism: M) -> f64 {
+fn bounce<M: Mechanism<2, ChainState = Vector2<f64>>>(mechanism: M) -> f64 {
     let axes = axes([BACKLASH, BACKLASH / 3.0]);
     let mut dynamics = dynamics(mechanism, &axes);
     let weights = dynamics.motors().windings.weights(SUBSTEP);

@@ -4,8 +4,10 @@
 
 mod shaft;
 
-use drives::plant::dynamics::{Dynamics, Motors, Phases, State};
+use drives::plant::dynamics::Dynamics;
 use drives::plant::friction;
+use drives::plant::motors::Motors;
+use drives::plant::state::{Phases, State};
 use machine::Friction;
 use nalgebra::Vector1;
 use serde_json::Value;

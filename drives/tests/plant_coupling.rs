@@ -7,13 +7,15 @@ mod arm;
 mod shaft;
 
 use arm::Arm;
-use drives::plant::dynamics::{Dynamics, Motors, Phases, State};
+use drives::plant::dynamics::Dynamics;
+use drives::plant::motors::Motors;
+use drives::plant::state::{Phases, State};
 use drives::plant::{Plant, PlantOptions, friction};
 use drives::{Actuation, Freshness, Measurement, Port};
 use machine::kinematics::Joints;
 use machine::{Axis, Friction, LaserSource, Mechanism, Pose};
+use messages::{CommandMode, FaultCode, axis::axis_array};
 use nalgebra::{Vector2, Vector3};
-use signals::{CommandMode, FaultCode, axis::axis_array};
 
 const SUBSTEP: f64 = 50e-6;
 const FREE: f64 = f64::INFINITY;

@@ -4,14 +4,16 @@
 
 mod shaft;
 
-use drives::plant::dynamics::{Dynamics, Motors, Phases, State};
+use drives::plant::dynamics::Dynamics;
+use drives::plant::motors::Motors;
+use drives::plant::state::{Phases, State};
 use drives::plant::{Plant, PlantOptions, friction};
 use drives::{Actuation, Freshness, Measurement, Port};
 use machine::transmission::Elasticity;
 use machine::{Axis, CoreXy, Friction, LaserSource, Machine, MechanismKind};
+use messages::{CommandMode, axis::axis_array};
 use nalgebra::{Vector1, Vector2};
 use shaft::Shaft;
-use signals::{CommandMode, axis::axis_array};
 
 const SUBSTEP: f64 = 50e-6;
 const DARK: LaserSource = LaserSource { on_delay: 0.0, off_delay: 0.0 };
@@ -171,7 +173,8 @@ fn friction_does_not_lower_the_accuracy_below_a_nanometre() {
 fn torque_below_stiction_never_creeps() {
     let machine = Machine::builtin();
     let motor = *machine.axes[0].motor.dc().unwrap();
-    let breakaway = machine.axes[0].friction.coulomb / motor.torque_constant * motor.resistance;
+    let breakaway =
+        motor.voltage(machine.axes[0].friction.coulomb / motor.torque_constant, 0.0, 0.0);
     let mut plant = plant(corexy(), &machine.axes);
     let start = *plant.state();
     for _ in 0..1000 {
@@ -270,8 +273,7 @@ fn stretch(direction: [f64; 2]) -> f64 {
         let middle = (f64::from(index) + 0.5) * 1e-3;
         let angular = 10.0 / ratio;
         let torque = motor.rotor_inertia * angular + mass * 10.0 * ratio / 2.0;
-        let volts = motor.resistance * torque / motor.torque_constant
-            + motor.torque_constant * angular * middle;
+        let volts = motor.voltage(torque / motor.torque_constant, 0.0, angular * middle);
         before = plant.state().load_speed;
         cycle(&mut plant, &voltage(&belts.map(|belt| belt * volts)));
     }

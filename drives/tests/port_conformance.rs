@@ -6,9 +6,9 @@
 use drives::{Actuation, Freshness, Measurement, PlantOptions, Port, Power, SimulatedPlant};
 use machine::transmission::{Elasticity, screw::at_nut};
 use machine::{Cartesian, Machine, MechanismKind};
-use signals::laser::{GateEdge, MAX_EDGES};
-use signals::time::CYCLE_PERIOD;
-use signals::{CommandMode, FaultCode, LaserCycle, MAX_AXES};
+use messages::laser::{GateEdge, MAX_EDGES};
+use messages::time::CYCLE_PERIOD;
+use messages::{CommandMode, FaultCode, LaserCycle, MAX_AXES};
 
 /// A port under test, with what its machine can bear.
 struct Subject {

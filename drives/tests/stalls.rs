@@ -6,10 +6,10 @@ use drives::{
     Actuation, Bridge, BridgeOptions, Deadlines, Measurement, PlantOptions, Port, SimulatedPlant,
 };
 use machine::{LaserSource, Machine, StallTolerance};
-use signals::feedback::status;
-use signals::laser::{GateEdge, LaserCycle};
-use signals::random::SplitMix64;
-use signals::{
+use messages::feedback::status;
+use messages::laser::{GateEdge, LaserCycle};
+use messages::random::SplitMix64;
+use messages::{
     Command, CommandMode, Cycle, FaultCode, Feedback, Nanoseconds, RealtimeFacts, StallCause,
     axis::axis_array,
 };
@@ -107,7 +107,7 @@ fn cycle_numbers_are_the_time_whatever_was_skipped() {
         assert_eq!((feedback.cycle, feedback.skipped), (Cycle(cycle), skipped as u16));
         assert_eq!(feedback.deadline.0, START + PERIOD * cycle as i64);
         assert_eq!(feedback.has(status::COMMAND_MISSED), skipped > 0);
-        assert!(!feedback.has(status::STOPPED_ALONE));
+        assert!(!feedback.has(status::WATCHDOG_TRIPPED));
     }
 }
 
@@ -196,7 +196,7 @@ fn a_stall_is_a_fault_exactly_when_it_is_longer_than_tolerated() {
                     feedback = run.cycle(0, (left == 0).then_some(dark()));
                 }
                 let case = format!("{cycles} of {tolerated}, {skipped} skipped");
-                let stopped = feedback.has(status::STOPPED_ALONE);
+                let stopped = feedback.has(status::WATCHDOG_TRIPPED);
                 assert_eq!(stopped, cycles > tolerated, "{case}");
                 assert_eq!(feedback.missed, cycles as u64, "{case}");
                 let fault = feedback.fault;
@@ -227,7 +227,7 @@ fn after_a_stall_too_long_the_axes_have_braked_and_rest_in_the_dark() {
     // The brake had more than a second.
     let still = run.dark();
     assert_eq!(run.dark().counts, still.counts);
-    assert!(still.has(status::STOPPED_ALONE) && !still.laser.is_lit());
+    assert!(still.has(status::WATCHDOG_TRIPPED) && !still.laser.is_lit());
     let report = run.bridge.report(RealtimeFacts::default());
     assert_eq!((report.stops, report.missed, report.lit), (1, 1501, 0));
     assert_eq!((report.stalls.count, report.stalls.longest), (1, Nanoseconds(1501 * PERIOD)));

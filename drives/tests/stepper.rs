@@ -8,9 +8,9 @@ mod shaft;
 use drives::plant::{Plant, PlantOptions};
 use drives::{Actuation, Freshness, Measurement, Port, Power};
 use machine::{Axis, Encoder, Friction, LaserSource, LoopGains, Motor, StepperMotor};
+use messages::time::CYCLE_TIME;
+use messages::{CommandMode, FaultCode, axis::axis_array};
 use shaft::Shaft;
-use signals::time::CYCLE_TIME;
-use signals::{CommandMode, FaultCode, axis::axis_array};
 
 const DARK: LaserSource = LaserSource { on_delay: 0.0, off_delay: 0.0 };
 
@@ -135,7 +135,7 @@ fn a_load_is_held_at_home_and_counted_in_pulses() {
 }
 
 /// The first fault on a ramp of `acceleration` [rad/s²], with the speed that it was told at.
-fn ramp(plant: &mut Plant<1, Shaft>, acceleration: f64) -> (signals::Fault, f64) {
+fn ramp(plant: &mut Plant<1, Shaft>, acceleration: f64) -> (messages::Fault, f64) {
     for cycle in 1..2000 {
         let time = f64::from(cycle) * CYCLE_TIME;
         let speed = acceleration * time;

@@ -6,9 +6,9 @@ use drives::{
     Bridge, BridgeOptions, Deadlines, Freshness, GatePermission, PlantOptions, SimulatedPlant,
 };
 use machine::{Machine, StallTolerance};
-use signals::feedback::status;
-use signals::laser::{GateEdge, LaserCycle, MAX_EDGES};
-use signals::{
+use messages::feedback::status;
+use messages::laser::{GateEdge, LaserCycle, MAX_EDGES};
+use messages::{
     Command, CommandMode, Cycle, FaultCode, Feedback, Nanoseconds, RealtimeFacts, axis::axis_array,
 };
 
@@ -152,7 +152,7 @@ fn the_first_stale_cycle_is_dark_for_every_pattern_of_edges() {
         assert!(stale.has(status::COMMAND_MISSED));
         let after = run.answered(CommandMode::Voltage, LaserCycle::OFF);
         assert!(!after.laser.is_lit(), "{bits:#b}: {:?}", after.laser);
-        assert!(!after.has(status::COMMAND_MISSED) && !after.has(status::STOPPED_ALONE));
+        assert!(!after.has(status::COMMAND_MISSED) && !after.has(status::WATCHDOG_TRIPPED));
         trips += u64::from(laser.last().0 != 0);
         assert_eq!(run.bridge.report(facts()).gate_trips, trips, "{bits:#b}");
     }
@@ -187,7 +187,7 @@ fn more_misses_than_tolerated_stop_the_axes_until_a_reset_and_a_new_start() {
     for expected in [false, false, true] {
         let feedback = run.missed();
         assert!(feedback.has(status::COMMAND_MISSED));
-        assert_eq!(feedback.has(status::STOPPED_ALONE), expected);
+        assert_eq!(feedback.has(status::WATCHDOG_TRIPPED), expected);
     }
     let fault = run.bridge.feedback().fault;
     assert_eq!((fault.code(), fault.value, fault.limit), (FaultCode::StaleCommand, 3.0, 2.0));
@@ -201,17 +201,17 @@ fn more_misses_than_tolerated_stop_the_axes_until_a_reset_and_a_new_start() {
     // Neither commands, nor disabling, nor a restarted controller that knows of no reset.
     for mode in [CommandMode::Voltage, CommandMode::Disabled, CommandMode::Voltage] {
         let feedback = run.answered(mode, lit());
-        assert!(feedback.has(status::STOPPED_ALONE) && !feedback.laser.is_lit());
+        assert!(feedback.has(status::WATCHDOG_TRIPPED) && !feedback.laser.is_lit());
     }
     let reset = |run: &mut Run, mode, reset| {
         run.cycle(|feedback| Some(Command { reset, ..command(feedback, mode, lit()) }))
     };
     // A reset while it still asks for voltage does not start it.
     reset(&mut run, CommandMode::Voltage, 9);
-    assert!(reset(&mut run, CommandMode::Voltage, 9).has(status::STOPPED_ALONE));
+    assert!(reset(&mut run, CommandMode::Voltage, 9).has(status::WATCHDOG_TRIPPED));
     reset(&mut run, CommandMode::Disabled, 9);
     let cleared = reset(&mut run, CommandMode::Voltage, 9);
-    assert!(!cleared.has(status::STOPPED_ALONE) && !cleared.fault.is_some());
+    assert!(!cleared.has(status::WATCHDOG_TRIPPED) && !cleared.fault.is_some());
     assert!(reset(&mut run, CommandMode::Voltage, 9).has(status::POWERED));
     assert!(reset(&mut run, CommandMode::Voltage, 9).laser.is_lit());
 
@@ -220,7 +220,7 @@ fn more_misses_than_tolerated_stop_the_axes_until_a_reset_and_a_new_start() {
         run.missed();
     }
     reset(&mut run, CommandMode::Disabled, 9);
-    assert!(reset(&mut run, CommandMode::Disabled, 9).has(status::STOPPED_ALONE));
+    assert!(reset(&mut run, CommandMode::Disabled, 9).has(status::WATCHDOG_TRIPPED));
     assert_eq!(run.bridge.report(facts()).stops, 2);
 }
 
@@ -229,7 +229,7 @@ fn power_needs_a_command_that_starts_from_disabled() {
     let mut run = Run::new(Deadlines::Strict);
     run.answered(CommandMode::Voltage, lit());
     let refused = run.answered(CommandMode::Voltage, lit());
-    assert!(refused.has(status::STOPPED_ALONE) && !refused.has(status::POWERED));
+    assert!(refused.has(status::WATCHDOG_TRIPPED) && !refused.has(status::POWERED));
     assert!(!run.answered(CommandMode::Voltage, lit()).laser.is_lit());
 }
 
@@ -245,7 +245,7 @@ fn a_controller_that_leaves_unpowered_stops_nothing() {
         run.missed();
     }
     let feedback = run.missed();
-    assert!(!feedback.fault.is_some() && !feedback.has(status::STOPPED_ALONE));
+    assert!(!feedback.fault.is_some() && !feedback.has(status::WATCHDOG_TRIPPED));
     assert_eq!(feedback.missed, 3);
 }
 
@@ -260,7 +260,7 @@ fn a_command_that_makes_no_sense_stops_at_once() {
         });
         let feedback = run.answered(CommandMode::Voltage, lit());
         assert_eq!((feedback.fault.code(), feedback.fault.axis), (FaultCode::NotFinite, 2));
-        assert!(feedback.has(status::STOPPED_ALONE));
+        assert!(feedback.has(status::WATCHDOG_TRIPPED));
         assert!(!run.answered(CommandMode::Voltage, lit()).laser.is_lit());
         assert_eq!(run.bridge.report(facts()).gate_trips, 1);
         for _ in 0..300 {
@@ -279,7 +279,7 @@ fn a_mode_without_drive_stops_with_the_ports_fault() {
     assert_eq!(feedback.fault.value, f64::from(CommandMode::Position as u32));
     assert_eq!(feedback.fault.at, feedback.measured);
     assert!(!run.answered(CommandMode::Voltage, lit()).laser.is_lit());
-    assert!(run.bridge.feedback().has(status::STOPPED_ALONE));
+    assert!(run.bridge.feedback().has(status::WATCHDOG_TRIPPED));
 }
 
 #[test]
@@ -293,7 +293,7 @@ fn a_dead_peer_closes_the_gate_and_leaves_the_axes_to_the_controller() {
     assert!(feedback.laser.is_lit() && feedback.has(status::GATE_INHIBITED));
     for _ in 0..5 {
         let feedback = run.answered(CommandMode::Voltage, lit());
-        assert!(!feedback.laser.is_lit() && !feedback.has(status::STOPPED_ALONE));
+        assert!(!feedback.laser.is_lit() && !feedback.has(status::WATCHDOG_TRIPPED));
     }
     assert_eq!(run.bridge.report(facts()).gate_trips, 1);
     assert_eq!(run.bridge.feedback().missed, 0);

@@ -12,7 +12,7 @@ mod loads;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use machine::kinematics::{Attitude, Freedom, Joints, ToolMotion};
+use machine::kinematics::{Attitude, Joints, TaskSpace, ToolMotion};
 use machine::mechanisms::mcm::McmBranch;
 use machine::mechanisms::polar::PolarBranch;
 use machine::mechanisms::serial::{JointKind, Link};
@@ -33,7 +33,7 @@ struct Case<const N: usize, M: Mechanism<N>> {
     pose: Pose,
     tool: ToolMotion,
     /// The chain at the position before.
-    before: M::Assembly,
+    before: M::ChainState,
     velocity: Joints<N>,
     acceleration: Joints<N>,
 }
@@ -50,15 +50,15 @@ fn round<const N: usize, M: Mechanism<N>>(
             middle[axis] + 1e-3 * (4.0 * (turn.fract() - 0.5).abs() - 1.0)
         })
     };
-    let flat = |vector: Vector3<f64>| match mechanism.freedom() {
-        Freedom::Plane => Vector3::new(vector.x, vector.y, 0.0),
+    let flat = |vector: Vector3<f64>| match mechanism.task_space() {
+        TaskSpace::Plane => Vector3::new(vector.x, vector.y, 0.0),
         _ => vector,
     };
     core::array::from_fn(|index| {
         let q = joints(index);
         let before =
-            mechanism.assemble(&joints((index + POSITIONS - 1) % POSITIONS), branch, None).unwrap();
-        let pose = mechanism.pose(&mechanism.assemble(&q, branch, None).unwrap());
+            mechanism.solve(&joints((index + POSITIONS - 1) % POSITIONS), branch, None).unwrap();
+        let pose = mechanism.pose(&mechanism.solve(&q, branch, None).unwrap());
         let tool = ToolMotion {
             position: pose.position,
             velocity: flat(Vector3::new(0.2, -0.1, 0.05)),
@@ -97,18 +97,18 @@ fn measure<const N: usize, M: Mechanism<N>>(
         });
     });
     let mut next = cases.iter().cycle();
-    group.bench_function("assembly and inverse dynamics", |bencher| {
+    group.bench_function("solve and inverse dynamics", |bencher| {
         bencher.iter(|| {
             let case = black_box(next.next().unwrap());
-            let there = mechanism.assemble(&case.q, branch, Some(&case.before)).unwrap();
+            let there = mechanism.solve(&case.q, branch, Some(&case.before)).unwrap();
             mechanism.inverse_dynamics(&there, &case.velocity, &case.acceleration)
         });
     });
     let mut next = cases.iter().cycle();
-    group.bench_function("assembly from nothing", |bencher| {
+    group.bench_function("solve from nothing", |bencher| {
         bencher.iter(|| {
             let case = black_box(next.next().unwrap());
-            mechanism.assemble(&case.q, branch, None).unwrap()
+            mechanism.solve(&case.q, branch, None).unwrap()
         });
     });
     group.finish();
@@ -231,12 +231,12 @@ fn link(twist: f64, length: f64, offset: f64) -> Link {
     }
 }
 
-fn chain<const N: usize>(freedom: Freedom, links: [Link; N], tool: Vector3<f64>) -> Serial<N> {
+fn chain<const N: usize>(task_space: TaskSpace, links: [Link; N], tool: Vector3<f64>) -> Serial<N> {
     Serial {
         base: Pose::at(Vector3::zeros()),
         links,
         tool: Pose::at(tool),
-        freedom,
+        task_space,
         gravity: Vector3::new(0.0, 0.0, -GRAVITY),
         elasticity: None,
     }
@@ -244,13 +244,13 @@ fn chain<const N: usize>(freedom: Freedom, links: [Link; N], tool: Vector3<f64>)
 
 fn two_joints() -> Serial<2> {
     let links = [link(0.0, 0.0, 0.0), link(0.0, 0.3, 0.0)];
-    chain(Freedom::Plane, links, Vector3::new(0.25, 0.0, 0.0))
+    chain(TaskSpace::Plane, links, Vector3::new(0.25, 0.0, 0.0))
 }
 
 fn six_joints() -> Serial<6> {
     use core::f64::consts::FRAC_PI_2;
     chain(
-        Freedom::Pose,
+        TaskSpace::Pose,
         [
             link(0.0, 0.0, 0.0),
             link(-FRAC_PI_2, 0.0, 0.15),

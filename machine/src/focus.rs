@@ -4,7 +4,7 @@
 //! less than t. By how much depends on the ray, so a wide cone has no sharp focus there. It is needed
 //! by the machine of source 000; the source does not treat it.
 
-use signals::math;
+use messages::math;
 
 /// Travel of the lens [m] that brings the focus of rays near the beam's axis to `depth` [m] below
 /// the face of a glass with refractive `index`.

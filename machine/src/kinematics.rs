@@ -177,7 +177,7 @@ pub struct KinematicsError {
 
 /// What a tool can be told: the part of a [`Pose`] that a mechanism can choose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Freedom {
+pub enum TaskSpace {
     /// x and y.
     Plane,
     /// x, y and z.
@@ -251,8 +251,8 @@ pub struct Margin {
 
 /// A mechanism with `N` actuated axes: pure functions of its dimensions and masses.
 ///
-/// [`Mechanism::assemble`] solves the chain once for a joint position; what depends on the position
-/// is then asked of the [`Mechanism::Assembly`] that it gives. Elasticity sits between the motor
+/// [`Mechanism::solve`] solves the chain once for a joint position; what depends on the position
+/// is then asked of the [`Mechanism::ChainState`] that it gives. Elasticity sits between the motor
 /// side and the load side of the transmission and is linear:
 /// `τ = K·(q_motor − q_load) + B·(q̇_motor − q̇_load)` in joint coordinates.
 pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
@@ -260,55 +260,55 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
     type Branch: Branch;
 
     /// The mechanism at one joint position, everything passive solved: bodies, angles, Jacobian.
-    type Assembly: Copy + core::fmt::Debug + Send + 'static;
+    type ChainState: Copy + core::fmt::Debug + Send + 'static;
 
     /// The name in machine files and summaries.
     const NAME: &'static str;
 
     /// What of a pose it can choose.
-    fn freedom(&self) -> Freedom;
+    fn task_space(&self) -> TaskSpace;
 
     /// The branch in which the machine is built and works.
     fn branch(&self) -> Self::Branch;
 
-    /// Solves the chain with the joints at `q` [m or rad]. `near` is an assembly at a position close
+    /// Solves the chain with the joints at `q` [m or rad]. `near` is the solved chain at a position close
     /// by, from which an iterative solution starts.
     ///
     /// # Errors
     /// Where the chain cannot close.
-    fn assemble(
+    fn solve(
         &self,
         q: &Joints<N>,
         branch: Self::Branch,
-        near: Option<&Self::Assembly>,
-    ) -> Result<Self::Assembly, KinematicsError>;
+        near: Option<&Self::ChainState>,
+    ) -> Result<Self::ChainState, KinematicsError>;
 
     /// The same where the tool is known to be at `pose`, from the inverse that gave `q`: what an
     /// iterative solution looks for.
     ///
     /// # Errors
     /// Where the chain cannot close.
-    fn assemble_at(
+    fn solve_at(
         &self,
         _pose: &Pose,
         q: &Joints<N>,
         branch: Self::Branch,
-        near: Option<&Self::Assembly>,
-    ) -> Result<Self::Assembly, KinematicsError> {
-        self.assemble(q, branch, near)
+        near: Option<&Self::ChainState>,
+    ) -> Result<Self::ChainState, KinematicsError> {
+        self.solve(q, branch, near)
     }
 
     /// Where the tool is.
-    fn pose(&self, assembly: &Self::Assembly) -> Pose;
+    fn pose(&self, chain: &Self::ChainState) -> Pose;
 
-    /// The branch that an assembly is in.
-    fn branch_of(&self, assembly: &Self::Assembly) -> Self::Branch;
+    /// The branch that a solved chain is in.
+    fn branch_of(&self, chain: &Self::ChainState) -> Self::Branch;
 
     /// Tool velocity per joint rate.
-    fn jacobian(&self, assembly: &Self::Assembly) -> Jacobian<N>;
+    fn jacobian(&self, chain: &Self::ChainState) -> Jacobian<N>;
 
     /// Distances to the mechanism's singularities and collisions, each with what it must keep.
-    fn margins(&self, assembly: &Self::Assembly) -> Vec<Margin>;
+    fn margins(&self, chain: &Self::ChainState) -> Vec<Margin>;
 
     /// Where the tool is with the joints at `q` [m or rad].
     ///
@@ -318,7 +318,7 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
         self.locate(q, branch, None)
     }
 
-    /// The pose of [`Self::assemble`] alone, to the bit, which may be had for less than the assembly.
+    /// The pose of [`Self::solve`] alone, to the bit, which may be had for less than the whole chain.
     ///
     /// # Errors
     /// Where the chain cannot close.
@@ -326,9 +326,9 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
         &self,
         q: &Joints<N>,
         branch: Self::Branch,
-        near: Option<&Self::Assembly>,
+        near: Option<&Self::ChainState>,
     ) -> Result<Pose, KinematicsError> {
-        Ok(self.pose(&self.assemble(q, branch, near)?))
+        Ok(self.pose(&self.solve(q, branch, near)?))
     }
 
     /// The joints that bring the tool to `pose` on `branch`, continuous with `previous`.
@@ -374,14 +374,14 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
 
     /// Inertia of the load in joint coordinates, symmetric and positive definite, rotors excluded
     /// [kg or kg·m²].
-    fn mass_matrix(&self, assembly: &Self::Assembly) -> SMatrix<f64, N, N>;
+    fn mass_matrix(&self, chain: &Self::ChainState) -> SMatrix<f64, N, N>;
 
     /// Coriolis, centrifugal and gravity efforts of the load, moving at `velocity` [m/s or rad/s];
     /// in [N or N·m].
-    fn bias(&self, assembly: &Self::Assembly, velocity: &Joints<N>) -> Joints<N>;
+    fn bias(&self, chain: &Self::ChainState, velocity: &Joints<N>) -> Joints<N>;
 
     /// The part of [`Self::bias`] that is there at rest [N or N·m].
-    fn gravity(&self, assembly: &Self::Assembly) -> Joints<N>;
+    fn gravity(&self, chain: &Self::ChainState) -> Joints<N>;
 
     /// Whether [`Self::mass_matrix`] and [`Self::gravity`] are the same everywhere, and there is no
     /// other bias.
@@ -394,11 +394,6 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
         false
     }
 
-    /// Joints that may turn without end, and look alike after every turn.
-    fn turns(&self) -> [bool; N] {
-        [false; N]
-    }
-
     /// Stiffness of the transmission [N/m or N·m/rad], symmetric; `None` when it is rigid.
     fn stiffness(&self) -> Option<SMatrix<f64, N, N>>;
 
@@ -408,11 +403,11 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
     /// Efforts on the load side of the transmission for a motion of the joints [N or N·m].
     fn inverse_dynamics(
         &self,
-        assembly: &Self::Assembly,
+        chain: &Self::ChainState,
         velocity: &Joints<N>,
         acceleration: &Joints<N>,
     ) -> Joints<N> {
-        self.mass_matrix(assembly) * acceleration + self.bias(assembly, velocity)
+        self.mass_matrix(chain) * acceleration + self.bias(chain, velocity)
     }
 }
 

@@ -8,16 +8,16 @@
 #![allow(rustdoc::broken_intra_doc_links)]
 
 pub mod actuator;
-pub mod deviation;
 pub mod document;
 pub mod file;
 pub mod focus;
+pub mod gcode_settings;
 pub mod kinematics;
+pub mod laser;
 pub mod limits;
 pub mod machine;
 pub mod mechanisms;
 pub mod motor;
-pub mod process;
 pub mod pulses;
 pub mod quantity;
 pub mod surface;
@@ -27,9 +27,10 @@ pub mod trip;
 
 pub use actuator::{Axis, Encoder, Friction, JointUnit, LoopGains};
 pub use document::{DocumentError, Override};
+pub use gcode_settings::{GcodeSettings, ZMeaning};
 pub use kinematics::{Mechanism, Pose};
-pub use limits::{AxisLimits, PathLimits, StallTolerance, WorkArea};
+pub use laser::LaserSource;
+pub use limits::{AxisLimits, CornerMode, PathLimits, StallTolerance, WorkArea};
 pub use machine::{Machine, Warning};
 pub use mechanisms::{Cartesian, CoreXy, Mcm, MechanismKind, MechanismVisitor, Polar, Serial};
 pub use motor::{DcMotor, Motor, StepperMotor};
-pub use process::{GcodeSettings, LaserSource, ZMeaning};

@@ -1,8 +1,8 @@
 //! Limits of the path, of each axis, of the area that the tool may reach, and of the time for which
 //! the axes may go on without a command.
 
-use signals::Nanoseconds;
-use signals::time::CYCLE_PERIOD;
+use messages::Nanoseconds;
+use messages::time::CYCLE_PERIOD;
 
 /// Limits of the tool's motion; they bind the norms of the vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,6 +18,15 @@ pub struct PathLimits {
     /// How far a smoothed join may lie from the drawn line, and the tool from its path between two
     /// setpoints [m].
     pub tolerance: f64,
+}
+
+/// How the corners of a path are passed where a job says nothing of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CornerMode {
+    /// On the way, rounded within the path's tolerance.
+    Blend,
+    /// At rest, exactly.
+    Exact,
 }
 
 /// Limits of one axis, in its joint's own unit.

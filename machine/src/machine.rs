@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use crate::actuator::Axis;
 use crate::document::{Concern, DocumentError, Override};
-use crate::limits::{PathLimits, StallTolerance, WorkArea};
+use crate::gcode_settings::GcodeSettings;
+use crate::laser::LaserSource;
+use crate::limits::{CornerMode, PathLimits, StallTolerance, WorkArea};
 use crate::mechanisms::MechanismKind;
-use crate::process::{GcodeSettings, LaserSource};
 
 /// The built-in machine's file.
 pub(crate) const BUILTIN: &str = include_str!("../../machines/corexy.toml");
@@ -31,6 +32,8 @@ pub struct Machine {
     pub home_joints: Vec<f64>,
     /// Limits of the tool's motion.
     pub path: PathLimits,
+    /// How corners are passed where a job says nothing of them.
+    pub corners: CornerMode,
     /// How long the axes may go on without a fresh command.
     pub stall: StallTolerance,
     /// The laser source.

@@ -2,7 +2,7 @@
 //! the surface is turned there.
 //!
 //! A drawing has x and y [m]. The surface gives the point in the workpiece's frame and its outward
-//! normal, against which the tool looks. Everything is written over [`Scalar`], so that a drawing
+//! normal, which the tool faces. Everything is written over [`Scalar`], so that a drawing
 //! that moves gives the point's derivatives too.
 
 mod cone;

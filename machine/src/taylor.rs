@@ -6,7 +6,7 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-use signals::math;
+use messages::math;
 
 /// What an equation of kinematics needs of its numbers: [`f64`], or [`Taylor`].
 pub trait Scalar:

@@ -1,9 +1,9 @@
 //! How far a plan may go, and where supervision stops the machine, side by side.
 //!
 //! A plan at its limit must never trip by rounding, by the resolution of a measurement, or by what the
-//! loops add to the feedforward. So each limit that both look at has two values here: the planner's
-//! checker asks for [`Limit::plan`], the controller's supervision for [`Limit::trip`]. Nobody else
-//! holds a share of a limit of his own.
+//! loops add to the feedforward. So each limit that both check has two values here: the planner's
+//! checker asks for [`Limit::plan`], the controller's supervision for [`Limit::trip`]. No other part
+//! keeps a margin of its own.
 
 use crate::actuator::Axis;
 use crate::motor::{DcMotor, Motor};
@@ -88,7 +88,7 @@ impl Axis {
         Limit::planned(
             friction
                 + match &self.motor {
-                    Motor::Dc(motor) => motor.torque_constant * motor.current,
+                    Motor::Dc(motor) => motor.largest_torque(),
                     Motor::Stepper(motor) => motor.holding_torque,
                 },
         )

@@ -171,13 +171,13 @@ fn the_shipped_files_are_usual() {
         files += 1;
         let machine = Machine::load(&path, &[]).unwrap();
         // The source's own table contradicts itself, and the files tell it as it is printed.
-        let doubts: Vec<&str> = machine
+        let warnings: Vec<&str> = machine
             .warnings
             .iter()
             .map(|warning| warning.text.as_str())
             .filter(|text| !text.contains("the nominal torque of 0.200 N·m at 3000 rpm"))
             .collect();
-        assert!(doubts.is_empty(), "{}: {doubts:#?}", path.display());
+        assert!(warnings.is_empty(), "{}: {warnings:#?}", path.display());
     }
     assert_eq!(files, 10);
 }

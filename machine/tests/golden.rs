@@ -6,9 +6,9 @@ use std::path::Path;
 
 use machine::kinematics::{Attitude, Jacobian, JointMotion, Joints, ToolMotion};
 use machine::{Machine, Mechanism, MechanismKind, MechanismVisitor, Pose};
+use messages::math;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use serde_json::Value;
-use signals::math;
 
 /// Relative to the size of the value; both sides are f64 and differ in the order of operations.
 const TOLERANCE: f64 = 1e-12;
@@ -76,7 +76,7 @@ impl Compare {
 
         let effort = mechanism
             .inverse_dynamics(
-                &mechanism.assemble(&q, branch, None).unwrap(),
+                &mechanism.solve(&q, branch, None).unwrap(),
                 &motion.velocity,
                 &motion.acceleration,
             )
@@ -86,7 +86,7 @@ impl Compare {
         check("power", power, pose["power"].as_f64().unwrap(), 1.0);
 
         let j =
-            plane(&mechanism.jacobian(&mechanism.assemble(&q, branch, None).unwrap()), &self.ratio);
+            plane(&mechanism.jacobian(&mechanism.solve(&q, branch, None).unwrap()), &self.ratio);
         for row in 0..2 {
             let expected = pair(&pose["J"][row]);
             check_pair("J", Vector2::new(j[(row, 0)], j[(row, 1)]), expected);

@@ -7,9 +7,9 @@ use machine::mechanisms::{
     ActuatorBodies, FiveBar, FiveBarBranch, Prrrp, PrrrpBranch, TwinActuator, TwinBranch,
 };
 use machine::{Mechanism, Pose};
+use messages::math;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use serde_json::Value;
-use signals::math;
 
 /// Relative; the golden vectors come from other equations for the same things.
 const TOLERANCE: f64 = 1e-9;
@@ -59,7 +59,7 @@ fn check_pose<M: Mechanism<2>>(
     mechanism: &M,
     pose: &Value,
     p: f64,
-) -> (M::Assembly, JointMotion<2>) {
+) -> (M::ChainState, JointMotion<2>) {
     let branch = mechanism.branch();
     let tool = ToolMotion {
         position: in_plane(&pose["x"]),
@@ -79,13 +79,13 @@ fn check_pose<M: Mechanism<2>>(
     check_pair("velocity", motion.velocity / p, pair(&pose["qd"]));
     check_pair("acceleration", motion.acceleration / p, pair(&pose["qdd"]));
 
-    let assembly = mechanism.assemble(&q, branch, None).unwrap();
-    assert_eq!(mechanism.branch_of(&assembly), branch);
-    let effort = mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
+    let chain = mechanism.solve(&q, branch, None).unwrap();
+    assert_eq!(mechanism.branch_of(&chain), branch);
+    let effort = mechanism.inverse_dynamics(&chain, &motion.velocity, &motion.acceleration);
     check_pair("tau", effort * p, pair(&pose["tau"]));
     check("power", effort.dot(&motion.velocity), number(&pose["power"]), effort.norm());
 
-    let j = mechanism.jacobian(&assembly).fixed_view::<2, 2>(0, 0) * p;
+    let j = mechanism.jacobian(&chain).fixed_view::<2, 2>(0, 0) * p;
     for row in 0..2 {
         check_pair("J", j.row(row).transpose(), pair(&pose["J"][row]));
     }
@@ -100,7 +100,7 @@ fn check_pose<M: Mechanism<2>>(
     let angle = math::atan2(2.0 * product[(0, 1)], spread) / 2.0;
     let off = (angle - number(&pose["manip_major_axis_angle"])) / core::f64::consts::PI;
     check("angle", off, off.round(), 1.0);
-    (assembly, motion)
+    (chain, motion)
 }
 
 fn five_bar() -> FiveBar {
@@ -161,32 +161,32 @@ fn the_five_bar_agrees_with_its_golden_vectors() {
     let poses = list(&file, "poses");
     assert_eq!(poses.len(), 15);
     for pose in poses {
-        let (assembly, motion) = check_pose(&mechanism, pose, 1.0);
+        let (chain, motion) = check_pose(&mechanism, pose, 1.0);
         // Passive joints, relative to the proximal links.
         let [th1, ph1, th2, ph2] = [0, 1, 2, 3].map(|index| number(&pose["Q4"][index]));
         let [_, pd1, _, pd2] = [0, 1, 2, 3].map(|index| number(&pose["Q4d"][index]));
         let [_, pdd1, _, pdd2] = [0, 1, 2, 3].map(|index| number(&pose["Q4dd"][index]));
         let (v, a) = (motion.velocity, motion.acceleration);
-        let (tool_even, even) = assembly.even_accelerations(&v);
+        let (tool_even, even) = chain.even_accelerations(&v);
         let absolute = [th1 + ph1, th2 + ph2];
         let mut turning = [0.0; 2];
         for arm in 0..2 {
             let (sine, cosine) = math::sin_cos(absolute[arm]);
-            check_pair("distal", assembly.distal[arm] / 0.25, Vector2::new(cosine, sine));
-            let rate = assembly.distal_rates[arm].dot(&v) - v[arm];
+            check_pair("distal", chain.distal[arm] / 0.25, Vector2::new(cosine, sine));
+            let rate = chain.distal_rates[arm].dot(&v) - v[arm];
             check("passive velocity", rate, [pd1, pd2][arm], v.amax());
-            turning[arm] = assembly.distal_rates[arm].dot(&a) + even[arm];
+            turning[arm] = chain.distal_rates[arm].dot(&a) + even[arm];
             check("passive acceleration", turning[arm] - a[arm], [pdd1, pdd2][arm], a.amax());
         }
-        let tool = assembly.jacobian * a + tool_even;
+        let tool = chain.jacobian * a + tool_even;
         check_pair("tool acceleration", tool, pair(&pose["a"]));
         let hinges = [0, 1].map(|arm| {
-            let p = assembly.proximal[arm];
+            let p = chain.proximal[arm];
             Vector2::new(-p.y, p.x) * a[arm] - p * (v[arm] * v[arm])
         });
         let link = (mechanism.distal_mass, mechanism.distal_inertia);
         let load = Vector2::new(mechanism.tool_mass, mechanism.tool_mass + mechanism.bar_mass);
-        let found = reaction(link, load, assembly.distal, hinges, tool, turning);
+        let found = reaction(link, load, chain.distal, hinges, tool, turning);
         check_pair("R", found, pair(&pose["R"]));
     }
 }
@@ -212,11 +212,11 @@ fn every_mode_of_the_five_bar_is_its_own() {
         for answer in list(mode, "fk") {
             let assembly_mode = answer["assembly"].as_i64().unwrap() as i32;
             let asked = FiveBarBranch { assembly_mode, ..branch };
-            let assembly = mechanism.assemble(&q, asked, None).unwrap();
-            check_pair("forward", assembly.tool, pair(&answer["x"]));
-            let [p1, p2] = assembly.proximal;
-            let [d1, d2] = assembly.distal;
-            let found = mechanism.branch_of(&assembly);
+            let chain = mechanism.solve(&q, asked, None).unwrap();
+            check_pair("forward", chain.tool, pair(&answer["x"]));
+            let [p1, p2] = chain.proximal;
+            let [d1, d2] = chain.distal;
+            let found = mechanism.branch_of(&chain);
             assert_eq!(found.assembly_mode, assembly_mode);
             if found.assembly_mode == branch.assembly_mode {
                 assert_eq!(found, branch);
@@ -247,21 +247,21 @@ fn the_prrrp_agrees_with_its_golden_vectors() {
     let poses = list(&file, "poses");
     assert_eq!(poses.len(), 15);
     for pose in poses {
-        let (assembly, motion) = check_pose(&mechanism, pose, value("p_m_per_rad"));
+        let (chain, motion) = check_pose(&mechanism, pose, value("p_m_per_rad"));
         let (v, a) = (motion.velocity, motion.acceleration);
         check_pair("carts", motion.position, pair(&pose["carts"]));
         check_pair("cart velocity", v, pair(&pose["cart_vel"]));
         check_pair("cart acceleration", a, pair(&pose["cart_acc"]));
-        let force = mechanism.inverse_dynamics(&assembly, &v, &a);
+        let force = mechanism.inverse_dynamics(&chain, &v, &a);
         check_pair("cart force", force, pair(&pose["cart_force"]));
-        let (tool_even, even) = assembly.even_accelerations(&v);
-        let tool = assembly.jacobian * a + tool_even;
+        let (tool_even, even) = chain.even_accelerations(&v);
+        let tool = chain.jacobian * a + tool_even;
         check_pair("tool acceleration", tool, pair(&pose["a"]));
-        let turning = [0, 1].map(|cart| assembly.link_rates[cart].dot(&a) + even[cart]);
+        let turning = [0, 1].map(|cart| chain.link_rates[cart].dot(&a) + even[cart]);
         let hinges = [0, 1].map(|cart| Vector2::new(0.0, a[cart]));
         let link = (mechanism.link_mass, mechanism.link_inertia);
         let load = Vector2::new(mechanism.tool_mass, mechanism.tool_mass + mechanism.bar_mass);
-        let found = reaction(link, load, assembly.links, hinges, tool, turning);
+        let found = reaction(link, load, chain.links, hinges, tool, turning);
         check_pair("R", found, pair(&pose["R"]));
     }
 }
@@ -304,21 +304,21 @@ fn the_twin_actuator_agrees_with_its_golden_vectors() {
         let lengths = pair(&output["L_total"]);
         let q = mechanism.inverse(&tool.pose(), branch, &Joints::zeros()).unwrap();
         check_pair("lengths", q, lengths);
-        let assembly = mechanism.assemble(&lengths, branch, None).unwrap();
-        check_pair("forward", assembly.tool, pair(&output["fk_P"]));
-        check_pair("J", assembly.joint, pair(&output["J"]));
-        check("theta", assembly.angle(), number(&output["theta"]), 1.0);
+        let chain = mechanism.solve(&lengths, branch, None).unwrap();
+        check_pair("forward", chain.tool, pair(&output["fk_P"]));
+        check_pair("J", chain.joint, pair(&output["J"]));
+        check("theta", chain.angle(), number(&output["theta"]), 1.0);
         for row in 0..2 {
             let expected = pair(&output["jacobian"][row]);
-            check_pair("jacobian", assembly.jacobian.row(row).transpose(), expected);
+            check_pair("jacobian", chain.jacobian.row(row).transpose(), expected);
         }
         let det = number(&output["det"]);
-        check("det", assembly.jacobian.determinant(), det, det.abs());
+        check("det", chain.jacobian.determinant(), det, det.abs());
         let motion = mechanism.joint_motion(&tool, branch, &Joints::zeros()).unwrap();
         check_pair("rates", motion.velocity, pair(&output["L_rate"]));
         // det = (La − h·cos θh)·Lb/(q·La·sin θ′), from the margins.
         let margin = |name: &str| {
-            let margins = mechanism.margins(&assembly);
+            let margins = mechanism.margins(&chain);
             margins.iter().find(|margin| margin.name == name).unwrap().value
         };
         let base = (mechanism.bases[1] - mechanism.bases[0]).norm();

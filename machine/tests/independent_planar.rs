@@ -45,12 +45,12 @@ fn near(what: &str, found: Vector2<f64>, expected: Vector2<f64>) {
 /// Forwards from the joints, and back from the tool.
 fn check<M: Mechanism<2>>(mechanism: &M, case: &Value) {
     let [q, velocity, acceleration] = ["q", "qd", "qdd"].map(|key| pair(&case[key]));
-    let assembly = mechanism.assemble(&q, mechanism.branch(), None).unwrap();
-    assert_eq!(mechanism.branch_of(&assembly), mechanism.branch());
-    near("x", mechanism.pose(&assembly).position.xy(), pair(&case["x"]));
-    let jacobian = mechanism.jacobian(&assembly);
+    let chain = mechanism.solve(&q, mechanism.branch(), None).unwrap();
+    assert_eq!(mechanism.branch_of(&chain), mechanism.branch());
+    near("x", mechanism.pose(&chain).position.xy(), pair(&case["x"]));
+    let jacobian = mechanism.jacobian(&chain);
     near("v", (jacobian * velocity).fixed_rows::<2>(0).into_owned(), pair(&case["xd"]));
-    let effort = mechanism.inverse_dynamics(&assembly, &velocity, &acceleration);
+    let effort = mechanism.inverse_dynamics(&chain, &velocity, &acceleration);
     near("tau", effort, pair(&case["tau"]));
 
     let space = |key: &str| Vector3::new(number(&case[key][0]), number(&case[key][1]), 0.0);

@@ -7,7 +7,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use machine::kinematics::{Freedom, Joints};
+use machine::kinematics::{Joints, TaskSpace};
 use machine::mechanisms::serial::{JointKind, Link};
 use machine::{Mechanism, Pose, Serial};
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -66,22 +66,22 @@ fn check<const N: usize>(case: &Value) {
         base: pose(&case["base"]),
         links: links.try_into().unwrap(),
         tool: pose(&case["tool"]),
-        freedom: Freedom::Pose,
+        task_space: TaskSpace::Pose,
         gravity: Vector3::new(0.0, 0.0, -9.806_65),
         elasticity: None,
     };
     let [q, velocity, acceleration] =
         ["q", "qd", "qdd"].map(|key| Joints::<N>::from_column_slice(&numbers(&case[key])));
-    let assembly = chain.assemble(&q, (), None).unwrap();
-    let found = chain.pose(&assembly);
+    let state = chain.solve(&q, (), None).unwrap();
+    let found = chain.pose(&state);
     near("position", found.position, vector(&case["position"]));
     let turned: Matrix3<f64> = matrix(&case["rotation"]);
     near("rotation", found.rotation, turned);
-    near("jacobian", chain.jacobian(&assembly), matrix::<6, N>(&case["jacobian"]));
-    near("mass", chain.mass_matrix(&assembly), matrix::<N, N>(&case["mass"]));
+    near("jacobian", chain.jacobian(&state), matrix::<6, N>(&case["jacobian"]));
+    near("mass", chain.mass_matrix(&state), matrix::<N, N>(&case["mass"]));
     let effort = |key: &str| Joints::<N>::from_column_slice(&numbers(&case[key]));
-    near("gravity", chain.gravity(&assembly), effort("gravity"));
-    near("tau", chain.inverse_dynamics(&assembly, &velocity, &acceleration), effort("tau"));
+    near("gravity", chain.gravity(&state), effort("gravity"));
+    near("tau", chain.inverse_dynamics(&state, &velocity, &acceleration), effort("tau"));
 }
 
 #[test]

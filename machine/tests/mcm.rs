@@ -4,12 +4,12 @@
 
 mod support;
 
-use machine::kinematics::{Attitude, Branch, Freedom, Joints, ToolMotion};
+use machine::kinematics::{Attitude, Branch, Joints, TaskSpace, ToolMotion};
 use machine::mechanisms::mcm::{McmBranch, McmLoad};
 use machine::{Mcm, Mechanism, Pose};
+use messages::math;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
-use signals::math;
 use support::{Random, array, code_of, conforms, golden, near, number, vector};
 
 fn mcm(parameters: &Value) -> Mcm {
@@ -35,7 +35,7 @@ fn branch(sign: &Value) -> McmBranch {
 }
 
 /// A rotation whose −z is `axis`, turned about it by `roll` [rad].
-fn looking(axis: &Vector3<f64>, roll: f64) -> Matrix3<f64> {
+fn pointing(axis: &Vector3<f64>, roll: f64) -> Matrix3<f64> {
     let up = -axis.normalize();
     let side = up.cross(&Vector3::new(0.3, -0.8, 0.52)).normalize();
     let (s, c) = math::sin_cos(roll);
@@ -109,7 +109,7 @@ fn tool_axes_agree_with_the_golden_vectors() {
         let previous = Joints::from(array::<5>(&input["prev_q"]));
         let axis = vector(&input["tool_axis"]);
         for roll in [0.0, 2.0] {
-            let pose = Pose { position: vector(&input["p"]), rotation: looking(&axis, roll) };
+            let pose = Pose { position: vector(&input["p"]), rotation: pointing(&axis, roll) };
             let q = machine.inverse(&pose, branch(&input["sign_X"]), &previous).unwrap();
             near((q - Joints::from(array::<5>(&output["q"]))).amax(), 0.0, 1e-9, &context);
             let kept = machine.inverse(&pose, machine.branch, &q).unwrap();
@@ -137,7 +137,7 @@ fn verdict(machine: &Mcm, limits: &Value, case: &Value) -> String {
         let (a, r) = (number(&input["a"]), number(&input["r"]));
         machine.inverse_machine_angles(&position, a, r, side, &previous)
     } else {
-        let rotation = looking(&vector(&input["tool_axis"]), 0.0);
+        let rotation = pointing(&vector(&input["tool_axis"]), 0.0);
         machine.inverse(&Pose { position, rotation }, McmBranch { side, lean: None }, &previous)
     };
     match solution {
@@ -332,7 +332,7 @@ fn a_path_through_the_vertical_keeps_the_heads_turn() {
 #[test]
 fn it_conforms() {
     let machine = reference();
-    assert_eq!(machine.freedom(), Freedom::Axis);
+    assert_eq!(machine.task_space(), TaskSpace::Axis);
     for side in [1, -1] {
         conforms(&machine, McmBranch { side: Some(side), lean: None }, |random| {
             let (s, c) = math::sin_cos(3.0 * random.next());
@@ -348,7 +348,7 @@ fn it_conforms() {
             tool.acceleration = random.vector(2.0);
             tool.jerk = random.vector(50.0);
             tool.attitude = Attitude {
-                rotation: looking(&axis, random.next()),
+                rotation: pointing(&axis, random.next()),
                 velocity: random.vector(0.5),
                 acceleration: random.vector(3.0),
                 jerk: random.vector(40.0),

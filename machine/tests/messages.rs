@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use machine::document::{Document, Override, Place, Position};
-use machine::{Machine, MechanismKind};
+use machine::document::{Document, Override, Position};
+use machine::{CornerMode, Machine, MechanismKind};
 
 const COREXY: &str = include_str!("../../machines/corexy.toml");
 
@@ -38,14 +38,18 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
     refused(
         "\"10 m/s^2\"",
         "10",
-        &["21:16: `10` has no unit, an acceleration is due; write it with its unit, such as \
-           \"10 m/s^2\""],
+        &[
+            "21:16: `10` has no unit, but an acceleration is needed; write it with its unit, such as \
+           \"10 m/s^2\"",
+        ],
     );
     refused(
         "\"10 m/s^2\"",
         "\"10 m/s\"",
-        &["21:16: `10 m/s` is a speed, an acceleration is due; write an acceleration such as \
-           \"10 m/s^2\""],
+        &[
+            "21:16: `10 m/s` is a speed, but an acceleration is needed; write an acceleration such as \
+           \"10 m/s^2\"",
+        ],
     );
     refused("\"2.3 ohm\"", "\"2.3 Ohm\"", &["47:14: `Ohm` is not a unit; did you mean `ohm`?"]);
     refused(
@@ -58,6 +62,18 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
         "z = \"ignored\"",
         "z = \"focused\"",
         &["106:5: `focused` is not a meaning of Z; did you mean \"focus\"?"],
+    );
+    refused(
+        "tolerance = \"5 um\"",
+        "corners = \"blended\"",
+        &["23:11: `blended` is not a way to pass corners; did you mean \"blend\"?"],
+    );
+    refused(
+        "tolerance = \"5 um\"",
+        "corners = true",
+        &[
+            "23:11: this is true or false, but a way to pass corners (\"blend\", \"exact\") is needed",
+        ],
     );
     refused(
         "z = \"ignored\"",
@@ -179,7 +195,7 @@ fn overrides_change_values_and_the_last_one_counts() {
 fn override_refused(setting: &str, expected: &str) {
     let error = Machine::parse("corexy.toml", COREXY, &set(&[setting])).unwrap_err();
     assert_eq!((error.line(), error.column()), (None, None));
-    assert_eq!(Place::of(&error), Position::default());
+    assert_eq!(Position::of(&error), Position::default());
     assert_eq!(error.to_string(), expected);
 }
 
@@ -199,7 +215,7 @@ fn what_is_other_in_the_plant_alone_is_laid_over_last_and_named_as_it_was_writte
 fn an_error_in_an_override_names_the_override() {
     override_refused(
         "path.jerk=500 m/s^2",
-        "--set machine.path.jerk=500 m/s^2: `500 m/s^2` is an acceleration, a jerk is due",
+        "--set machine.path.jerk=500 m/s^2: `500 m/s^2` is an acceleration, but a jerk is needed",
     );
     override_refused("path.jrk=3", "--set machine.path.jrk=3: unknown key `jrk`");
     override_refused(
@@ -208,7 +224,7 @@ fn an_error_in_an_override_names_the_override() {
     );
     override_refused("path..jerk=1", "--set machine.path..jerk=1: `path..jerk` has an empty part");
     override_refused("path.jerk=", "--set machine.path.jerk=: `` does not start with a number");
-    override_refused("path=3", "--set machine.path=3: this is a number, a table is due");
+    override_refused("path=3", "--set machine.path=3: this is a number, but a table is needed");
     assert_eq!(
         "path.jerk".parse::<Override>().unwrap_err().to_string(),
         "`path.jerk` is not KEY=VALUE, such as path.jerk=\"500 m/s^3\"",
@@ -346,4 +362,13 @@ fn a_cartesian_with_a_z_axis_focuses() {
     let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
     assert_eq!(names, ["x", "y", "z"]);
     assert_eq!(machine.axes[2].limits.position, [-0.011, 0.011]);
+}
+
+#[test]
+fn corners_are_blended_unless_the_file_has_them_exact() {
+    assert_eq!(Machine::builtin().corners, CornerMode::Blend);
+    let exact = Machine::builtin_with(&set(&["path.corners=\"exact\""])).unwrap();
+    assert_eq!(exact.corners, CornerMode::Exact);
+    let blend = Machine::builtin_with(&set(&["path.corners=blend"])).unwrap();
+    assert_eq!(blend.corners, CornerMode::Blend);
 }

@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used)]
 
 use machine::Machine;
-use machine::document::{DocumentError, Place, ProblemKind};
-use signals::random::SplitMix64;
+use machine::document::{DocumentError, Position, ProblemKind};
+use messages::random::SplitMix64;
 
 const FILES: [(&str, &str); 10] = [
     ("cartesian.toml", include_str!("../../machines/cartesian.toml")),
@@ -453,7 +453,7 @@ fn a_broken_header_is_refused_near_its_line() {
 #[test]
 fn random_damage_never_panics() {
     let mut sequence = SplitMix64::new(1);
-    let mut random = |below: usize| (sequence.bits() % below as u64) as usize;
+    let mut random = |below: usize| sequence.below(below as u64) as usize;
     let alphabet: Vec<char> = "0129.-+eE[]{}=\"'#\n\r\t ,ambµ²^/%\u{0}\u{feff}".chars().collect();
     for case in 0..4000 {
         let (file, text) = FILES[case % FILES.len()];
@@ -476,7 +476,7 @@ fn random_damage_never_panics() {
             // An independent count of line and column; a carriage return alone is a line break for
             // one and not for the other.
             if !damaged.contains('\r') {
-                let place = Place::of(&error);
+                let place = Position::of(&error);
                 let own = (error.line(), error.column());
                 let counted = (place.line.map(|l| l as usize), place.column.map(|c| c as usize));
                 assert_eq!(counted, own, "case {case}: {error}\n{damaged}");

@@ -108,8 +108,8 @@ fn the_five_bar_keeps_its_forearms_out_of_line() {
     let forearm = 0.28 - 0.2 * c;
     let tool = (0.25_f64 * 0.25 - forearm * forearm).sqrt();
     let q = inner.inverse(&pose(0.0, 0.2 * s + tool), inner.branch, &Joints::zeros()).unwrap();
-    assert!((signals::math::cos(q[0]) - c).abs() < 1e-12, "{q}");
-    let margins = inner.margins(&inner.assemble(&q, inner.branch, None).unwrap());
+    assert!((messages::math::cos(q[0]) - c).abs() < 1e-12, "{q}");
+    let margins = inner.margins(&inner.solve(&q, inner.branch, None).unwrap());
     assert_eq!(margins.iter().map(|margin| margin.name).collect::<Vec<_>>(), ["type_1", "type_2"]);
     // sin(Φ1 − Φ2) with both forearms at the same slope.
     let sine = 2.0 * forearm * tool / (0.25 * 0.25);
@@ -125,10 +125,10 @@ fn the_prrrp_refuses_what_its_links_cannot_span() {
     check(refused(&PRRRP, -0.2, 0.5), "wrong_side", None, -0.2, 0.0);
     check(refused(&PRRRP, 0.021, 0.5), "singular_type_2", None, 0.07, 0.1);
     check(refused(&PRRRP, 0.288, 0.5), "singular_type_1", None, 0.28, 0.3);
-    let assemble = |low: f64, high: f64| PRRRP.assemble(&[low, high].into(), PRRRP.branch, None);
-    check(assemble(0.0, 0.61).unwrap_err(), "unreachable_radius", None, 0.305, 0.3);
-    check(assemble(0.2, 0.1).unwrap_err(), "carts_crossed", Some(1), 0.1, 0.2);
-    let margins = PRRRP.margins(&assemble(0.1, 0.46).unwrap());
+    let solve = |low: f64, high: f64| PRRRP.solve(&[low, high].into(), PRRRP.branch, None);
+    check(solve(0.0, 0.61).unwrap_err(), "unreachable_radius", None, 0.305, 0.3);
+    check(solve(0.2, 0.1).unwrap_err(), "carts_crossed", Some(1), 0.1, 0.2);
+    let margins = PRRRP.margins(&solve(0.1, 0.46).unwrap());
     let values = [margins[0].value, margins[1].value];
     assert!((values[0] - 0.6).abs() + (values[1] - 0.8).abs() < 1e-12, "{margins:?}");
 }
@@ -136,7 +136,7 @@ fn the_prrrp_refuses_what_its_links_cannot_span() {
 #[test]
 fn the_twin_actuator_refuses_its_base_line_and_its_pivot() {
     // h·sin θh = 0.0546; |P − A| = 0.05.
-    let sideways = 0.06 * signals::math::sin(2.0);
+    let sideways = 0.06 * messages::math::sin(2.0);
     check(refused(&TWIN, 0.03, 0.04), "unreachable_near_A", Some(0), 0.05, sideways);
     // √(|P − A|² − 0.0546²) = 0.015.
     let radius = (sideways * sideways + 0.015 * 0.015).sqrt();
@@ -145,15 +145,15 @@ fn the_twin_actuator_refuses_its_base_line_and_its_pivot() {
     let baseline = refused(&TWIN, 0.44, 0.08);
     assert_eq!((baseline.code, baseline.limit), ("singular_baseline", 0.1));
     assert!(baseline.value.abs() < 0.1, "{baseline:?}");
-    let assemble = |la: f64, lb: f64| TWIN.assemble(&[la, lb].into(), TWIN.branch, None);
+    let solve = |la: f64, lb: f64| TWIN.solve(&[la, lb].into(), TWIN.branch, None);
     // The cosine at A of sides 0.8, 0.3 and 0.4: the two are shorter than the base.
     let cosine = (0.64 + 0.09 - 0.16) / (2.0 * 0.8 * 0.3);
-    check(assemble(0.3, 0.4).unwrap_err(), "unreachable_lengths", None, cosine, 1.0);
-    assert_eq!(assemble(-0.5, 0.6).unwrap_err().code, "unreachable_lengths");
-    let margins = TWIN.margins(&assemble(0.5, 0.5).unwrap());
+    check(solve(0.3, 0.4).unwrap_err(), "unreachable_lengths", None, cosine, 1.0);
+    assert_eq!(solve(-0.5, 0.6).unwrap_err().code, "unreachable_lengths");
+    let margins = TWIN.margins(&solve(0.5, 0.5).unwrap());
     // An isosceles triangle 0.3 high on a base of 0.8.
     assert!((margins[0].value - 0.6).abs() < 1e-12, "{margins:?}");
-    let forwards = 0.06 * signals::math::cos(2.0);
+    let forwards = 0.06 * messages::math::cos(2.0);
     assert!((margins[1].value - (0.5 - forwards)).abs() < 1e-12, "{margins:?}");
 }
 
@@ -170,7 +170,7 @@ fn what_is_not_a_number_is_refused() {
             for axis in 0..2 {
                 let mut joints = q;
                 joints[axis] = wrong;
-                assert!(mechanism.assemble(&joints, branch, None).is_err(), "{joints}");
+                assert!(mechanism.solve(&joints, branch, None).is_err(), "{joints}");
             }
         }
     }
@@ -206,9 +206,9 @@ fn the_five_bars_angles_are_those_of_the_equations_unless_a_turn_lies_between() 
         ..FIVE_BAR
     };
     let (x, y): (f64, f64) = (-0.15, 0.1);
-    let r = signals::math::hypot(x, y);
-    let expected =
-        signals::math::atan2(y, x) + signals::math::acos((0.04 + r * r - 0.0625) / (2.0 * 0.2 * r));
+    let r = messages::math::hypot(x, y);
+    let expected = messages::math::atan2(y, x)
+        + messages::math::acos((0.04 + r * r - 0.0625) / (2.0 * 0.2 * r));
     assert!(expected > core::f64::consts::PI, "{expected}");
     let q = machine.inverse(&place, machine.branch, &Joints::zeros()).unwrap();
     assert!((q[0] - expected).abs() < 1e-12, "{q}");

@@ -6,9 +6,9 @@ use machine::kinematics::{Attitude, Joints, ToolMotion};
 use machine::mechanisms::{ActuatorBodies, TwinActuator, TwinBranch};
 use machine::pulses::{PulseScale, crossings, nearest, quantisation_bound};
 use machine::{Mechanism, Pose};
+use messages::math;
 use nalgebra::{Vector2, Vector3};
 use serde_json::Value;
-use signals::math;
 
 fn golden() -> Value {
     let path = format!("{}/../tests/golden/twin_actuator.json", env!("CARGO_MANIFEST_DIR"));
@@ -78,9 +78,9 @@ fn single_poses_are_rounded_within_the_bound() {
         let rounded = Joints::from([0, 1].map(|axis| scales[axis].length(counts[axis])));
         let tool = mechanism.forward(&rounded, mechanism.branch).unwrap().position.xy();
         near("quantised", (tool - pair(&output["P_quantised"])).norm(), 0.0, 1e-14);
-        let assembly = mechanism.assemble(&lengths, mechanism.branch, None).unwrap();
+        let chain = mechanism.solve(&lengths, mechanism.branch, None).unwrap();
         let per_length = scales.map(|scale| scale.per_length);
-        let bound = quantisation_bound(&mechanism.jacobian(&assembly), &per_length);
+        let bound = quantisation_bound(&mechanism.jacobian(&chain), &per_length);
         near("bound", bound, number(&output["quant_bound"]), 1e-9 * bound);
         let error = (tool - pair(&case["input"]["P"])).norm();
         near("error", error, number(&output["quant_err"]), 1e-14);
@@ -239,14 +239,14 @@ fn the_paths_are_followed_within_the_bound_of_rounding() {
             }
             behind = ahead;
             let rounded = Joints::from([0, 1].map(|axis| scales[axis].length(counts[axis])));
-            let tool = mechanism.assemble(&rounded, branch, None).unwrap().tool;
+            let tool = mechanism.solve(&rounded, branch, None).unwrap().tool;
             pos_err = pos_err.max((tool - course.motion(time).position.xy()).norm());
             path_err = path_err.max(course.miss(tool));
             let lengths =
                 [0, 1].map(|axis| scales[axis].home + ahead[axis].0 / scales[axis].per_length);
-            let assembly = mechanism.assemble(&Joints::from(lengths), branch, None).unwrap();
+            let chain = mechanism.solve(&Joints::from(lengths), branch, None).unwrap();
             let per_length = scales.map(|scale| scale.per_length);
-            bound = bound.max(quantisation_bound(&mechanism.jacobian(&assembly), &per_length));
+            bound = bound.max(quantisation_bound(&mechanism.jacobian(&chain), &per_length));
         }
         assert_eq!(counts.map(|count| count as f64), [0, 1].map(|axis| number(&rule["N"][axis])));
         assert_eq!(burst as f64, number(&rule["max_burst"]));

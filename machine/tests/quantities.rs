@@ -5,7 +5,7 @@
 use core::f64::consts::TAU;
 
 use machine::quantity::*;
-use signals::random::SplitMix64;
+use messages::random::SplitMix64;
 
 #[track_caller]
 fn reads<K: Kind>(text: &str, expected: f64) {
@@ -93,17 +93,17 @@ fn what_is_no_quantity_is_refused_with_advice() {
     refuses::<Speed>(
         "3 kg",
         WrongDimension,
-        "`3 kg` is a mass, a speed is due; write a speed such as \"0.25 m/s\"",
+        "`3 kg` is a mass, but a speed is needed; write a speed such as \"0.25 m/s\"",
     );
     refuses::<Torque>(
         "3 N m/rad",
         WrongDimension,
-        "`3 N m/rad` is a torsional stiffness, a torque is due; write a torque such as \"5 mN m\"",
+        "`3 N m/rad` is a torsional stiffness, but a torque is needed; write a torque such as \"5 mN m\"",
     );
     refuses::<Length>(
         "20",
         NoUnit,
-        "`20` has no unit, a length is due; write a length such as \"120 mm\"",
+        "`20` has no unit, but a length is needed; write a length such as \"120 mm\"",
     );
     refuses::<Length>(
         "",

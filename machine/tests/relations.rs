@@ -26,7 +26,7 @@ fn told(name: &str, settings: &[&str]) -> Vec<String> {
 }
 
 #[track_caller]
-fn doubted(name: &str, settings: &[&str], parts: &[&str]) {
+fn warned(name: &str, settings: &[&str], parts: &[&str]) {
     let told = told(name, settings);
     let all = |text: &&String| parts.iter().all(|part| text.contains(part));
     assert!(told.iter().any(|text| all(&text)), "{name} {settings:?}: {told:#?}");
@@ -38,20 +38,20 @@ fn sound(name: &str, settings: &[&str]) {
 }
 
 #[test]
-fn a_following_error_below_a_count_is_refused_and_one_of_a_few_counts_doubted() {
+fn a_following_error_below_a_count_is_refused_and_one_of_a_few_counts_warned_of() {
     // A count of the belt is 10 mm / 8 turns: 1.917 µm.
-    doubted(
+    warned(
         "corexy",
         &["axis.a.limits.following_error=1.9 um"],
         &["1.900e-6 m stops the machine", "one count of the encoder is 1.917e-6 m (line 59)"],
     );
-    doubted(
+    warned(
         "corexy",
         &["axis.a.limits.following_error=7 um"],
         &["less than 4 times the count of the encoder of 1.917e-6 m", "noise of the encoder"],
     );
     // 62.5 µm of travel in 3200 pulses.
-    doubted(
+    warned(
         "cartesian_steppers",
         &["axis.y.limits.following_error=1 um"],
         &["one pulse is 1.563e-6 m"],
@@ -59,9 +59,9 @@ fn a_following_error_below_a_count_is_refused_and_one_of_a_few_counts_doubted() 
 }
 
 #[test]
-fn a_following_error_below_what_a_jerk_changes_is_doubted() {
+fn a_following_error_below_what_a_jerk_changes_is_warned_of() {
     // The head of 1.06 kg on 60 N/mm: (500 m/s³ · √2 · 2) · 1 ms · (1.06 / 60e3) s² / 0.25 = 100 µm.
-    doubted(
+    warned(
         "corexy",
         &["axis.a.limits.following_error=50 um"],
         &["below 9.994e-5 m", "the jerk of 500 m/s³ (line 22)"],
@@ -70,13 +70,13 @@ fn a_following_error_below_what_a_jerk_changes_is_doubted() {
 }
 
 #[test]
-fn an_encoder_coarser_than_the_tolerance_is_doubted() {
-    doubted(
+fn an_encoder_coarser_than_the_tolerance_is_warned_of() {
+    warned(
         "corexy",
         &["path.tolerance=1 um"],
         &["one count of the encoder moves the tool by 1.356 µm", "tolerance is 1.000 µm"],
     );
-    doubted("polar", &["axis.th2.encoder.resolution=400 counts/rev"], &["tolerance is 5.000 µm"]);
+    warned("polar", &["axis.th2.encoder.resolution=400 counts/rev"], &["tolerance is 5.000 µm"]);
     sound("corexy", &["path.tolerance=2 um"]);
 }
 
@@ -86,14 +86,14 @@ fn a_gear_that_is_off_shows_in_speed_or_in_the_load_that_the_rotor_feels() {
         let told = told("corexy", &[&format!("axis.a.gear={gear}")]);
         assert!(!told.is_empty(), "a gear of {gear} passed");
     }
-    doubted("corexy", &["axis.a.gear=0.8"], &["times the motor's 2.000e-6 kg·m² (line 50)"]);
-    doubted("polar", &["axis.th1.gear=5000"], &["the motor reaches 0.1600 rad/s without load"]);
-    doubted("five_bar", &["axis.th1.gear=25000"], &["near home a path at 0.25 m/s may ask it for"]);
+    warned("corexy", &["axis.a.gear=0.8"], &["times the motor's 2.000e-6 kg·m² (line 50)"]);
+    warned("polar", &["axis.th1.gear=5000"], &["the motor reaches 0.1600 rad/s without load"]);
+    warned("five_bar", &["axis.th1.gear=25000"], &["near home a path at 0.25 m/s may ask it for"]);
 }
 
 #[test]
-fn a_lead_longer_than_the_travel_is_doubted() {
-    doubted(
+fn a_lead_longer_than_the_travel_is_warned_of() {
+    warned(
         "cartesian",
         &["mechanism.cartesian.y.lead=300 mm/rev"],
         &["one turn of the gear's output moves the joint by 0.3000 m", "whole travel is 0.2020 m"],
@@ -103,19 +103,15 @@ fn a_lead_longer_than_the_travel_is_doubted() {
 #[test]
 fn time_constants_of_motors_are_doubted_where_no_motor_has_them() {
     let winding = "windings have 2e-5 to 0.2 s";
-    doubted("corexy", &["axis.a.motor.dc.inductance=2.3 uH"], &["1.000e-6 s", winding, "line 47"]);
-    doubted("corexy", &["axis.a.motor.dc.inductance=0.9 H"], &[winding, "line 47"]);
-    doubted(
-        "corexy",
-        &["axis.a.motor.dc.torque_constant=0.5 mN m/A"],
-        &["motors have 5e-5 to 2 s"],
-    );
+    warned("corexy", &["axis.a.motor.dc.inductance=2.3 uH"], &["1.000e-6 s", winding, "line 47"]);
+    warned("corexy", &["axis.a.motor.dc.inductance=0.9 H"], &[winding, "line 47"]);
+    warned("corexy", &["axis.a.motor.dc.torque_constant=0.5 mN m/A"], &["motors have 5e-5 to 2 s"]);
 }
 
 #[test]
-fn a_load_softer_than_the_loops_is_doubted() {
+fn a_load_softer_than_the_loops_is_warned_of() {
     // √(60 kN/m / 3 kg) = 141 rad/s, and the velocity loop has 160.
-    doubted(
+    warned(
         "corexy",
         &["mechanism.corexy.mass_y=3 kg"],
         &["a bandwidth of 160.0 rad/s", "resonates at 141.4 rad/s"],
@@ -124,16 +120,16 @@ fn a_load_softer_than_the_loops_is_doubted() {
 }
 
 #[test]
-fn a_position_loop_near_its_velocity_loop_is_doubted() {
+fn a_position_loop_near_its_velocity_loop_is_warned_of() {
     let parts = ["a bandwidth of 120.0 rad/s", "160.0 rad/s (line 67)", "swing together"];
-    doubted("corexy", &["axis.a.loops.position=120 1/s"], &parts);
+    warned("corexy", &["axis.a.loops.position=120 1/s"], &parts);
     sound("corexy", &["axis.a.loops.position=60 1/s"]);
 }
 
 #[test]
-fn loops_that_axes_make_faster_for_each_other_are_doubted() {
+fn loops_that_axes_make_faster_for_each_other_are_warned_of() {
     // The bar of a five-bar moves only where both arms do.
-    doubted(
+    warned(
         "five_bar",
         &["mechanism.five_bar.bar_mass=18.6 kg"],
         &["the axes move each other's load"],
@@ -142,18 +138,14 @@ fn loops_that_axes_make_faster_for_each_other_are_doubted() {
 }
 
 #[test]
-fn an_axis_that_sinks_without_power_is_doubted() {
-    doubted(
+fn an_axis_that_sinks_without_power_is_warned_of() {
+    warned(
         "mcm",
         &["mechanism.mcm.counterbalance=5 N"],
         &["it sinks while the motor is unpowered"],
     );
-    doubted(
-        "serial",
-        &["axis.j3.friction.brake=0 N m"],
-        &["it sinks while the motor is unpowered"],
-    );
-    doubted(
+    warned("serial", &["axis.j3.friction.brake=0 N m"], &["it sinks while the motor is unpowered"]);
+    warned(
         "mcm",
         &["mechanism.mcm.counterbalance=18 N"],
         &["it sinks while the motor is unpowered"],
@@ -162,10 +154,10 @@ fn an_axis_that_sinks_without_power_is_doubted() {
 }
 
 #[test]
-fn a_weight_that_the_loops_take_over_from_a_brake_is_doubted() {
+fn a_weight_that_the_loops_take_over_from_a_brake_is_warned_of() {
     // 0.5 kg on 10 mm/rev: 7.8 mN·m, of which friction holds 4; the loops are made for 160 rad/s
     // times 40 1/s times 1.03e-5 kg·m², and give way by 92 µm.
-    doubted(
+    warned(
         "serial",
         &["path.tolerance=3 um"],
         &["axis `j3`", "the loops give way by 92.", "marks soon after enabling show"],
@@ -173,20 +165,16 @@ fn a_weight_that_the_loops_take_over_from_a_brake_is_doubted() {
 }
 
 #[test]
-fn friction_that_takes_much_of_the_motor_or_of_the_path_is_doubted() {
-    doubted(
-        "corexy",
-        &["axis.a.friction.coulomb=50 mN m"],
-        &["friction takes 5.000e-2 N·m of the"],
-    );
-    doubted("corexy", &["axis.a.friction.coulomb=20 mN m"], &["pushes the tool off its path by"]);
+fn friction_that_takes_much_of_the_motor_or_of_the_path_is_warned_of() {
+    warned("corexy", &["axis.a.friction.coulomb=50 mN m"], &["friction takes 5.000e-2 N·m of the"]);
+    warned("corexy", &["axis.a.friction.coulomb=20 mN m"], &["pushes the tool off its path by"]);
     sound("corexy", &["axis.a.friction.coulomb=6 mN m"]);
 }
 
 #[test]
 fn a_stepper_whose_teeth_are_stronger_than_its_field_is_refused() {
     let detent = "axis.x.motor.stepper.detent_torque";
-    doubted("cartesian_steppers", &[&format!("{detent}=0.4 N m")], &["the motor could not turn"]);
-    doubted("cartesian_steppers", &[&format!("{detent}=0.2 N m")], &["50 % of the holding torque"]);
+    warned("cartesian_steppers", &[&format!("{detent}=0.4 N m")], &["the motor could not turn"]);
+    warned("cartesian_steppers", &[&format!("{detent}=0.2 N m")], &["50 % of the holding torque"]);
     sound("cartesian_steppers", &[&format!("{detent}=40 mN m")]);
 }

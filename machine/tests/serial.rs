@@ -4,11 +4,11 @@
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use machine::kinematics::{Freedom, Joints, ToolMotion};
+use machine::kinematics::{Joints, TaskSpace, ToolMotion};
 use machine::mechanisms::serial::{JointKind, Link};
 use machine::{Mechanism, Pose, Serial};
+use messages::math;
 use nalgebra::{Matrix2, Matrix3, Vector3};
-use signals::math;
 
 const GRAVITY: f64 = 9.806_65;
 
@@ -27,12 +27,12 @@ fn link(kind: JointKind, twist: f64, length: f64, offset: f64) -> Link {
     }
 }
 
-fn chain<const N: usize>(freedom: Freedom, links: [Link; N], tool: [f64; 3]) -> Serial<N> {
+fn chain<const N: usize>(task_space: TaskSpace, links: [Link; N], tool: [f64; 3]) -> Serial<N> {
     Serial {
         base: Pose::at(Vector3::zeros()),
         links,
         tool: Pose::at(Vector3::from(tool)),
-        freedom,
+        task_space,
         gravity: Vector3::new(0.0, 0.0, -GRAVITY),
         elasticity: None,
     }
@@ -51,7 +51,7 @@ fn planar() -> Serial<2> {
         inertia: Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, INERTIA[joint])),
         ..link(JointKind::Revolute, 0.0, length, 0.0)
     };
-    chain(Freedom::Plane, [body(0, 0.0), body(1, LENGTH[0])], [LENGTH[1], 0.0, 0.0])
+    chain(TaskSpace::Plane, [body(0, 0.0), body(1, LENGTH[0])], [LENGTH[1], 0.0, 0.0])
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn a_planar_arm_has_the_closed_forms_of_the_textbook() {
     // Hung up in the plane of gravity, to have all three parts of the efforts.
     let arm = Serial { gravity: Vector3::new(0.0, -GRAVITY, 0.0), ..planar() };
     let (q, rate) = (Joints::from([0.7, 1.1]), Joints::from([1.3, -2.1]));
-    let assembly = arm.assemble(&q, (), None).unwrap();
+    let state = arm.solve(&q, (), None).unwrap();
     let (s2, c2) = math::sin_cos(q[1]);
     let (c1, c12) = (math::cos(q[0]), math::cos(q[0] + q[1]));
     let (s1, s12) = (math::sin(q[0]), math::sin(q[0] + q[1]));
@@ -69,11 +69,11 @@ fn a_planar_arm_has_the_closed_forms_of_the_textbook() {
     let [i1, i2] = INERTIA;
 
     let tool = Vector3::new(l1 * c1 + l2 * c12, l1 * s1 + l2 * s12, 0.0);
-    assert!((arm.pose(&assembly).position - tool).amax() < 1e-15);
+    assert!((arm.pose(&state).position - tool).amax() < 1e-15);
     let far = i2 + m2 * r2 * r2;
     let cross = far + m2 * l1 * r2 * c2;
     let near = i1 + m1 * r1 * r1 + m2 * l1 * l1 + 2.0 * cross - far;
-    let mass = arm.mass_matrix(&assembly);
+    let mass = arm.mass_matrix(&state);
     assert!((mass - Matrix2::new(near, cross, cross, far)).amax() < 1e-15, "{mass}");
     let pull = m2 * l1 * r2 * s2;
     let lift = m2 * GRAVITY * r2 * c12;
@@ -83,7 +83,7 @@ fn a_planar_arm_has_the_closed_forms_of_the_textbook() {
             + lift,
         pull * rate[0] * rate[0] + lift,
     ]);
-    let bias = arm.bias(&assembly, &rate);
+    let bias = arm.bias(&state, &rate);
     assert!((bias - expected).amax() < 1e-14, "{bias} {expected}");
 }
 
@@ -93,7 +93,7 @@ fn the_polar_arm_of_table_1_is_where_the_source_says() {
     let (a1, l2) = (0.25, -0.04);
     let slide = Link { upper: 0.2, lower: 0.0, ..link(JointKind::Prismatic, 0.0, a1, 0.0) };
     let arm =
-        chain(Freedom::Space, [link(JointKind::Revolute, 0.0, 0.0, 0.0), slide], [0.0, 0.0, l2]);
+        chain(TaskSpace::Space, [link(JointKind::Revolute, 0.0, 0.0, 0.0), slide], [0.0, 0.0, l2]);
     let q = Joints::from([0.4, 0.07]);
     let pose = arm.forward(&q, ()).unwrap();
     let (s, c) = math::sin_cos(0.4);
@@ -112,7 +112,7 @@ fn the_polar_arm_of_table_1_is_where_the_source_says() {
 fn puma() -> Serial<6> {
     let turn = |twist, length, offset| link(JointKind::Revolute, twist, length, offset);
     chain(
-        Freedom::Pose,
+        TaskSpace::Pose,
         [
             turn(0.0, 0.0, 0.0),
             turn(-FRAC_PI_2, 0.0, 0.0),

@@ -47,9 +47,9 @@ fn what_a_stepper_does_not_have_is_refused() {
 #[test]
 fn steps_are_whole_and_currents_can_be_driven() {
     let found = errors("full_steps = 200", "full_steps = 202");
-    assert_eq!(found, ["202 of them cannot be"]);
+    assert_eq!(found, ["202 is not possible here: it must be a multiple of 4"]);
     let found = errors("microsteps = 16", "microsteps = 2.5");
-    assert_eq!(found, ["2.5 of them cannot be"]);
+    assert_eq!(found, ["2.5 is not possible here: it must be a multiple of 1"]);
     let found = errors("voltage = \"48 V\"", "voltage = \"2 V\"");
     assert_eq!(found, ["2.0 V across 1.650 Ω drive at most 1.21 A, not 1.68 A"]);
 }

@@ -86,7 +86,7 @@ fn golden_case(mechanism: &TriPlanar, case: &Value, tolerance: f64, fk_tolerance
     let q = mechanism.inverse(&pose, branch, &at_rest()).unwrap();
     near((q - Joints::from(list::<6>(&output["motors"]))).amax(), 0.0, tolerance, context);
 
-    let cold = mechanism.assemble(&q, branch, None).unwrap();
+    let cold = mechanism.solve(&q, branch, None).unwrap();
     same_pose(&mechanism.pose(&cold), &pose, fk_tolerance, context);
     assert_eq!(mechanism.branch_of(&cold), branch, "{context}");
     let guess = Pose {
@@ -95,19 +95,19 @@ fn golden_case(mechanism: &TriPlanar, case: &Value, tolerance: f64, fk_tolerance
     };
     // The guesses lie outside the limits now and then.
     if let Ok(guessed) = unlimited(mechanism).inverse(&guess, branch, &at_rest())
-        && let Ok(start) = mechanism.assemble(&guessed, branch, None)
+        && let Ok(start) = mechanism.solve(&guessed, branch, None)
     {
-        let warm = mechanism.assemble(&q, branch, Some(&start)).unwrap();
+        let warm = mechanism.solve(&q, branch, Some(&start)).unwrap();
         same_pose(&mechanism.pose(&warm), &pose, fk_tolerance, context);
     }
 
-    let known = mechanism.assemble_at(&pose, &q, branch, None).unwrap();
+    let known = mechanism.solve_at(&pose, &q, branch, None).unwrap();
     same_pose(&mechanism.pose(&known), &pose, fk_tolerance, context);
     // A pose that is not that of the feet, or no pose at all, does not matter.
-    let misled = mechanism.assemble_at(&guess, &q, branch, None).unwrap();
+    let misled = mechanism.solve_at(&guess, &q, branch, None).unwrap();
     same_pose(&mechanism.pose(&misled), &pose, fk_tolerance, context);
     let nowhere = Pose::at(pose.position * f64::NAN);
-    let found = mechanism.assemble_at(&nowhere, &q, branch, None).unwrap();
+    let found = mechanism.solve_at(&nowhere, &q, branch, None).unwrap();
     assert_eq!(found, cold, "{context}");
 
     let inverse_jacobian = cold.inverse_jacobian();
@@ -164,15 +164,15 @@ fn it_agrees_with_the_golden_vectors() {
     }
     assert_eq!(count, 19);
 
-    let mut assembly = None;
+    let mut chain = None;
     for point in golden["trajectory"].as_array().unwrap() {
         let context = &point.to_string();
         let pose = Pose { position: list(&point["t"]).into(), rotation: rotation(&point["rpy"]) };
         let q = mechanism.inverse(&pose, Legs::default(), &at_rest()).unwrap();
         near((q - Joints::from(list::<6>(&point["motors"]))).amax(), 0.0, tolerance, context);
-        let found = mechanism.assemble(&q, Legs::default(), assembly.as_ref()).unwrap();
+        let found = mechanism.solve(&q, Legs::default(), chain.as_ref()).unwrap();
         same_pose(&mechanism.pose(&found), &pose, fk_tolerance, context);
-        assembly = Some(found);
+        chain = Some(found);
     }
 
     for level in golden["level"].as_array().unwrap() {
@@ -182,14 +182,14 @@ fn it_agrees_with_the_golden_vectors() {
         let mut tool = ToolMotion::rest(&Pose::at(Vector3::new(0.0, 0.0, z)));
         tool.velocity.z = 1.0;
         let motion = mechanism.joint_motion(&tool, Legs::default(), &at_rest()).unwrap();
-        let assembly = mechanism.assemble(&motion.position, Legs::default(), None).unwrap();
+        let chain = mechanism.solve(&motion.position, Legs::default(), None).unwrap();
         for foot in 0..3 {
             let place = motion.position.fixed_rows::<2>(2 * foot).into_owned();
             let speed = motion.velocity.fixed_rows::<2>(2 * foot).into_owned();
             near(place.norm(), number(&level["R_feet"]), tolerance, context);
             let outward = speed.dot(&place) / place.norm();
             near(outward, number(&level["dR_dz"]), tolerance, context);
-            near(assembly.fold_angles()[foot], number(&level["omega"]), tolerance, context);
+            near(chain.fold_angles()[foot], number(&level["omega"]), tolerance, context);
         }
     }
 }
@@ -253,13 +253,13 @@ fn it_says_which_limit_and_by_how_much() {
     }
 
     let scattered = Joints::from([0.4, 0.3, -0.4, 0.3, 0.0, -0.3]);
-    assert_eq!(mechanism.assemble(&scattered, outward, None).unwrap_err().code, "no_assembly");
+    assert_eq!(mechanism.solve(&scattered, outward, None).unwrap_err().code, "no_assembly");
     let nowhere = Joints::from([f64::NAN; 6]);
-    assert_eq!(mechanism.assemble(&nowhere, outward, None).unwrap_err().code, "no_assembly");
-    // The feet of one branch are not an assembly of another.
+    assert_eq!(mechanism.solve(&nowhere, outward, None).unwrap_err().code, "no_assembly");
+    // The feet of one branch are no solution of another.
     let q = mechanism.inverse(&level(0.0, 0.0, 0.6), outward, &at_rest()).unwrap();
     let mixed = outward.choose("legs", &[-1, 1, 1]).unwrap();
-    assert_eq!(mechanism.assemble(&q, mixed, None).unwrap_err().code, "no_assembly");
+    assert_eq!(mechanism.solve(&q, mixed, None).unwrap_err().code, "no_assembly");
     assert_eq!(mixed.choices(), [("legs", vec![-1, 1, 1])]);
     assert_eq!(outward.choose("legs", &[0, 1, 1]), None);
     assert_eq!(outward.choose("elbow", &[1, 1, 1]), None);
@@ -290,17 +290,17 @@ fn feet_and_pose_lead_to_each_other_over_the_working_range() {
         for (which, branch) in [Legs::default(), mixed].into_iter().enumerate() {
             let Ok(q) = mechanism.inverse(&pose, branch, &at_rest()) else { continue };
             let context = &format!("case {case} {branch:?}: {pose:?}");
-            let cold = mechanism.assemble(&q, branch, None).expect(context);
+            let cold = mechanism.solve(&q, branch, None).expect(context);
             // The least singular value is 0.05, so rounding of 1e-16 may grow twentyfold and more.
             same_pose(&mechanism.pose(&cold), &pose, 1e-13, context);
             let back = mechanism.inverse(&mechanism.pose(&cold), branch, &q).expect(context);
             near((back - q).amax(), 0.0, 1e-13, context);
             // From the last pose, anywhere else on the stator, and from close by.
-            let warm = mechanism.assemble(&q, branch, last[which].as_ref()).expect(context);
+            let warm = mechanism.solve(&q, branch, last[which].as_ref()).expect(context);
             same_pose(&mechanism.pose(&warm), &pose, 1e-13, context);
             let moved = q + Joints::from_fn(|_, _| random.next() * 1e-4);
-            if let Ok(start) = mechanism.assemble(&moved, branch, Some(&cold)) {
-                let warm = mechanism.assemble(&q, branch, Some(&start)).expect(context);
+            if let Ok(start) = mechanism.solve(&moved, branch, Some(&cold)) {
+                let warm = mechanism.solve(&q, branch, Some(&start)).expect(context);
                 same_pose(&mechanism.pose(&warm), &pose, 1e-13, context);
             }
             last[which] = Some(cold);
@@ -400,8 +400,8 @@ fn every_derivative_of_the_joints_is_that_of_the_one_below() {
                 near((found - difference).amax() / scale, 0.0, 1e-5, context);
             }
             // What moves the feet moves the platform.
-            let assembly = mechanism.assemble(&motion.position, branch, None).expect(context);
-            let twist = mechanism.jacobian(&assembly) * motion.velocity;
+            let chain = mechanism.solve(&motion.position, branch, None).expect(context);
+            let twist = mechanism.jacobian(&chain) * motion.velocity;
             near((twist.fixed_rows::<3>(0) - course.tool.velocity).amax(), 0.0, 1e-12, context);
             let spin = course.tool.attitude.velocity;
             near((twist.fixed_rows::<3>(3) - spin).amax(), 0.0, 1e-12, context);
@@ -455,8 +455,8 @@ fn power_into_the_feet_is_the_change_of_energy() {
             let context = &format!("{branch:?} {:?}", course.tool);
             let motion: JointMotion<6> =
                 mechanism.joint_motion(&course.tool, branch, &at_rest()).unwrap();
-            let assembly = mechanism.assemble(&motion.position, branch, None).unwrap();
-            let mass = mechanism.mass_matrix(&assembly);
+            let chain = mechanism.solve(&motion.position, branch, None).unwrap();
+            let mass = mechanism.mass_matrix(&chain);
             assert_eq!(mass, mass.transpose());
             assert!(mass.cholesky().is_some(), "{context}");
             let kinetic = motion.velocity.dot(&(mass * motion.velocity)) / 2.0;
@@ -469,12 +469,11 @@ fn power_into_the_feet_is_the_change_of_energy() {
                 kinetic + potential
             };
             let change = (total(h) - total(-h)) / (2.0 * h);
-            let effort =
-                mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
+            let effort = mechanism.inverse_dynamics(&chain, &motion.velocity, &motion.acceleration);
             let power = effort.dot(&motion.velocity);
             near((power - change) / (1.0 + power.abs()), 0.0, 2e-4, context);
-            let still = mechanism.bias(&assembly, &at_rest());
-            near((still - mechanism.gravity(&assembly)).amax(), 0.0, 1e-12, context);
+            let still = mechanism.bias(&chain, &at_rest());
+            near((still - mechanism.gravity(&chain)).amax(), 0.0, 1e-12, context);
         }
     }
 }
@@ -489,20 +488,20 @@ fn the_bias_is_that_of_lagrange() {
         let context = &format!("{:?}", course.tool);
         let motion = mechanism.joint_motion(&course.tool, branch, &at_rest()).unwrap();
         let (q, velocity) = (motion.position, motion.velocity);
-        let assembly = mechanism.assemble(&q, branch, None).unwrap();
+        let chain = mechanism.solve(&q, branch, None).unwrap();
         let mass = |q: Joints<6>| {
-            mechanism.mass_matrix(&mechanism.assemble(&q, branch, Some(&assembly)).unwrap())
+            mechanism.mass_matrix(&mechanism.solve(&q, branch, Some(&chain)).unwrap())
         };
         let h = 1e-6;
         let change = (mass(q + velocity * h) - mass(q - velocity * h)) / (2.0 * h);
-        let mut expected = change * velocity + mechanism.gravity(&assembly);
+        let mut expected = change * velocity + mechanism.gravity(&chain);
         for joint in 0..6 {
             let mut offset = at_rest();
             offset[joint] = h;
             let kinetic = |q| velocity.dot(&(mass(q) * velocity)) / 2.0;
             expected[joint] -= (kinetic(q + offset) - kinetic(q - offset)) / (2.0 * h);
         }
-        let found = mechanism.bias(&assembly, &velocity);
+        let found = mechanism.bias(&chain, &velocity);
         near((found - expected).amax() / (1.0 + found.amax()), 0.0, 1e-6, context);
     }
 }
@@ -514,7 +513,7 @@ fn a_level_load_spreads_the_feet_by_a_third_of_it_over_tan_omega() {
     for share in [0.3, 0.5, 0.7, 0.9] {
         let pose = Pose::at(Vector3::new(0.1, -0.05, share * height));
         let q = massless.inverse(&pose, massless.legs, &at_rest()).unwrap();
-        let held = massless.gravity(&massless.assemble(&q, massless.legs, None).unwrap());
+        let held = massless.gravity(&massless.solve(&q, massless.legs, None).unwrap());
         let slope = share / (1.0_f64 - share * share).sqrt();
         let thrust = 0.8 * 9.806_65 / (3.0 * slope);
         for leg in 0..3 {
@@ -553,21 +552,21 @@ fn its_dynamics_are_those_of_an_independent_library() {
             };
             let q = mechanism.inverse(&pose, branch, &at_rest()).unwrap();
             near((q - joints("feet")).amax(), 0.0, tolerance, context);
-            let assembly = mechanism.assemble(&q, branch, None).unwrap();
-            same_pose(&mechanism.pose(&assembly), &pose, tolerance, context);
+            let chain = mechanism.solve(&q, branch, None).unwrap();
+            same_pose(&mechanism.pose(&chain), &pose, tolerance, context);
 
             let velocity = joints("velocity");
-            let twist = mechanism.jacobian(&assembly) * velocity;
+            let twist = mechanism.jacobian(&chain) * velocity;
             near((twist - joints("twist")).amax() / twist.amax(), 0.0, tolerance, context);
             let expected =
                 SMatrix::<f64, 6, 6>::from_fn(|row, column| number(&case["mass"][row][column]));
-            let mass = mechanism.mass_matrix(&assembly);
+            let mass = mechanism.mass_matrix(&chain);
             near((mass - expected).amax() / mass.amax(), 0.0, tolerance, context);
-            let gravity = mechanism.gravity(&assembly);
+            let gravity = mechanism.gravity(&chain);
             near((gravity - joints("gravity")).amax() / gravity.amax(), 0.0, tolerance, context);
-            let bias = mechanism.bias(&assembly, &velocity);
+            let bias = mechanism.bias(&chain, &velocity);
             near((bias - joints("bias")).amax() / bias.amax(), 0.0, tolerance, context);
-            let effort = mechanism.inverse_dynamics(&assembly, &velocity, &joints("acceleration"));
+            let effort = mechanism.inverse_dynamics(&chain, &velocity, &joints("acceleration"));
             near((effort - joints("effort")).amax() / effort.amax(), 0.0, tolerance, context);
             count += 1;
         }

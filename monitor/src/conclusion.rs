@@ -6,13 +6,13 @@
 
 pub mod verdict;
 
-pub use crate::recording::note::{RecordingState, WatchNote};
+pub use crate::recording::info::{RecordingInfo, RecordingState};
 
-use crate::examination::{Clock, Examination, Findings};
-use crate::marks::{Judgement, Marks, StreamEnd};
+use crate::marks::{MarkEvaluation, Marks, StreamEnd};
 use crate::recording::file::{RecordingError, RecordingReader};
-use crate::recording::note::Progress;
+use crate::recording::info::Progress;
 use crate::report::Report;
+use crate::run_analysis::{Clock, RunAnalysis, RunResults};
 use crate::run_folder::RunFolder;
 use crate::summary::text::length;
 use crate::summary::{
@@ -20,12 +20,12 @@ use crate::summary::{
     Summary,
 };
 use machine::{Axis, Machine};
+use messages::artwork::Artwork;
+use messages::plan::PlanFacts;
+use messages::time::CYCLE_TIME;
+use messages::{ControllerReport, DrivesReport, Fault, FaultCode, RealtimeFacts, run_folder};
 use runtime::thread;
 use serde::Deserialize;
-use signals::artwork::Artwork;
-use signals::plan::PlanFacts;
-use signals::time::CYCLE_TIME;
-use signals::{ControllerReport, DrivesReport, Fault, FaultCode, RealtimeFacts, run_folder};
 use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::time::Instant;
@@ -39,7 +39,7 @@ const END_CYCLES: u64 = 1;
 
 /// How a run ended, as whoever watched it knows.
 #[derive(Debug, Clone, Default)]
-pub struct Ending {
+pub struct RunOutcome {
     /// How whoever watched ended it; `None` where it ended by itself. What the reports say of the
     /// machine goes before it: see [`verdict`](verdict::verdict).
     pub outcome: Option<Outcome>,
@@ -65,31 +65,31 @@ pub struct Ending {
     pub warnings: Vec<String>,
 }
 
-/// The summary of a run from its ending, its plan, and what its recording tells; `findings` is
+/// The summary of a run from its outcome, its plan, and what its recording tells; `results` is
 /// `None` without a recording.
 pub fn summarise(
     machine: &Machine,
     plan: &PlanFacts,
-    ending: &Ending,
-    findings: Option<&Findings>,
+    run_outcome: &RunOutcome,
+    results: Option<&RunResults>,
     clock: Clock,
 ) -> Summary {
     let job = JobSummary {
-        name: if plan.name.is_empty() { ending.job.clone() } else { plan.name.clone() },
+        name: if plan.name.is_empty() { run_outcome.job.clone() } else { plan.name.clone() },
         strokes: plan.strokes as u64,
         length: plan.length,
     };
     let mut summary = Summary::new(Outcome::Aborted, job, machine_summary(machine));
-    summary.error = ending.error.clone();
-    summary.wall = ending.wall;
-    summary.plan_time = ending.plan_time;
-    summary.realtime_factor = ending.realtime_factor;
-    summary.warnings = ending.warnings.clone();
+    summary.error = run_outcome.error.clone();
+    summary.wall = run_outcome.wall;
+    summary.plan_time = run_outcome.plan_time;
+    summary.realtime_factor = run_outcome.realtime_factor;
+    summary.warnings = run_outcome.warnings.clone();
     summary.warnings.extend(plan.notes.iter().map(|note| match note.line {
         0 => note.text.clone(),
         line => format!("line {line}: {}", note.text),
     }));
-    if let Some(report) = &ending.controller {
+    if let Some(report) = &run_outcome.controller {
         summary.take_controller(report);
         summary.time = if report.completed == 1 {
             // What the stream took beyond its plan was holds and overrides.
@@ -99,9 +99,9 @@ pub fn summarise(
             report.cycles as f64 * CYCLE_TIME
         };
     }
-    if let Some(report) = &ending.drives {
-        summary.overruns = report.overruns.saturating_sub(ending.overruns_before);
-        if let Some(stream) = &ending.controller {
+    if let Some(report) = &run_outcome.drives {
+        summary.overruns = report.overruns.saturating_sub(run_outcome.overruns_before);
+        if let Some(stream) = &run_outcome.controller {
             summary.stalls = StallSummary::of(&report.stalls, stream);
         }
         // A clock that slips has the machine wait: the marks are the same.
@@ -109,35 +109,35 @@ pub fn summarise(
             summary.warnings.extend(summary.stalls.warning());
         }
     }
-    end(&mut summary, machine, ending);
+    end(&mut summary, machine, run_outcome);
     if let Some(fault) = &mut summary.fault {
         fault.blame(&summary.stalls);
     }
-    if let Some(findings) = findings {
-        summary.latency = findings.histograms.summary();
-        summary.recording = Some(findings.continuity.summary());
-        match &findings.marks {
-            Ok(judgement) => {
-                summary.warnings.extend(doubts(judgement));
-                summary.marks = Some(judgement.marks.clone());
+    if let Some(results) = results {
+        summary.latency = results.histograms.summary();
+        summary.recording = Some(results.continuity.summary());
+        match &results.marks {
+            Ok(evaluation) => {
+                summary.warnings.extend(warnings(evaluation));
+                summary.marks = Some(evaluation.marks.clone());
             }
             Err(reason) => summary.warnings.push(reason.to_string()),
         }
     }
     summary.realtime = match clock {
         Clock::Virtual => Realtime::in_virtual_time(),
-        Clock::Real => realtime(ending),
+        Clock::Real => realtime(run_outcome),
     };
     summary
 }
 
 /// How it ended. What came after a completed job is a warning, and none of its faults.
-fn end(summary: &mut Summary, machine: &Machine, ending: &Ending) {
+fn end(summary: &mut Summary, machine: &Machine, run_outcome: &RunOutcome) {
     let verdict = verdict::verdict(&verdict::Evidence {
-        controller: ending.controller,
-        latched: ending.latched,
-        drives: ending.drives.map(|report| report.fault).unwrap_or_default(),
-        own: ending.outcome,
+        controller: run_outcome.controller,
+        latched: run_outcome.latched,
+        drives: run_outcome.drives.map(|report| report.fault).unwrap_or_default(),
+        own: run_outcome.outcome,
     });
     let told = |fault: Fault| FaultSummary::of(&fault, &machine.axes);
     summary.outcome = verdict.outcome;
@@ -152,8 +152,8 @@ fn end(summary: &mut Summary, machine: &Machine, ending: &Ending) {
 }
 
 /// What a person should know of marks that are not judged whole.
-fn doubts(judgement: &Judgement) -> Vec<String> {
-    let Judgement { marks, unrecorded_strokes, unknown, open_end } = judgement;
+fn warnings(evaluation: &MarkEvaluation) -> Vec<String> {
+    let MarkEvaluation { marks, unrecorded_strokes, unknown, open_end } = evaluation;
     let Some((first, last)) = unrecorded_strokes else { return Vec::new() };
     let Marks { unrecorded, .. } = marks;
     let strokes = if first == last {
@@ -161,18 +161,18 @@ fn doubts(judgement: &Judgement) -> Vec<String> {
     } else {
         format!("between stroke {first} and stroke {last}")
     };
-    let mut doubts = vec![format!(
+    let mut warnings = vec![format!(
         "not all was recorded: {} {strokes} may be marked or missing and are not judged",
         length(*unrecorded)
     )];
     if *open_end {
         let nobody = "the recording ends before the job, and nobody can tell how far it went on";
-        doubts.push(nobody.to_owned());
+        warnings.push(nobody.to_owned());
     }
     if *unknown > 0 {
-        doubts.push(format!("the tool position was unknown in {unknown} lit cycles"));
+        warnings.push(format!("the tool position was unknown in {unknown} lit cycles"));
     }
-    doubts
+    warnings
 }
 
 /// The machine as summaries name it.
@@ -184,10 +184,11 @@ pub fn machine_summary(machine: &Machine) -> MachineSummary {
     }
 }
 
-fn realtime(ending: &Ending) -> Realtime {
-    let controller = ending.controller.map(|report| report.realtime);
+fn realtime(run_outcome: &RunOutcome) -> Realtime {
+    let controller = run_outcome.controller.map(|report| report.realtime);
     // Until drives has run a cycle, its report is empty.
-    let drives = ending.drives.filter(|report| report.cycle.0 != 0).map(|report| report.realtime);
+    let drives =
+        run_outcome.drives.filter(|report| report.cycle.0 != 0).map(|report| report.realtime);
     let reported: Vec<(&str, RealtimeFacts)> = [("controller", controller), ("drives", drives)]
         .into_iter()
         .filter_map(|(name, facts)| Some((name, facts?)))
@@ -204,54 +205,55 @@ fn realtime(ending: &Ending) -> Realtime {
 pub fn conclude(
     folder: &RunFolder,
     machine: &Machine,
-    ending: &Ending,
+    run_outcome: &RunOutcome,
     started: Instant,
 ) -> Summary {
     let began = Instant::now();
-    let mut ending = ending.clone();
-    let (mut plan, mut artwork, mut findings) = (PlanFacts::default(), Artwork::default(), None);
+    let mut run_outcome = run_outcome.clone();
+    let (mut plan, mut artwork, mut results) = (PlanFacts::default(), Artwork::default(), None);
     // A job that was refused has no plan: one in the folder is that of an earlier job.
-    if ending.outcome != Some(Outcome::Refused) {
-        let warnings = &mut ending.warnings;
+    if run_outcome.outcome != Some(Outcome::Refused) {
+        let warnings = &mut run_outcome.warnings;
         plan = read_json(folder, run_folder::PLAN, warnings).unwrap_or_default();
-        let note = WatchNote::read(folder).unwrap_or_default();
-        if !note.message.is_empty() {
-            warnings.push(format!("the recording was broken off: {}", note.message));
+        let info = RecordingInfo::read(folder).unwrap_or_default();
+        if !info.message.is_empty() {
+            warnings.push(format!("the recording was broken off: {}", info.message));
         }
         // Nor was anything marked before there was an artwork.
         if let Some(planned) = read_json(folder, run_folder::ARTWORK, warnings) {
             artwork = planned;
-            let faults = [ending.latched, ending.drives.map(|it| it.fault).unwrap_or_default()];
+            let faults =
+                [run_outcome.latched, run_outcome.drives.map(|it| it.fault).unwrap_or_default()];
             let silenced = faults.iter().any(|fault| fault.code() == FaultCode::DrivesLost);
-            let end = match &ending.controller {
+            let end = match &run_outcome.controller {
                 Some(report) => StreamEnd::Reported(report),
-                None if silenced && note.progress == Progress::Complete => StreamEnd::Silenced,
+                None if silenced && info.progress == Progress::Complete => StreamEnd::Silenced,
                 None => StreamEnd::Unknown,
             };
-            findings = examine(folder, &artwork, plan.speed, end)
+            results = examine(folder, &artwork, plan.speed, end)
                 .map_err(|reason| warnings.push(format!("there is no recording: {reason}")))
                 .ok();
         }
     }
-    let mut summary = summarise(machine, &plan, &ending, findings.as_ref(), Clock::Real);
+    let mut summary = summarise(machine, &plan, &run_outcome, results.as_ref(), Clock::Real);
     summary.report_time = began.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
-    write(folder, machine, &artwork, &mut summary, findings.as_ref());
+    write(folder, machine, &artwork, &mut summary, results.as_ref());
     summary
 }
 
 /// Writes report and summary into the run folder, tells the summary where that is, and adds what
-/// the report took to its times. Without findings there is no report. What cannot be written is a
+/// the report took to its times. Without results there is no report. What cannot be written is a
 /// warning in the summary, which names the file and the reason.
 pub fn write(
     folder: &RunFolder,
     machine: &Machine,
     artwork: &Artwork,
     summary: &mut Summary,
-    findings: Option<&Findings>,
+    results: Option<&RunResults>,
 ) {
     summary.out = Some(folder.path().to_string_lossy().into_owned());
-    if let Some(findings) = findings {
+    if let Some(results) = results {
         // A stepper's current says nothing of its torque.
         let constant = |axis: &Axis| axis.motor.dc().map_or(0.0, |motor| motor.torque_constant);
         let constants: Vec<f64> = machine.axes.iter().map(constant).collect();
@@ -259,9 +261,9 @@ pub fn write(
         let report = Report {
             summary,
             artwork,
-            trace: &findings.trace,
+            trace: &results.trace,
             torque_constants: &constants,
-            histograms: &findings.histograms,
+            histograms: &results.histograms,
         };
         if let Err(error) = report.write(folder) {
             summary.warnings.push(error.to_string());
@@ -282,21 +284,21 @@ fn examine(
     artwork: &Artwork,
     speed: f64,
     end: StreamEnd<'_>,
-) -> Result<Findings, String> {
+) -> Result<RunResults, String> {
     let path = folder.file(run_folder::SAMPLES);
     let at = |error: RecordingError| format!("{}: {error}", path.display());
     let file = File::open(&path).map_err(|error| at(error.into()))?;
     let reader = RecordingReader::new(BufReader::new(file)).map_err(at)?;
-    let mut examination = Examination::new(artwork, Clock::Real).with_fastest(speed);
+    let mut analysis = RunAnalysis::new(artwork, Clock::Real).with_fastest(speed);
     for record in reader {
         match record {
-            Ok(record) => examination.push(&record),
+            Ok(record) => analysis.push(&record),
             // A writer that was killed leaves a torn last record; all before it are whole.
             Err(RecordingError::Truncated { .. }) => break,
             Err(error) => return Err(at(error)),
         }
     }
-    Ok(examination.finish(end))
+    Ok(analysis.finish(end))
 }
 
 /// A file of the planner; `None` when it was never written, or cannot be read: then with a warning.

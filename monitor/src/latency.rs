@@ -6,10 +6,10 @@ use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::{
     IntervalLogIterator, IntervalLogWriterBuilder, IntervalLogWriterError, LogEntry, Tag,
 };
+use messages::Nanoseconds;
+use messages::hop::{Hop, latencies};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use signals::Nanoseconds;
-use signals::hop::{Hop, latencies};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
@@ -263,7 +263,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use hdrhistogram::serialization::Deserializer;
-    use signals::{Command, Cycle, Feedback};
+    use messages::{Command, Cycle, Feedback};
 
     fn record(cycle: u64) -> CycleRecord {
         let start = 1_000_000_000 + cycle as i64 * 1_000_000;

@@ -1,4 +1,4 @@
-//! The judgement of the marks: what the laser truly marked against what the job asked for.
+//! The evaluation of the marks: what the laser truly marked against what the job asked for.
 //!
 //! Matched stroke by stroke along the arc length, so that strokes which touch or cross in space do
 //! not hide each other. All light names its stroke, and the tool's place along that stroke is
@@ -9,7 +9,7 @@
 //! What passed while nobody recorded is *unrecorded*, from where the job had come before a gap to
 //! where light first fell or was due after it: missing, because nobody saw it marked.
 //!
-//! The [`Judge`] takes records as they come; it remembers runs of light, not samples.
+//! The [`MarkEvaluator`] takes records as they come; it remembers runs of light, not samples.
 
 pub mod coverage;
 mod frontier;
@@ -22,12 +22,12 @@ use crate::recording::continuity::Succession;
 use coverage::Coverage;
 use frontier::{Frontier, Unseen, first_light, last_light};
 use line::{Foot, Line};
+use messages::ControllerReport;
+use messages::artwork::Artwork;
+use messages::time::CYCLE_TIME;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use signals::ControllerReport;
-use signals::artwork::Artwork;
-use signals::time::CYCLE_TIME;
 use tool_path::{Interval, LitSpan, Moment, ToolPath};
 
 /// How the tool's true position was known.
@@ -76,7 +76,7 @@ pub struct Marks {
 
 /// The marks, and which of them passed while nobody recorded.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Judgement {
+pub struct MarkEvaluation {
     /// The marks.
     pub marks: Marks,
     /// The first and the last stroke, from 1, of which not all was recorded.
@@ -107,9 +107,9 @@ impl<'a> StreamEnd<'a> {
     }
 }
 
-/// Why there is no judgement at all.
+/// Why there is no evaluation at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Unjudged {
+pub enum Unevaluated {
     /// There are no records of the job's stream.
     #[error("the marks are not judged: nothing of the job was recorded")]
     Unrecorded,
@@ -118,9 +118,9 @@ pub enum Unjudged {
     ToolUnknown,
 }
 
-/// Judges marks record by record.
+/// Evaluates marks record by record.
 #[derive(Debug)]
-pub struct Judge<'a> {
+pub struct MarkEvaluator<'a> {
     artwork: &'a Artwork,
     path: ToolPath,
     newest: Option<Moment>,
@@ -217,7 +217,7 @@ const REACH: f64 = 1e-4;
 /// A run of light that begins farther from its stroke than this is looked for all along it [m].
 const LOST_TRACK: f64 = 2e-4;
 
-impl<'a> Judge<'a> {
+impl<'a> MarkEvaluator<'a> {
     /// A judge of the marks of `artwork`, before the first record.
     pub fn new(artwork: &'a Artwork) -> Self {
         Self {
@@ -256,19 +256,19 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The judgement, with what is known of the end of the stream.
+    /// The evaluation, with what is known of the end of the stream.
     ///
     /// # Errors
-    /// [`Unjudged`] where there is nothing to judge.
-    pub fn finish(mut self, end: StreamEnd<'_>) -> Result<Judgement, Unjudged> {
+    /// [`Unevaluated`] where there is nothing to judge.
+    pub fn finish(mut self, end: StreamEnd<'_>) -> Result<MarkEvaluation, Unevaluated> {
         if let Some(interval) = self.path.finish() {
             self.interval(&interval);
         }
         self.end_run();
         if !self.played {
-            return Err(Unjudged::Unrecorded);
+            return Err(Unevaluated::Unrecorded);
         }
-        let Some(newest) = self.newest else { return Err(Unjudged::ToolUnknown) };
+        let Some(newest) = self.newest else { return Err(Unevaluated::ToolUnknown) };
         let open_end = self.hide_the_end(&newest, end);
         let (speed_min, speed_max) = self.sums.speed.or(self.sums.run_speed).unwrap_or((0.0, 0.0));
         let mut marks = Marks {
@@ -311,7 +311,7 @@ impl<'a> Judge<'a> {
                 marks.missing_end_max = marks.missing_end_max.max(end);
             }
         }
-        Ok(Judgement { marks, unrecorded_strokes, unknown: self.unknown, open_end })
+        Ok(MarkEvaluation { marks, unrecorded_strokes, unknown: self.unknown, open_end })
     }
 
     fn moment(&mut self, moment: Moment) {

@@ -6,11 +6,11 @@
 
 pub mod continuity;
 pub mod file;
-pub mod note;
+pub mod info;
 pub mod table;
 
 use continuity::{Continuity, Stamp, Succession};
-use signals::{Command, Feedback, Sample};
+use messages::{Command, Feedback, Sample};
 use std::collections::VecDeque;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
@@ -151,7 +151,7 @@ impl Recorder {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use signals::{Cycle, Nanoseconds};
+    use messages::{Cycle, Nanoseconds};
 
     fn feedback(cycle: u64) -> Feedback {
         Feedback {

@@ -9,8 +9,8 @@ use crate::latency::HopHistograms;
 use crate::run_folder::{FileError, RunFolder};
 use crate::summary::Summary;
 use crate::trace::Trace;
-use signals::artwork::Artwork;
-use signals::run_folder;
+use messages::artwork::Artwork;
+use messages::run_folder;
 
 /// What a report is made from.
 #[derive(Debug, Clone, Copy)]

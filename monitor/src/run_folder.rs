@@ -1,9 +1,9 @@
-//! The run folder: `runs/DATE-TIME-JOB`; [`signals::run_folder`] names the files in it.
+//! The run folder: `runs/DATE-TIME-JOB`; [`messages::run_folder`] names the files in it.
 //!
 //! A folder made here is its user's alone. One that was there before keeps its mode.
 
+use messages::run_folder;
 use serde::Serialize;
-use signals::run_folder;
 use std::fs;
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
@@ -60,7 +60,7 @@ impl RunFolder {
         Self::create_named(&below.join("runs"), &format!("{now}-{}", file_name(job)))
     }
 
-    /// Uses the folder that the user named; it is created where it does not exist.
+    /// LimitUtilization the folder that the user named; it is created where it does not exist.
     ///
     /// # Errors
     /// What the operating system reports, with the path.

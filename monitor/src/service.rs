@@ -12,17 +12,17 @@ use crate::conclusion::RecordingState;
 use crate::run_folder::{FileError, RunFolder};
 use crate::stage::Inputs;
 use machine::Machine;
+use messages::{Command, ControllerReport, DrivesReport, Feedback, JobOffer, run_folder};
 use recording::Recording;
 use runtime::channel::DEEP;
 use runtime::message::tell;
 use runtime::peer::{PeerState, Peers};
-use runtime::{Domain, Reading, Role, ServiceError, Subscriber, signal};
-use signals::{Command, ControllerReport, DrivesReport, Feedback, JobOffer, run_folder};
+use runtime::{Domain, Role, Samples, ServiceError, Subscriber, signal};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// How often the service looks at its channels.
-const LOOK: Duration = Duration::from_millis(5);
+/// How often the service polls its channels.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// How long feedback or commands may stay away before nothing more is waited for: three times what
 /// the clock of simulated drives may slip.
@@ -35,16 +35,16 @@ const SILENCE: Duration = Duration::from_millis(300);
 pub fn run(domain: &Domain, machine: &Machine) -> Result<(), ServiceError> {
     let mut service = Service::open(domain)?;
     while signal::termination().is_none() && service.has_supervisor() {
-        service.look()?;
-        std::thread::sleep(LOOK);
+        service.poll()?;
+        std::thread::sleep(POLL_INTERVAL);
     }
-    let looked = service.look();
+    let polled = service.poll();
     let ended = if service.has_supervisor() {
         service.end_recording()
     } else {
         service.conclude_alone(machine)
     };
-    looked.and(ended)
+    polled.and(ended)
 }
 
 struct Service {
@@ -79,11 +79,11 @@ struct Job {
 impl Service {
     fn open(domain: &Domain) -> Result<Self, ServiceError> {
         Ok(Self {
-            feedbacks: domain.subscriber(Reading::Every)?,
-            commands: domain.subscriber(Reading::Every)?,
-            controller_reports: domain.subscriber(Reading::Newest)?,
-            drives_reports: domain.subscriber(Reading::Newest)?,
-            offers: domain.subscriber(Reading::Newest)?,
+            feedbacks: domain.subscriber(Samples::All)?,
+            commands: domain.subscriber(Samples::All)?,
+            controller_reports: domain.subscriber(Samples::Latest)?,
+            drives_reports: domain.subscriber(Samples::Latest)?,
+            offers: domain.subscriber(Samples::Latest)?,
             peers: Peers::watch(domain, &[Role::Domain, Role::Controller, Role::Drives])?,
             controller: ControllerReport::default(),
             drives: None,
@@ -101,7 +101,7 @@ impl Service {
         self.peers.state(Role::Domain) != PeerState::Dead
     }
 
-    fn look(&mut self) -> Result<(), ServiceError> {
+    fn poll(&mut self) -> Result<(), ServiceError> {
         if let Some(report) = self.controller_reports.newest()? {
             self.controller = report;
         }

@@ -1,13 +1,13 @@
 //! The monitor as a stage beside a running pipeline: pairs the samples of two channels into records
 //! and measures their latencies. Pure; the service around it moves samples and writes files.
 //!
-//! What a run's records tell beyond that is an [`Examination`](crate::examination::Examination),
+//! What a run's records tell beyond that is an [`RunAnalysis`](crate::run_analysis::RunAnalysis),
 //! made of the whole recording when the run has ended.
 
 use crate::latency::HopHistograms;
 use crate::recording::continuity::Continuity;
 use crate::recording::{CycleRecord, Recorder};
-use signals::{Command, Feedback};
+use messages::{Command, Feedback};
 
 /// The samples that arrived since the last step, each kind in order.
 #[derive(Debug, Clone, Copy, Default)]

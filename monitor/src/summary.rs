@@ -10,9 +10,9 @@ pub mod text;
 use crate::latency::HopLatency;
 use crate::marks::Marks;
 use crate::recording::continuity::RecordingSummary;
+use messages::{ControllerReport, RealtimeFacts};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use signals::{ControllerReport, RealtimeFacts};
 use std::collections::BTreeMap;
 
 pub use fault::FaultSummary;
@@ -226,11 +226,11 @@ impl Summary {
         }
     }
 
-    /// Takes over what the controller counted: cycles, digest, limits and following error. Uses
+    /// Takes over what the controller counted: cycles, digest, limits and following error. LimitUtilization
     /// the axes of `machine`, which must be set.
     pub fn take_controller(&mut self, report: &ControllerReport) {
         let axes = self.machine.axes.len();
-        let first = |values: &signals::AxisArray| -> Vec<f64> {
+        let first = |values: &messages::AxisArray| -> Vec<f64> {
             values.iter().take(axes).copied().collect()
         };
         let count = report.count.max(1) as f64;

@@ -8,9 +8,9 @@ use crate::marks::tool_path::{Interval, LitSpan, LitSpans, Moment, ToolPath};
 use crate::recording::CycleRecord;
 use crate::recording::continuity::Succession;
 use envelope::Envelope;
+use messages::hop::{Hop, latencies};
+use messages::{LaserCycle, MAX_AXES};
 use outline::{Outline, OutlinePoint};
-use signals::hop::{Hop, latencies};
-use signals::{LaserCycle, MAX_AXES};
 
 /// Share of so many cycles in which the laser marked, 0..=1.
 pub fn lit_share(laser: &LaserCycle, cycles: u64) -> f64 {
@@ -87,7 +87,7 @@ impl Trace {
             }
         }
         for axis in 0..MAX_AXES {
-            let pick = |values: &signals::AxisArray| values.get(axis).copied();
+            let pick = |values: &messages::AxisArray| values.get(axis).copied();
             let curves = [
                 (&mut self.following_error, answered, &command.following_error),
                 (&mut self.current, true, &feedback.current),

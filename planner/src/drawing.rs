@@ -3,10 +3,11 @@
 //! Every reader (letters, points, G-code) ends here, and everything after starts here. Machine
 //! frame, SI units. Nothing is timed yet.
 
+use machine::CornerMode;
+use messages::math;
 use nalgebra::Vector3;
-use signals::math;
 
-pub use signals::plan::Note;
+pub use messages::plan::Note;
 
 /// A job as geometry: what to mark and how to get there, in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,6 +87,18 @@ pub enum Corners {
     Blend(Option<f64>),
 }
 
+impl Corners {
+    /// How far from a corner the tool may pass [m], 0 for exact corners, on a machine whose file says
+    /// `mode` and `tolerance` [m].
+    pub fn tolerance(self, mode: CornerMode, tolerance: f64) -> f64 {
+        match (self, mode) {
+            (Self::Exact, _) | (Self::AsMachine, CornerMode::Exact) => 0.0,
+            (Self::Blend(own), _) => own.unwrap_or(tolerance),
+            (Self::AsMachine, CornerMode::Blend) => tolerance,
+        }
+    }
+}
+
 /// Laser power along a mark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Power {
@@ -143,5 +156,31 @@ impl Curve {
     /// Where it ends [m].
     pub fn to(&self) -> Vector3<f64> {
         self.point(1.0)
+    }
+}
+
+/// How the tool gets from one line that is marked at one speed to the next.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Turns {
+    /// Without stopping, where that is quicker.
+    #[default]
+    Fly,
+    /// By way of a rest.
+    Stop,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drawing_rules_its_corners_and_the_machine_the_others() {
+        let tolerances = |corners: Corners| {
+            [CornerMode::Blend, CornerMode::Exact].map(|mode| corners.tolerance(mode, 5e-6))
+        };
+        assert_eq!(tolerances(Corners::AsMachine), [5e-6, 0.0]);
+        assert_eq!(tolerances(Corners::Exact), [0.0, 0.0]);
+        assert_eq!(tolerances(Corners::Blend(None)), [5e-6, 5e-6]);
+        assert_eq!(tolerances(Corners::Blend(Some(1e-4))), [1e-4, 1e-4]);
     }
 }

@@ -1,9 +1,9 @@
 //! What property tests draw besides even numbers.
 
-use signals::random::SplitMix64;
+use messages::random::SplitMix64;
 
 /// Evenly over the orders of magnitude from `lower` to `upper`, in their unit.
 pub(crate) fn logarithmic(random: &mut SplitMix64, lower: f64, upper: f64) -> f64 {
-    use signals::math::{exp, ln};
+    use messages::math::{exp, ln};
     exp(random.between(ln(lower), ln(upper)))
 }

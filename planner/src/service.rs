@@ -7,20 +7,20 @@
 //! emptied unread. A stream that the controller has gone on with without this process, or is done
 //! with, is let go: no part of it is ever sent twice.
 
-mod desk;
+mod planning_task;
 #[cfg(test)]
 mod tests;
 
 use crate::request::Refusal;
 use crate::{Plan, PlanFacts};
 use crossbeam::channel::{Receiver, TryRecvError, bounded};
-use desk::Abandoned;
 use machine::Machine;
-use runtime::peer::{PeerState, Peers};
-use runtime::{Domain, Publisher, Reading, Role, ServiceError, Subscriber, clock, signal};
-use signals::{
+use messages::{
     ControllerState, JobOffer, PlannerPhase, PlannerReport, Progress, Setpoint, run_folder,
 };
+use planning_task::Abandoned;
+use runtime::peer::{PeerState, Peers};
+use runtime::{Domain, Publisher, Role, Samples, ServiceError, Subscriber, clock, signal};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -91,8 +91,8 @@ impl Service {
             machine: machine.clone(),
             spare: domain.instance().root(),
             peers: Peers::watch(domain, &[Role::Domain])?,
-            offers: domain.subscriber(Reading::Newest)?,
-            progress: domain.subscriber(Reading::Newest)?,
+            offers: domain.subscriber(Samples::Latest)?,
+            progress: domain.subscriber(Samples::Latest)?,
             newest_progress: Progress::default(),
             setpoints: domain.publisher()?,
             reports: domain.publisher()?,
@@ -169,7 +169,7 @@ impl Service {
         let (place, machine, watched) = (folder.clone(), self.machine.clone(), abandoned.watch());
         spawn("plan", move || {
             // Nobody listens any more when the offer was withdrawn.
-            let _ = sender.send(desk::plan_request(&place, &machine, &standing, &watched));
+            let _ = sender.send(planning_task::plan_request(&place, &machine, &standing, &watched));
         })?;
         let started = Instant::now();
         self.work = Work::Planning(Planning { folder, started, result, _abandoned: abandoned });
@@ -193,7 +193,7 @@ impl Service {
                 self.begin_stream(plan, plan_time)
             }
             Err(refusal) => {
-                desk::write_refusal(folder, &self.spare, &refusal);
+                planning_task::write_refusal(folder, &self.spare, &refusal);
                 self.work = Work::Idle;
                 self.enter(PlannerPhase::Refused)
             }

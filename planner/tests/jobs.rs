@@ -102,7 +102,7 @@ fn points_are_seen_from_home() {
     let places: Vec<_> = planned.artwork.strokes.iter().map(|stroke| stroke.points[0]).collect();
     assert_eq!(places.len(), 2);
     for (found, expected) in places.iter().zip([[0.11, 0.105, 0.0], [0.09, 0.1, 0.0]]) {
-        assert!(signals::artwork::distance(found, &expected) < 1e-12, "{found:?}");
+        assert!(messages::artwork::distance(found, &expected) < 1e-12, "{found:?}");
     }
     assert_eq!(planned.artwork.strokes[0].line, 1);
     assert!(matches!(

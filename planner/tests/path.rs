@@ -6,10 +6,10 @@
 use std::path::Path;
 
 use machine::Machine;
+use messages::{Setpoint, math};
 use nalgebra::Vector3;
 use planner::drawing::{Action, Curve};
 use planner::{Job, plan};
-use signals::{Setpoint, math};
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 

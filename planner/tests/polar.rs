@@ -7,13 +7,13 @@ use core::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use machine::{Machine, MechanismKind};
+use messages::{Setpoint, math};
 use nalgebra::Vector3;
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
 use planner::job::cloud::Cloud;
-use planner::profile::Move;
-use planner::trajectory::Course;
+use planner::law::profile::Move;
+use planner::trajectory::Motion;
 use planner::{Job, Plan, plan};
-use signals::{Setpoint, math};
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
@@ -46,7 +46,7 @@ fn at(x: f64, y: f64) -> Vector3<f64> {
 }
 
 fn line(from: Vector3<f64>, to: Vector3<f64>, speed: f64) -> Vec<Step> {
-    let power = Power { level: 0.5, follows_speed: true };
+    let power = Power { level: 0.5, follows_speed: false };
     let mark = Action::Mark { curve: Curve::Line { from, to }, speed: Some(speed), power };
     vec![Step { action: Action::Rapid { to: from }, line: 3 }, Step { action: mark, line: 3 }]
 }
@@ -159,11 +159,11 @@ fn ten_thousand_points_are_marked_once_each_in_their_order() {
     // than each axis alone.
     let (mut taken, mut least) = (0.0, 0.0);
     for piece in &plan.trajectory.pieces {
-        let Course::Joints(step) = &piece.course else { continue };
+        let Motion::Joints(step) = &piece.motion else { continue };
         if piece.duration <= 1e-3 {
             continue;
         }
-        let (from, to) = (step.at(0.0).position, step.to());
+        let (from, to) = (step.at(0.0).position, step.at(piece.duration).position);
         let mut bound: f64 = 0.0;
         for (index, axis) in machine.axes.iter().enumerate() {
             let limits = &axis.limits;
@@ -224,10 +224,13 @@ fn a_line_beside_the_centre_is_as_fast_as_the_table_can_turn() {
     let table = &machine.axes[1].limits;
     let near = lit.iter().filter(|sample| sample.tool[0].abs() < 2e-4);
     let least = near.map(|sample| sample.path_velocity).fold(f64::INFINITY, f64::min);
-    // A steady v at a distance y turns the table with θ̈ = v²·x·y·2/ρ⁴, at most 0.65·(v/y)²: the
-    // table's acceleration bounds it before its speed does.
+    // A steady v at a distance y turns the table with θ̈ = v²·x·y·2/ρ⁴, at most 0.65·(v/y)². A speed
+    // that varies is faster where the table turns evenly, up to the table's own speed.
     let bound = (table.acceleration / 0.65).sqrt() * 1e-3;
-    assert!(least > 0.9 * bound && least <= bound, "{least} m/s of {bound} m/s");
+    assert!(
+        least > 0.9 * bound && least <= table.velocity * 1e-3 * 1.04,
+        "{least} m/s of {bound} m/s"
+    );
     let uses = &plan.facts.uses;
     assert!(uses.acceleration[1] > 0.85 && uses.acceleration[1] <= 1.0, "{uses:?}");
     assert!(uses.velocity[1] <= 1.0 && uses.path_acceleration <= 1.001, "{uses:?}");

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use machine::{Machine, Motor, StepperMotor};
-use planner::check::Quantity;
+use planner::plan::LimitUtilization;
 use planner::{Job, PlanError, plan};
 
 fn machine() -> Machine {
@@ -18,16 +18,11 @@ fn stepper(machine: &mut Machine, axis: usize) -> &mut StepperMotor {
     }
 }
 
-/// What is refused of the built-in job on `machine`, with axis, limit and unit.
-fn refused(machine: &Machine) -> (String, Quantity, f64, &'static str) {
-    let job = Job::builtin(&[], machine).unwrap();
-    match plan(machine, &job).unwrap_err() {
-        PlanError::Limit { breach, .. } => {
-            assert!(breach.value > breach.limit, "{breach:?}");
-            (breach.axis.unwrap(), breach.quantity, breach.limit, breach.unit)
-        }
-        other => panic!("{other}"),
-    }
+/// How long the built-in job takes on `machine` [s], and what it uses of the limits.
+fn planned(machine: &Machine) -> (f64, LimitUtilization) {
+    let facts = plan(machine, &Job::builtin(&[], machine).unwrap()).unwrap().facts;
+    assert_eq!(facts.strokes, 8);
+    (facts.duration, facts.uses)
 }
 
 #[test]
@@ -45,14 +40,29 @@ fn the_checker_reports_torque_and_pulse_rate() {
 }
 
 #[test]
-fn a_motor_beyond_its_torque_or_its_driver_is_refused() {
+fn a_weak_motor_or_a_slow_driver_slows_the_job_and_is_not_exceeded() {
+    let (quick, uses) = planned(&machine());
     let mut weak = machine();
-    stepper(&mut weak, 1).holding_torque = 0.01;
-    let (axis, quantity, limit, unit) = refused(&weak);
-    assert_eq!((axis.as_str(), quantity, unit), ("y", Quantity::MotorTorque, "N·m"));
-    assert!(limit <= 0.01, "{limit}");
+    let StepperMotor { holding_torque, .. } = *stepper(&mut weak, 1);
+    stepper(&mut weak, 1).holding_torque = 0.7 * uses.current[1] * holding_torque;
+    let (duration, uses) = planned(&weak);
+    assert!(duration > quick, "{duration} s after {quick} s");
+    assert!(uses.current[1] > 0.8 && uses.current[1] <= 1.0, "{:?}", uses.current);
     let mut slow = machine();
     stepper(&mut slow, 0).pulse_rate = 40e3;
-    let (axis, quantity, limit, unit) = refused(&slow);
-    assert_eq!((axis.as_str(), quantity, limit, unit), ("x", Quantity::PulseRate, 40e3, "1/s"));
+    let (duration, uses) = planned(&slow);
+    assert!(duration > quick, "{duration} s after {quick} s");
+    assert!(uses.voltage[0] > 0.9 && uses.voltage[0] <= 1.0, "{:?}", uses.voltage);
+}
+
+/// What holds the load at rest cannot be had by going slower.
+#[test]
+fn a_motor_that_cannot_move_its_axis_at_all_is_refused() {
+    let mut weak = machine();
+    stepper(&mut weak, 1).holding_torque = 1e-4;
+    let job = Job::builtin(&[], &weak).unwrap();
+    let Err(PlanError::Unreachable { cause, .. }) = plan(&weak, &job) else {
+        panic!("0.1 mN·m are less than the friction")
+    };
+    assert_eq!((cause.code, cause.axis), ("overload", Some(1)));
 }

@@ -9,9 +9,9 @@ use machine::mechanisms::mcm::{Mcm, McmBranch};
 use machine::surface::{Cone, Placement, Projection, Shape, Surface};
 use machine::{Axis, Machine, Mechanism, MechanismKind};
 use nalgebra::{Matrix3, SVector, Vector3};
-use planner::attitude::{AttitudeLaw, turned};
-use planner::check::Quantity;
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
+use planner::geometry::attitude::{AttitudeLaw, turned};
+use planner::verify::checker::Quantity;
 use planner::{Job, PlanError, plan};
 
 const RADIUS: f64 = 0.03;
@@ -169,11 +169,11 @@ fn a_path_through_the_upright_tool_goes_on_with_the_tilt_of_the_other_sign() {
 fn a_path_through_the_upright_tool_is_refused_where_the_tilt_goes_one_way_only() {
     let mut machine = machine();
     machine.axes[3].limits.position[0] = 0.0;
-    let Err(PlanError::Limit { line, breach, .. }) =
+    let Err(PlanError::Limit { line, violation, .. }) =
         plan(&machine, &line_through_upright(&machine))
     else {
         panic!("the tilt has no other side")
     };
-    assert_eq!((line, breach.quantity, breach.limit), (4, Quantity::JointPosition, 0.0));
-    assert_eq!(breach.axis, Some(machine.axes[3].name.clone()));
+    assert_eq!((line, violation.quantity, violation.limit), (4, Quantity::JointPosition, 0.0));
+    assert_eq!(violation.axis, Some(machine.axes[3].name.clone()));
 }

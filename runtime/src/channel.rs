@@ -15,15 +15,15 @@ use iceoryx2::prelude::{
 };
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-use signals::{
+use messages::{
     Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress, Sample,
     Setpoint,
 };
 
-use crate::domain::{Domain, Keep};
+use crate::domain::{Domain, DomainGuard};
 use crate::room::{RoomError, need};
 
-/// How long a reader of [`Reading::Every`] may be away from a 1 kHz channel without a loss, in
+/// How long a reader of [`Samples::All`] may be away from a 1 kHz channel without a loss, in
 /// samples.
 pub const DEEP: usize = 4096;
 
@@ -35,7 +35,7 @@ const KEPT_FOR_A_SUCCESSOR: usize = 512;
 /// Setpoints under way at most; the planner's own limit is the room that the controller reports.
 pub const SETPOINTS_UNDER_WAY: usize = 2048;
 
-/// Samples of a status channel that wait for a reader who looks a few times a second.
+/// Samples of a status channel that wait for a reader who polls a few times a second.
 const STATUS_DEPTH: usize = 64;
 
 /// Samples that a reader can have in its hands at once.
@@ -43,16 +43,16 @@ pub(crate) const BORROWED: usize = 2;
 
 /// How a channel treats a reader that does not keep up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quality {
+pub enum Qos {
     /// The oldest sample makes room. Late joiners get the newest one, or as many as the channel
     /// keeps ([`Channel::KEPT`]), at the publisher's next [`Publisher::publish`] or
     /// [`Publisher::greet`].
-    Newest {
-        /// Samples that a reader of [`Reading::Every`] can have waiting.
+    KeepLast {
+        /// Samples that a reader of [`Samples::All`] can have waiting.
         depth: usize,
     },
     /// Nothing makes room: the publisher is told that the buffer is full.
-    Complete {
+    Reliable {
         /// Samples that can be under way.
         depth: usize,
     },
@@ -63,19 +63,19 @@ pub trait Channel: Sample {
     /// The name of the channel.
     const SERVICE: &'static str;
     /// How it treats a reader that does not keep up.
-    const QUALITY: Quality;
+    const QOS: Qos;
     /// How many readers there can be.
     const READERS: usize = 4;
-    /// How many of them can be of [`Reading::Every`]; the publisher has memory for no more.
+    /// How many of them can be of [`Samples::All`]; the publisher has memory for no more.
     const DEEP_READERS: usize = Self::READERS;
-    /// How many of the newest samples a late reader of [`Reading::Every`] gets, on a channel of
-    /// [`Quality::Newest`].
+    /// How many of the newest samples a late reader of [`Samples::All`] gets, on a channel of
+    /// [`Qos::KeepLast`].
     const KEPT: usize = 1;
 }
 
 impl Channel for Feedback {
     const SERVICE: &'static str = "feedback";
-    const QUALITY: Quality = Quality::Newest { depth: DEEP };
+    const QOS: Qos = Qos::KeepLast { depth: DEEP };
     // The monitor, and who measures beside it.
     const DEEP_READERS: usize = 2;
     const KEPT: usize = KEPT_FOR_A_SUCCESSOR;
@@ -83,7 +83,7 @@ impl Channel for Feedback {
 
 impl Channel for Command {
     const SERVICE: &'static str = "commands";
-    const QUALITY: Quality = Quality::Newest { depth: DEEP };
+    const QOS: Qos = Qos::KeepLast { depth: DEEP };
     // As of feedback.
     const DEEP_READERS: usize = 2;
     const KEPT: usize = KEPT_FOR_A_SUCCESSOR;
@@ -91,34 +91,34 @@ impl Channel for Command {
 
 impl Channel for Setpoint {
     const SERVICE: &'static str = "setpoints";
-    const QUALITY: Quality = Quality::Complete { depth: SETPOINTS_UNDER_WAY };
+    const QOS: Qos = Qos::Reliable { depth: SETPOINTS_UNDER_WAY };
     // A second reader that stands still would hold the planner up.
     const READERS: usize = 1;
 }
 
 impl Channel for Progress {
     const SERVICE: &'static str = "progress";
-    const QUALITY: Quality = Quality::Newest { depth: STATUS_DEPTH };
+    const QOS: Qos = Qos::KeepLast { depth: STATUS_DEPTH };
 }
 
 impl Channel for ControllerReport {
     const SERVICE: &'static str = "controller-reports";
-    const QUALITY: Quality = Quality::Newest { depth: STATUS_DEPTH };
+    const QOS: Qos = Qos::KeepLast { depth: STATUS_DEPTH };
 }
 
 impl Channel for DrivesReport {
     const SERVICE: &'static str = "drives-reports";
-    const QUALITY: Quality = Quality::Newest { depth: STATUS_DEPTH };
+    const QOS: Qos = Qos::KeepLast { depth: STATUS_DEPTH };
 }
 
 impl Channel for PlannerReport {
     const SERVICE: &'static str = "planner-reports";
-    const QUALITY: Quality = Quality::Newest { depth: STATUS_DEPTH };
+    const QOS: Qos = Qos::KeepLast { depth: STATUS_DEPTH };
 }
 
 impl Channel for JobOffer {
     const SERVICE: &'static str = "job-offers";
-    const QUALITY: Quality = Quality::Newest { depth: STATUS_DEPTH };
+    const QOS: Qos = Qos::KeepLast { depth: STATUS_DEPTH };
 }
 
 /// Why a channel could not be opened or used.
@@ -170,11 +170,11 @@ pub enum ChannelError {
 
 /// Which samples a reader wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reading {
+pub enum Samples {
     /// Only the newest one, for a cycle.
-    Newest,
+    Latest,
     /// Every one, in order, losses counted.
-    Every,
+    All,
 }
 
 /// A sample as iceoryx2 carries it.
@@ -228,18 +228,18 @@ macro_rules! attribute {
 
 /// How many samples a late joiner gets.
 pub(crate) const fn history<T: Channel>() -> usize {
-    match T::QUALITY {
-        Quality::Newest { .. } => T::KEPT,
-        Quality::Complete { .. } => 0,
+    match T::QOS {
+        Qos::KeepLast { .. } => T::KEPT,
+        Qos::Reliable { .. } => 0,
     }
 }
 
 pub(crate) fn create<T: Channel>(
     node: &Node<ipc::Service>,
 ) -> Result<Box<dyn Any + Send + Sync>, ChannelError> {
-    let (overflow, depth) = match T::QUALITY {
-        Quality::Newest { depth } => (true, depth),
-        Quality::Complete { depth } => (false, depth),
+    let (overflow, depth) = match T::QOS {
+        Qos::KeepLast { depth } => (true, depth),
+        Qos::Reliable { depth } => (false, depth),
     };
     let name = T::SERVICE.try_into().map_err(refused::<T>)?;
     let factory = node
@@ -277,7 +277,7 @@ fn open<T: Channel>(domain: &Domain) -> Result<Factory<T>, ChannelError> {
 }
 
 /// Whether one more reader of every sample fits; those of dead processes do not count.
-fn admit_deep_reader<T: Channel>(
+fn check_deep_readers<T: Channel>(
     domain: &Domain,
     factory: &Factory<T>,
 ) -> Result<(), ChannelError> {
@@ -304,7 +304,7 @@ fn admit_deep_reader<T: Channel>(
 pub struct Publisher<T: Channel> {
     port: iceoryx2::port::publisher::Publisher<ipc::Service, Wire<T>, Serial>,
     serial: u64,
-    _keep: Keep,
+    _guard: DomainGuard,
 }
 
 impl<T: Channel> Publisher<T> {
@@ -320,12 +320,12 @@ impl<T: Channel> Publisher<T> {
         let port = domain
             .room()
             .open(need::publisher::<T>(), || builder.create().map_err(refused::<T>))?;
-        Ok(Self { port, serial: 0, _keep: domain.keep() })
+        Ok(Self { port, serial: 0, _guard: domain.guard() })
     }
 
     /// Publishes one sample; never waits.
     ///
-    /// `false` when it reached no reader: on a [`Quality::Complete`] channel the buffer is full or
+    /// `false` when it reached no reader: on a [`Qos::Reliable`] channel the buffer is full or
     /// there is no reader yet, and the same sample must be published again. On the other channels
     /// `false` only says that nobody listens now.
     ///
@@ -334,17 +334,17 @@ impl<T: Channel> Publisher<T> {
         let mut loan = self.port.loan_uninit().map_err(|_| lost::<T>())?;
         *loan.user_header_mut() = Serial(self.serial + 1);
         let readers = loan.write_payload(Wire(*sample)).send().map_err(|_| lost::<T>())?;
-        if readers > 0 || matches!(T::QUALITY, Quality::Newest { .. }) {
+        if readers > 0 || matches!(T::QOS, Qos::KeepLast { .. }) {
             self.serial += 1;
         }
         Ok(readers > 0)
     }
 
     /// Gives the newest sample to readers that have joined since the last [`Self::publish`] or
-    /// `greet`; on a [`Quality::Complete`] channel there is none to give.
+    /// `greet`; on a [`Qos::Reliable`] channel there is none to give.
     ///
     /// A reader that joins does not get it by itself. Whoever publishes seldom on a
-    /// [`Quality::Newest`] channel calls this on every look, so that a process which was started
+    /// [`Qos::KeepLast`] channel calls this on every poll, so that a process which was started
     /// again learns what was said before; one that publishes many times a second needs not. Never
     /// waits. Cheap when nobody joined; else it maps the reader's memory, 40 to 160 µs: not for a
     /// real-time loop.
@@ -361,29 +361,29 @@ pub struct Subscriber<T: Channel> {
     serial: u64,
     lost: u64,
     _sample: PhantomData<T>,
-    _keep: Keep,
+    _guard: DomainGuard,
 }
 
 impl<T: Channel> Subscriber<T> {
-    pub(crate) fn open(domain: &Domain, reading: Reading) -> Result<Self, ChannelError> {
+    pub(crate) fn open(domain: &Domain, samples: Samples) -> Result<Self, ChannelError> {
         let factory = open::<T>(domain)?;
-        let depth = match T::QUALITY {
-            Quality::Newest { depth } | Quality::Complete { depth } => depth,
+        let depth = match T::QOS {
+            Qos::KeepLast { depth } | Qos::Reliable { depth } => depth,
         };
-        let size = match reading {
-            Reading::Newest => 1,
-            Reading::Every => depth,
+        let size = match samples {
+            Samples::Latest => 1,
+            Samples::All => depth,
         };
         let kept = history::<T>().min(size);
         let builder = factory.subscriber_builder().buffer_size(size).history_request(kept);
         let port = domain.room().open(need::subscriber::<T>(size), || {
             if size > 1 {
-                admit_deep_reader(domain, &factory)?;
+                check_deep_readers(domain, &factory)?;
             }
             builder.create().map_err(refused::<T>)
         })?;
-        let keep = domain.keep();
-        Ok(Self { port, origin: None, serial: 0, lost: 0, _sample: PhantomData, _keep: keep })
+        let guard = domain.guard();
+        Ok(Self { port, origin: None, serial: 0, lost: 0, _sample: PhantomData, _guard: guard })
     }
 
     /// The next sample, if one waits. Does not allocate.

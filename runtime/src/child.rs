@@ -39,7 +39,7 @@ pub enum SpawnError {
 impl ChildProcess {
     /// Starts `command` as a future member of `domain`, which stays locked while the child lives.
     pub fn spawn(domain: &Domain, mut command: Command) -> Result<Self, SpawnError> {
-        domain.bequeath(&mut command)?;
+        domain.inherit_lock(&mut command)?;
         let program = command.get_program().to_string_lossy().into_owned();
         let failed = |source| SpawnError::Start { program: program.clone(), source };
         let mut child = command.process_group(0).spawn().map_err(failed)?;

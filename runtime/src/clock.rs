@@ -1,6 +1,6 @@
 //! The monotonic clock, sleeping until an absolute instant, and the deadlines of a cycle.
 
-use signals::Nanoseconds;
+use messages::Nanoseconds;
 
 const SECOND: i64 = 1_000_000_000;
 

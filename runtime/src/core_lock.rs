@@ -4,7 +4,7 @@
 //! name in the abstract socket namespace: it is the same for all users, ends with its process
 //! however that dies, and leaves no file. Anybody can bind such a name, so a name that is taken
 //! proves nothing: the kernel is asked whether its owner really has a real-time thread on the core.
-//! Where not, the next name is the claim, and every pipeline looks at all of them.
+//! Where not, the next name is the claim, and every pipeline checks all of them.
 
 mod occupant;
 
@@ -180,7 +180,7 @@ mod tests {
         let second = CoreLock::claim_named(NOWHERE, &name).unwrap();
         assert_eq!(second.squatter(), Some(own));
         assert_eq!(CoreLock::claim_named(NOWHERE, &name).unwrap().squatter(), Some(own));
-        // The first name is free again; the others are looked at all the same.
+        // The first name is free again; the others are checked all the same.
         drop(first);
         assert_eq!(CoreLock::claim_named(NOWHERE, &name).unwrap().squatter(), Some(own));
         drop(second);

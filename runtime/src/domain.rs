@@ -16,12 +16,12 @@ use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::prelude::{
     FileName, LogLevel, SemanticString, SignalHandlingMode, ipc, set_log_level,
 };
-use signals::{
+use messages::{
     Command as MotorCommand, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport,
     Progress, Setpoint,
 };
 
-use crate::channel::{self, Channel, ChannelError, Publisher, Reading, Subscriber};
+use crate::channel::{self, Channel, ChannelError, Publisher, Samples, Subscriber};
 use crate::instance::{Instance, SHARED_MEMORY};
 use crate::membership::{self, Membership};
 use crate::operator;
@@ -49,7 +49,7 @@ pub enum Role {
     Drives,
     /// The monitor service.
     Monitor,
-    /// Anybody who only looks; any number of them.
+    /// An observer, who only reads; any number of them.
     Observer,
 }
 
@@ -228,8 +228,8 @@ impl Domain {
     }
 
     /// A subscriber on the channel of `T`.
-    pub fn subscriber<T: Channel>(&self, reading: Reading) -> Result<Subscriber<T>, ChannelError> {
-        Subscriber::open(self, reading)
+    pub fn subscriber<T: Channel>(&self, samples: Samples) -> Result<Subscriber<T>, ChannelError> {
+        Subscriber::open(self, samples)
     }
 
     /// The side of a wake event that wakes.
@@ -249,8 +249,8 @@ impl Domain {
 
     /// Lets the process that `command` starts keep the domain from its first instruction on, so
     /// that nobody can take the instance before the child has joined.
-    pub fn bequeath(&self, command: &mut Command) -> Result<(), DomainError> {
-        membership::bequeath(self.instance(), command)
+    pub fn inherit_lock(&self, command: &mut Command) -> Result<(), DomainError> {
+        membership::inherit_lock(self.instance(), command)
     }
 
     /// Removes the ports of dead processes, so that their successors find room. For the holder,
@@ -262,7 +262,7 @@ impl Domain {
     /// Makes sure that every segment of the domain has all its pages, and puts what is left of the
     /// domain's room back into its reserve, for those who join later.
     ///
-    /// Ports have their pages when they are open, so this is a second look: for the holder, when a
+    /// Ports have their pages when they are open, so this is a second check: for the holder, when a
     /// service has come up and before the motors are powered, and after [`Self::clean`]. Never in
     /// a real-time loop.
     ///
@@ -282,8 +282,8 @@ impl Domain {
     }
 
     /// What a port keeps so that the domain outlives it: the node first, then the membership.
-    pub(crate) fn keep(&self) -> Keep {
-        Keep { _node: self.node.clone(), _membership: self.membership.clone() }
+    pub(crate) fn guard(&self) -> DomainGuard {
+        DomainGuard { _node: self.node.clone(), _membership: self.membership.clone() }
     }
 }
 
@@ -319,7 +319,7 @@ impl Entry {
 
 /// Keeps node and membership alive in this order behind a port.
 #[derive(Debug)]
-pub(crate) struct Keep {
+pub(crate) struct DomainGuard {
     _node: Rc<Node<ipc::Service>>,
     _membership: Arc<Membership>,
 }

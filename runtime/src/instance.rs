@@ -10,10 +10,10 @@ mod directory;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-use signals::sample::fnv1a;
+use messages::sample::fnv1a;
 
 use directory::PassedOver;
-pub(crate) use directory::{Place, create_private, look};
+pub(crate) use directory::{Place, create_private, inspect};
 
 /// Longest name of an instance, in bytes.
 pub const MAX_NAME: usize = 32;
@@ -74,7 +74,7 @@ pub enum InstanceError {
         /// The names, and what stands there.
         taken: String,
     },
-    /// A directory could not be looked at.
+    /// A directory could not be inspected.
     #[error("{directory:?}: {reason}")]
     Hidden {
         /// The directory.
@@ -114,7 +114,7 @@ impl Instance {
         for number in 1..=BASES {
             let stem = if number == 1 { stem.to_owned() } else { format!("{stem}-{number}") };
             let base = directory.join(stem);
-            let place = look(&base).map_err(|error| InstanceError::Hidden {
+            let place = inspect(&base).map_err(|error| InstanceError::Hidden {
                 directory: base.clone(),
                 reason: error.to_string(),
             })?;

@@ -31,7 +31,7 @@ pub mod stall;
 pub mod thread;
 pub mod wake;
 
-pub use channel::{Publisher, Reading, Subscriber};
+pub use channel::{Publisher, Samples, Subscriber};
 pub use domain::{Domain, DomainError, Role};
 pub use instance::Instance;
 pub use service::ServiceError;

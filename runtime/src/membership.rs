@@ -10,7 +10,7 @@
 //! only succeed when nobody is alive. A leaving member first lets go and then tries to be alone:
 //! of two that leave at once, the later one succeeds, so what is left is always removed.
 //!
-//! Between spawn and join a child of the holder has no lock of its own; [`bequeath`] gives it
+//! Between spawn and join a child of the holder has no lock of its own; [`inherit_lock`] gives it
 //! one, which [`drop_inherited`] closes once the child has joined.
 
 use std::fs::{self, File, OpenOptions};
@@ -23,7 +23,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::domain::{DomainError, Role};
-use crate::instance::{Instance, Nonce, Place, create_private, look};
+use crate::instance::{Instance, Nonce, Place, create_private, inspect};
 use crate::lock::{Hold, is_locked, try_lock};
 use crate::room::{self, Room, need};
 
@@ -220,7 +220,7 @@ pub(crate) fn member_pid(instance: &Instance, role: Role) -> Option<i32> {
 /// Gives `command`'s process a hold on the domain from its first instruction on, and nothing else:
 /// the descriptors that iceoryx2 0.10 opens would survive the exec, and with them the sockets and
 /// the memory of a dead holder.
-pub(crate) fn bequeath(instance: &Instance, command: &mut Command) -> Result<(), DomainError> {
+pub(crate) fn inherit_lock(instance: &Instance, command: &mut Command) -> Result<(), DomainError> {
     let lock = open_existing_lock(instance)?
         .ok_or_else(|| DomainError::Absent { instance: instance.name().into() })?;
     let inherit = move || {
@@ -250,7 +250,7 @@ pub(crate) fn bequeath(instance: &Instance, command: &mut Command) -> Result<(),
     Ok(())
 }
 
-/// Closes the hold that [`bequeath`] gave this process: descriptors of the lock file that survive
+/// Closes the hold that [`inherit_lock`] gave this process: descriptors of the lock file that survive
 /// an exec; our own never do.
 fn drop_inherited(lock: &File) {
     let (Ok(own), Ok(entries)) = (lock.metadata(), fs::read_dir("/proc/self/fd")) else { return };
@@ -310,7 +310,7 @@ fn open_lock(instance: &Instance, hold: Hold) -> Result<Option<File>, DomainErro
     for _ in 0..100 {
         let base = instance.base();
         create_private(base).map_err(|source| DomainError::io(base, source))?;
-        if let Place::Taken(what) = look(base).map_err(|source| DomainError::io(base, source))? {
+        if let Place::Taken(what) = inspect(base).map_err(|source| DomainError::io(base, source))? {
             return Err(DomainError::Foreign { directory: base.into(), what });
         }
         match private_file().create(true).open(&path) {

@@ -19,7 +19,7 @@ use crossbeam::queue::ArrayQueue;
 use iceoryx2::node::Node;
 use iceoryx2::prelude::{AttributeSpecifier, AttributeVerifier, BackpressureStrategy, ipc};
 use iceoryx2::service::port_factory::request_response::PortFactory;
-use signals::{OperatorReply, OperatorRequest, OperatorVerb, Sample};
+use messages::{OperatorReply, OperatorRequest, OperatorVerb, Sample};
 
 use crate::channel::{ChannelError, Wire};
 use crate::domain::{Domain, DomainError, Entry};
@@ -30,10 +30,10 @@ const SERVICE: &str = "operator-requests";
 /// How long a request may take without another word, the controller's cycles included.
 pub const PATIENCE: Duration = Duration::from_secs(2);
 
-/// How often the controller's thread looks for requests: a person does not feel it.
+/// How often the controller's thread polls for requests: a person does not feel it.
 const LOOK_PERIOD: Duration = Duration::from_millis(5);
 
-/// How often the asking side looks for the answer.
+/// How often the asking side polls for the answer.
 const ANSWER_PERIOD: Duration = Duration::from_millis(1);
 
 /// Requests that can wait for the cycle.

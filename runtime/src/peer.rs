@@ -12,7 +12,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crossbeam::queue::ArrayQueue;
-use signals::Nanoseconds;
+use messages::Nanoseconds;
 
 use crate::clock;
 use crate::domain::{Domain, Role};
@@ -23,7 +23,7 @@ use crate::service::ServiceError;
 /// A year: longer than anybody waits [ns].
 const LONG: i64 = 31_536_000_000_000_000;
 
-/// How often the searching thread of [`Peers`] looks for a peer that is missing.
+/// How often the searching thread of [`Peers`] checks for a peer that is missing.
 const SEARCH_PERIOD: Duration = Duration::from_millis(20);
 
 /// A handle on one process.

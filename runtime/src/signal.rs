@@ -1,4 +1,4 @@
-//! Requests to end as a flag that loops look at: Ctrl-C, SIGTERM, and SIGHUP, which a closed
+//! Requests to end as a flag that loops poll: Ctrl-C, SIGTERM, and SIGHUP, which a closed
 //! terminal sends. Also when the process was last stopped and continued.
 //!
 //! SIGPIPE stays ignored, as Rust's runtime leaves it: a reader that goes away is an error of the
@@ -13,7 +13,7 @@
 use std::io;
 use std::sync::atomic::{AtomicI32, AtomicI64, AtomicU32, Ordering};
 
-use signals::Nanoseconds;
+use messages::Nanoseconds;
 
 use crate::clock;
 
@@ -44,7 +44,7 @@ extern "C" fn note_continued(_: libc::c_int) {
 }
 
 /// Makes SIGINT, SIGTERM and SIGHUP set the flag instead of ending the process, and notes SIGCONT.
-/// System calls that wait come back with `EINTR`, so that loops look at the flag at once. A SIGHUP
+/// System calls that wait come back with `EINTR`, so that loops check the flag at once. A SIGHUP
 /// that is ignored already, as under `nohup`, stays ignored. SIGBUS ends the process still, but says
 /// why.
 ///

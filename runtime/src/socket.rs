@@ -25,13 +25,13 @@ const MAX_LINE: u64 = 1 << 20;
 /// How long a client waits for a plain answer: longer than the holder waits for the controller.
 pub const ANSWER_PATIENCE: Duration = Duration::from_secs(4);
 
-/// How often a client that follows a request looks up from it.
+/// How often a client that follows a request interrupts the wait.
 const FOLLOW_PERIOD: Duration = Duration::from_millis(100);
 
 /// How long a client may leave what it is told unread, once all buffers are full.
 const CLIENT_PATIENCE: Duration = Duration::from_secs(1);
 
-/// How often the accepting thread looks whether it shall end.
+/// How often the accepting thread checks whether it shall end.
 const LOOK_PERIOD: Duration = Duration::from_millis(20);
 
 /// Why an operator could not be served, or a request failed.
@@ -315,7 +315,7 @@ impl OperatorClient {
 
     /// Sends a request, hands each part to `part` as it comes, and gives the reply, however long
     /// it takes. `part` gets `None` every tenth of a second in which nothing came, so that whoever
-    /// follows can look at other things; when it breaks, what it breaks with is given instead.
+    /// follows can check other things; when it breaks, what it breaks with is given instead.
     ///
     /// # Errors
     /// A holder that goes away or does not understand.

@@ -18,7 +18,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use crossbeam::queue::ArrayQueue;
-use signals::{Nanoseconds, StallCause};
+use messages::{Nanoseconds, StallCause};
 
 use crate::{clock, signal};
 

@@ -11,8 +11,8 @@ use std::fs::File;
 use std::io::{self, Write};
 
 use core_affinity::CoreId;
-use signals::report::refused;
-use signals::{Nanoseconds, RealtimeFacts};
+use messages::report::refused;
+use messages::{Nanoseconds, RealtimeFacts};
 
 use crate::clock::SPIN_MARGIN;
 use crate::core_lock::{CoreError, CoreLock};

@@ -1,6 +1,6 @@
 //! Wake events: how drives wakes the controller and the controller wakes drives.
 //!
-//! A wake says "look", never what happened; the data is in the channel. Waiting is one `ppoll` on
+//! A wake says that there is something new, never what; the data is in the channel. Waiting is one `ppoll` on
 //! the listener's descriptor and a drain: iceoryx2's own wait takes seven system calls, and its
 //! wait set allocates and installs signal handlers.
 
@@ -12,9 +12,9 @@ use iceoryx2::prelude::{FileDescriptorBased, ipc};
 
 use crate::channel::ChannelError;
 use crate::clock;
-use crate::domain::{Domain, Keep};
+use crate::domain::{Domain, DomainGuard};
 use crate::room::need;
-use signals::Nanoseconds;
+use messages::Nanoseconds;
 
 /// The two wake events of a pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,7 +67,7 @@ fn open(domain: &Domain, wake: Wake) -> Result<Factory, ChannelError> {
 pub struct Notifier {
     port: iceoryx2::port::notifier::Notifier<ipc::Service>,
     wake: Wake,
-    _keep: Keep,
+    _guard: DomainGuard,
 }
 
 impl Notifier {
@@ -76,7 +76,7 @@ impl Notifier {
         let builder = factory.notifier_builder();
         let create = || builder.create().map_err(|error| refused(wake, error));
         let port = domain.room().open(0, create)?;
-        Ok(Self { port, wake, _keep: domain.keep() })
+        Ok(Self { port, wake, _guard: domain.guard() })
     }
 
     /// Wakes whoever listens; one system call for each listener, no allocation.
@@ -94,7 +94,7 @@ impl Notifier {
 pub struct Listener {
     port: iceoryx2::port::listener::Listener<ipc::Service>,
     wake: Wake,
-    _keep: Keep,
+    _guard: DomainGuard,
 }
 
 impl Listener {
@@ -103,11 +103,11 @@ impl Listener {
         let builder = factory.listener_builder();
         let create = || builder.create().map_err(|error| refused(wake, error));
         let port = domain.room().open(need::wake(), create)?;
-        Ok(Self { port, wake, _keep: domain.keep() })
+        Ok(Self { port, wake, _guard: domain.guard() })
     }
 
     /// Waits until woken or until `deadline` on the monotonic clock; `false` at the deadline, or
-    /// when a signal came. A deadline in the past only looks. Does not allocate.
+    /// when a signal came. A deadline in the past only checks. Does not allocate.
     ///
     /// A wake may be older than the newest sample: read the channel, and wait again if it had
     /// nothing new.

@@ -6,16 +6,16 @@ mod scratch;
 
 use std::time::{Duration, Instant};
 
-use runtime::allocation::{Allocations, CountingAllocator};
-use runtime::channel::{Channel, ChannelError, Quality, SETPOINTS_UNDER_WAY};
-use runtime::operator::{OperatorError, OperatorLink, OperatorQueue};
-use runtime::wake::Wake;
-use runtime::{Domain, DomainError, Reading, Role, clock};
-use scratch::Scratch;
-use signals::{
+use messages::{
     Command, Cycle, Feedback, JobOffer, Nanoseconds, OperatorReply, OperatorVerb, Progress,
     Setpoint,
 };
+use runtime::allocation::{Allocations, CountingAllocator};
+use runtime::channel::{Channel, ChannelError, Qos, SETPOINTS_UNDER_WAY};
+use runtime::operator::{OperatorError, OperatorLink, OperatorQueue};
+use runtime::wake::Wake;
+use runtime::{Domain, DomainError, Role, Samples, clock};
+use scratch::Scratch;
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
@@ -31,7 +31,7 @@ fn a_published_sample_arrives_whole() {
     let drives = Domain::join(scratch.instance(), Role::Drives).unwrap();
     let controller = Domain::join(scratch.instance(), Role::Controller).unwrap();
     let mut publisher = drives.publisher::<Feedback>().unwrap();
-    let mut subscriber = controller.subscriber::<Feedback>(Reading::Newest).unwrap();
+    let mut subscriber = controller.subscriber::<Feedback>(Samples::Latest).unwrap();
 
     assert_eq!(subscriber.receive().unwrap(), None);
     assert!(publisher.publish(&feedback(7)).unwrap());
@@ -45,8 +45,8 @@ fn a_cycle_sees_the_newest_and_a_monitor_every_sample() {
     let scratch = Scratch::new();
     let holder = Domain::create(scratch.instance()).unwrap();
     let mut publisher = holder.publisher::<Command>().unwrap();
-    let mut cycle = holder.subscriber::<Command>(Reading::Newest).unwrap();
-    let mut monitor = holder.subscriber::<Command>(Reading::Every).unwrap();
+    let mut cycle = holder.subscriber::<Command>(Samples::Latest).unwrap();
+    let mut monitor = holder.subscriber::<Command>(Samples::All).unwrap();
     let command = |cycle| Command { cycle: Cycle(cycle), ..Command::default() };
 
     for number in 0..100 {
@@ -64,7 +64,7 @@ fn a_slow_reader_counts_what_it_lost_and_stops_nobody() {
     let scratch = Scratch::new();
     let holder = Domain::create(scratch.instance()).unwrap();
     let mut publisher = holder.publisher::<Progress>().unwrap();
-    let mut reader = holder.subscriber::<Progress>(Reading::Every).unwrap();
+    let mut reader = holder.subscriber::<Progress>(Samples::All).unwrap();
     let progress = |played| Progress { played, ..Progress::default() };
 
     publisher.publish(&progress(0)).unwrap();
@@ -88,7 +88,7 @@ fn a_late_reader_gets_the_newest_sample_before_the_next_one() {
     assert!(!publisher.publish(&JobOffer::new(0, "/tmp/old").unwrap()).unwrap());
     assert!(!publisher.publish(&offer).unwrap());
 
-    let mut planner = holder.subscriber::<JobOffer>(Reading::Every).unwrap();
+    let mut planner = holder.subscriber::<JobOffer>(Samples::All).unwrap();
     let next = JobOffer::new(2, "/tmp/next").unwrap();
     assert!(publisher.publish(&next).unwrap());
     assert_eq!(planner.receive().unwrap(), Some(offer));
@@ -106,7 +106,7 @@ fn a_silent_publisher_greets_a_late_reader_with_its_newest_sample_once() {
     publisher.publish(&JobOffer::new(0, "/tmp/old").unwrap()).unwrap();
     publisher.publish(&offer).unwrap();
 
-    for reading in [Reading::Newest, Reading::Every] {
+    for reading in [Samples::Latest, Samples::All] {
         let mut reader = holder.subscriber::<JobOffer>(reading).unwrap();
         assert_eq!(reader.receive().unwrap(), None, "nobody has greeted {reading:?} yet");
         publisher.greet().unwrap();
@@ -117,7 +117,7 @@ fn a_silent_publisher_greets_a_late_reader_with_its_newest_sample_once() {
     }
     // On a channel that loses nothing there is no newest sample to give.
     let mut planner = holder.publisher::<Setpoint>().unwrap();
-    let mut controller = holder.subscriber::<Setpoint>(Reading::Every).unwrap();
+    let mut controller = holder.subscriber::<Setpoint>(Samples::All).unwrap();
     planner.greet().unwrap();
     assert_eq!(controller.receive().unwrap(), None);
 }
@@ -130,7 +130,7 @@ fn a_full_setpoint_channel_refuses_and_loses_nothing() {
     let setpoint = |sequence| Setpoint { stream: 1, sequence, ..Setpoint::default() };
     assert!(!planner.publish(&setpoint(0)).unwrap(), "no reader yet");
 
-    let mut controller = holder.subscriber::<Setpoint>(Reading::Every).unwrap();
+    let mut controller = holder.subscriber::<Setpoint>(Samples::All).unwrap();
     let mut sent = 0;
     while planner.publish(&setpoint(sent)).unwrap() {
         sent += 1;
@@ -155,19 +155,19 @@ fn a_full_setpoint_channel_refuses_and_loses_nothing() {
 mod other_build {
     //! What another build could have made of `Progress`: same name and size, other fields.
 
-    use super::{Channel, Quality};
+    use super::{Channel, Qos};
 
-    signals::sample! {
-        /// Has as many bytes as `signals::Progress`.
+    messages::sample! {
+        /// Has as many bytes as `messages::Progress`.
         Progress = "graver.Progress.v2" {
             /// All of them.
-            words: [u64; size_of::<signals::Progress>() / 8],
+            words: [u64; size_of::<messages::Progress>() / 8],
         }
     }
 
     impl Channel for Progress {
-        const SERVICE: &'static str = <signals::Progress as Channel>::SERVICE;
-        const QUALITY: Quality = <signals::Progress as Channel>::QUALITY;
+        const SERVICE: &'static str = <messages::Progress as Channel>::SERVICE;
+        const QOS: Qos = <messages::Progress as Channel>::QOS;
     }
 }
 
@@ -176,9 +176,9 @@ fn another_layout_under_the_same_name_is_refused() {
     let scratch = Scratch::new();
     let holder = Domain::create(scratch.instance()).unwrap();
     assert_eq!(size_of::<other_build::Progress>(), size_of::<Progress>());
-    let error = holder.subscriber::<other_build::Progress>(Reading::Every).unwrap_err();
+    let error = holder.subscriber::<other_build::Progress>(Samples::All).unwrap_err();
     assert_eq!(error, ChannelError::Layout { channel: "progress", sample: "graver.Progress.v2" });
-    assert!(holder.subscriber::<Progress>(Reading::Every).is_ok());
+    assert!(holder.subscriber::<Progress>(Samples::All).is_ok());
 }
 
 #[test]
@@ -196,7 +196,7 @@ fn a_channel_has_one_publisher() {
 fn a_new_publisher_is_no_loss() {
     let scratch = Scratch::new();
     let holder = Domain::create(scratch.instance()).unwrap();
-    let mut reader = holder.subscriber::<Feedback>(Reading::Every).unwrap();
+    let mut reader = holder.subscriber::<Feedback>(Samples::All).unwrap();
     for cycle in [5, 15, 10] {
         let mut publisher = holder.publisher::<Feedback>().unwrap();
         publisher.publish(&feedback(cycle)).unwrap();
@@ -232,8 +232,8 @@ fn one_allocation_for_each_publish_and_none_for_all_else() {
     let scratch = Scratch::new();
     let holder = Domain::create(scratch.instance()).unwrap();
     let mut publisher = holder.publisher::<Feedback>().unwrap();
-    let mut newest = holder.subscriber::<Feedback>(Reading::Newest).unwrap();
-    let mut every = holder.subscriber::<Feedback>(Reading::Every).unwrap();
+    let mut newest = holder.subscriber::<Feedback>(Samples::Latest).unwrap();
+    let mut every = holder.subscriber::<Feedback>(Samples::All).unwrap();
     let notifier = holder.notifier(Wake::Feedback).unwrap();
     let listener = holder.listener(Wake::Feedback).unwrap();
     let queue = OperatorQueue::start(&holder).unwrap();
@@ -269,7 +269,7 @@ fn a_full_channel_allocates_no_more_than_a_publish() {
     let scratch = Scratch::new();
     let holder = Domain::create(scratch.instance()).unwrap();
     let mut planner = holder.publisher::<Setpoint>().unwrap();
-    let _controller = holder.subscriber::<Setpoint>(Reading::Every).unwrap();
+    let _controller = holder.subscriber::<Setpoint>(Samples::All).unwrap();
     while planner.publish(&Setpoint::default()).unwrap() {}
     let (sent, asked) = Allocations::during(|| planner.publish(&Setpoint::default()));
     assert!(!sent.unwrap());
@@ -321,7 +321,7 @@ fn a_request_reaches_the_cycle_and_its_reply_the_operator() {
 fn another_thread_enters_and_makes_its_own_ports() {
     let scratch = Scratch::new();
     let holder = Domain::create(scratch.instance()).unwrap();
-    let mut reader = holder.subscriber::<Progress>(Reading::Every).unwrap();
+    let mut reader = holder.subscriber::<Progress>(Samples::All).unwrap();
     let entry = holder.entry();
     let (send, publish) = std::sync::mpsc::channel();
     let thread = std::thread::spawn(move || {

@@ -13,12 +13,12 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use messages::{Cycle, Feedback, Progress};
 use runtime::child::ChildProcess;
 use runtime::peer::{PeerState, Peers};
 use runtime::wake::Wake;
-use runtime::{Domain, DomainError, Instance, Reading, Role};
+use runtime::{Domain, DomainError, Instance, Role, Samples};
 use scratch::Scratch;
-use signals::{Cycle, Feedback, Progress};
 
 const INSTANCE: &str = "GRAVER_TEST_INSTANCE";
 const ROLE: &str = "GRAVER_TEST_ROLE";
@@ -53,7 +53,7 @@ fn member_process() {
         publisher.publish(&Feedback { epoch, cycle: Cycle(1), ..Feedback::default() }).unwrap();
         publisher
     });
-    let status = domain.subscriber::<Progress>(Reading::Every).unwrap();
+    let status = domain.subscriber::<Progress>(Samples::All).unwrap();
     println!("\nmember: ready");
     std::io::stdin().read_to_end(&mut Vec::new()).unwrap();
     drop((ports, status));
@@ -217,7 +217,7 @@ fn members_killed_while_they_join_do_no_harm() {
         drives.wait().unwrap();
         holder.clean();
     }
-    let mut reader = holder.subscriber::<Feedback>(Reading::Every).unwrap();
+    let mut reader = holder.subscriber::<Feedback>(Samples::All).unwrap();
     let drives = start(scratch.instance(), Role::Drives);
     let _ = reader.receive().unwrap();
     leave(drives);
@@ -228,7 +228,7 @@ fn members_killed_while_they_join_do_no_harm() {
 fn a_successor_of_a_killed_publisher_is_heard() {
     let scratch = Scratch::new();
     let holder = Domain::create(scratch.instance()).unwrap();
-    let mut reader = holder.subscriber::<Feedback>(Reading::Every).unwrap();
+    let mut reader = holder.subscriber::<Feedback>(Samples::All).unwrap();
     for _ in 0..4 {
         let drives = start(scratch.instance(), Role::Drives);
         let pid = u64::from(drives.id());

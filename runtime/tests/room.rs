@@ -14,9 +14,9 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use runtime::{Domain, DomainError, Instance, Reading};
+use messages::{Command as MotorCommand, Cycle, Feedback, Setpoint};
+use runtime::{Domain, DomainError, Instance, Samples};
 use scratch::Scratch;
-use signals::{Command as MotorCommand, Cycle, Feedback, Setpoint};
 
 const SCRIPT: &str = "GRAVER_TEST_ROOM";
 const INSTANCE: &str = "GRAVER_TEST_INSTANCE";
@@ -64,7 +64,7 @@ fn what_a_pipeline_needs_is_taken_at_once_and_every_port_is_whole() {
     assert_whole(instance);
 
     let publisher = holder.publisher::<Feedback>().unwrap();
-    let reader = holder.subscriber::<Feedback>(Reading::Every).unwrap();
+    let reader = holder.subscriber::<Feedback>(Samples::All).unwrap();
     assert_whole(instance);
     assert!(reserve(instance) < held);
     // What the ports took came out of the reserve, small files in the root included.
@@ -81,7 +81,7 @@ fn nothing_of_a_domain_is_open_to_others() {
     let holder = Domain::create(scratch.instance()).unwrap();
     let _ports = (
         holder.publisher::<Feedback>().unwrap(),
-        holder.subscriber::<Feedback>(Reading::Every).unwrap(),
+        holder.subscriber::<Feedback>(Samples::All).unwrap(),
         holder.listener(runtime::wake::Wake::Feedback).unwrap(),
     );
     let mode = |path: &Path| fs::symlink_metadata(path).unwrap().permissions().mode();
@@ -116,14 +116,14 @@ fn as_many_readers_of_every_sample_as_there_is_memory_for_are_let_in() {
     let holder = Domain::create(scratch.instance()).unwrap();
     let mut publisher = holder.publisher::<Feedback>().unwrap();
     let mut every: Vec<_> =
-        (0..2).map(|_| holder.subscriber::<Feedback>(Reading::Every).unwrap()).collect();
-    let refusal = holder.subscriber::<Feedback>(Reading::Every).unwrap_err().to_string();
+        (0..2).map(|_| holder.subscriber::<Feedback>(Samples::All).unwrap()).collect();
+    let refusal = holder.subscriber::<Feedback>(Samples::All).unwrap_err().to_string();
     assert_eq!(
         refusal,
         "channel \"feedback\" has 2 readers of every sample already, and no more fit"
     );
     let mut newest: Vec<_> =
-        (0..2).map(|_| holder.subscriber::<Feedback>(Reading::Newest).unwrap()).collect();
+        (0..2).map(|_| holder.subscriber::<Feedback>(Samples::Latest).unwrap()).collect();
     // None of them reads: the publisher has memory for all that waits.
     for cycle in 1..=10_000 {
         publisher.publish(&Feedback { cycle: Cycle(cycle), ..Feedback::default() }).unwrap();
@@ -132,7 +132,7 @@ fn as_many_readers_of_every_sample_as_there_is_memory_for_are_let_in() {
         assert_eq!(reader.newest().unwrap().unwrap().cycle, Cycle(10_000));
     }
     drop(every.pop());
-    assert!(holder.subscriber::<Feedback>(Reading::Every).is_ok());
+    assert!(holder.subscriber::<Feedback>(Samples::All).is_ok());
 }
 
 #[test]
@@ -177,8 +177,8 @@ fn fill(instance: &Instance) {
     let holder = Domain::create(instance).unwrap();
     let mut feedbacks = holder.publisher::<Feedback>().unwrap();
     let mut commands = holder.publisher::<MotorCommand>().unwrap();
-    let mut reader = holder.subscriber::<Feedback>(Reading::Every).unwrap();
-    let _other = holder.subscriber::<MotorCommand>(Reading::Every).unwrap();
+    let mut reader = holder.subscriber::<Feedback>(Samples::All).unwrap();
+    let _other = holder.subscriber::<MotorCommand>(Samples::All).unwrap();
     fill_up();
     for _ in 0..5000 {
         feedbacks.publish(&Feedback::default()).unwrap();
@@ -193,7 +193,7 @@ fn late(instance: &Instance) {
     let holder = Domain::create(instance).unwrap();
     let mut feedbacks = holder.publisher::<Feedback>().unwrap();
     fill_up();
-    let mut reader = holder.subscriber::<Feedback>(Reading::Every).unwrap();
+    let mut reader = holder.subscriber::<Feedback>(Samples::All).unwrap();
     feedbacks.publish(&Feedback { cycle: Cycle(7), ..Feedback::default() }).unwrap();
     assert_eq!(reader.receive().unwrap().unwrap().cycle, Cycle(7));
     let _setpoints = holder.publisher::<Setpoint>().unwrap();

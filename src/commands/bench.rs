@@ -4,20 +4,20 @@ use crate::arguments::{BenchArguments, LatencyArguments};
 use crate::exit::{Exit, Failure};
 use crate::output::say;
 use crate::pipeline::configuration::Configuration;
-use crate::pipeline::{LOOK, Pipeline, Starter};
+use crate::pipeline::{POLL_INTERVAL, Pipeline, ServiceOwner};
 use crate::{inputs, output};
 use drives::PlantOptions;
-use monitor::conclusion::{Ending, summarise};
-use monitor::examination::{Clock, Findings};
+use messages::plan::PlanFacts;
+use messages::time::CYCLE_TIME;
+use messages::{Command, Feedback, OperatorVerb, PlannerPhase, run_folder};
+use monitor::conclusion::{RunOutcome, summarise};
 use monitor::latency::HopLatency;
+use monitor::run_analysis::{Clock, RunResults};
 use monitor::stage::{Inputs, MonitorStage, Outputs};
 use monitor::summary::Realtime;
 use planner::request::JobRequest;
-use runtime::{Domain, Instance, Reading, Role, Subscriber, signal};
+use runtime::{Domain, Instance, Role, Samples, Subscriber, signal};
 use serde::Serialize;
-use signals::plan::PlanFacts;
-use signals::time::CYCLE_TIME;
-use signals::{Command, Feedback, OperatorVerb, PlannerPhase, run_folder};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::time::{Duration, Instant};
@@ -59,11 +59,11 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Exit, Failure> {
         .prefix("graver-bench-")
         .tempdir()
         .map_err(|error| Failure::output(format!("{}: {error}", std::env::temp_dir().display())))?;
-    let mut pipeline = Pipeline::start(&instance, &configuration, Starter::Own)?;
+    let mut pipeline = Pipeline::start(&instance, &configuration, ServiceOwner::Own)?;
     let measured = pipeline.enable().and_then(|()| {
         measure(&mut pipeline, &request, folder.path(), &instance, arguments.seconds)
     });
-    let heard = pipeline.heard;
+    let latest = pipeline.latest;
     pipeline.shut_down();
     let measured = measured?;
 
@@ -72,18 +72,23 @@ pub fn latency(arguments: &LatencyArguments) -> Result<Exit, Failure> {
         output::printed(std::io::stdout().lock().write_all(lines.as_bytes()))?;
         return Ok(Exit::Done);
     }
-    let ending = Ending {
-        controller: Some(heard.controller).filter(|report| report.stream != 0),
-        drives: Some(heard.drives),
-        ..Ending::default()
+    let run_outcome = RunOutcome {
+        controller: Some(latest.controller).filter(|report| report.stream != 0),
+        drives: Some(latest.drives),
+        ..RunOutcome::default()
     };
-    let summary =
-        summarise(&input.machine, &PlanFacts::default(), &ending, None::<&Findings>, Clock::Real);
+    let summary = summarise(
+        &input.machine,
+        &PlanFacts::default(),
+        &run_outcome,
+        None::<&RunResults>,
+        Clock::Real,
+    );
     let report = LatencyReport {
         seconds: arguments.seconds,
         cycles: measured.periods.len() as u64,
-        overruns: heard.drives.overruns,
-        missed: heard.drives.missed,
+        overruns: latest.drives.overruns,
+        missed: latest.drives.missed,
         latency: measured.stage.histograms().summary(),
         period_error: measured.period_error(),
         realtime: summary.realtime,
@@ -134,7 +139,7 @@ impl Measured {
         let mut errors: Vec<u64> = self
             .periods
             .iter()
-            .map(|period| period.abs_diff(signals::time::CYCLE_PERIOD.0))
+            .map(|period| period.abs_diff(messages::time::CYCLE_PERIOD.0))
             .collect();
         errors.sort_unstable();
         let at = |share: f64| {
@@ -166,9 +171,9 @@ fn measure(
         .map_err(|error| Failure::output(format!("{}: {error}", file.display())))?;
     let observer = Domain::join(instance, Role::Observer).map_err(Failure::service)?;
     let mut feedbacks: Subscriber<Feedback> =
-        observer.subscriber(Reading::Every).map_err(Failure::service)?;
+        observer.subscriber(Samples::All).map_err(Failure::service)?;
     let mut commands: Subscriber<Command> =
-        observer.subscriber(Reading::Every).map_err(Failure::service)?;
+        observer.subscriber(Samples::All).map_err(Failure::service)?;
     let (mut feedback_batch, mut command_batch) = (Vec::new(), Vec::new());
     let mut outputs = Outputs::default();
     let mut measured = Measured { stage: MonitorStage::new(), periods: Vec::new() };
@@ -178,14 +183,14 @@ fn measure(
     let began = Instant::now();
     let end = Duration::from_secs_f64(seconds);
     while began.elapsed() < end && signal::termination().is_none() {
-        if let Some(ended) = pipeline.look()?.first() {
+        if let Some(ended) = pipeline.poll()?.first() {
             return Err(Failure::service(ended));
         }
-        let heard = &pipeline.heard;
-        if stream == 0 || heard.progress.finished_stream >= stream {
+        let latest = &pipeline.latest;
+        if stream == 0 || latest.progress.finished_stream >= stream {
             stream = pipeline.offer(&folder.to_string_lossy())?;
-        } else if heard.planner.stream == stream
-            && PlannerPhase::from_wire(heard.planner.phase) == PlannerPhase::Streaming
+        } else if latest.planner.stream == stream
+            && PlannerPhase::from_wire(latest.planner.phase) == PlannerPhase::Streaming
             && started_stream != stream
         {
             pipeline.ask(OperatorVerb::Start, stream as f64);
@@ -207,7 +212,7 @@ fn measure(
         }
         let inputs = Inputs { feedbacks: &feedback_batch, commands: &command_batch };
         measured.stage.step(&inputs, &mut outputs);
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
     Ok(measured)
 }

@@ -15,13 +15,13 @@ use crate::inputs::MachineInput;
 use crate::{inputs, output};
 use drives::{PlantOptions, SimulatedPlant};
 use machine::Machine;
+use messages::artwork::Artwork;
 use monitor::conclusion::machine_summary;
 use monitor::report::workspace::Workspace;
 use monitor::summary::MachineSummary;
 use planner::Plan;
 use planner::request::JobRequest;
 use serde::Serialize;
-use signals::artwork::Artwork;
 use std::io::Write;
 use std::path::{Component, Path, PathBuf};
 
@@ -135,7 +135,7 @@ fn tidy(path: &Path) -> PathBuf {
 
 /// The doubts about the machine file, and why it cannot be simulated, if it cannot.
 fn warnings(input: &MachineInput) -> Vec<CheckWarning> {
-    let doubts = input.machine.warnings.iter().map(|warning| CheckWarning {
+    let warnings = input.machine.warnings.iter().map(|warning| CheckWarning {
         line: warning.line as u64,
         column: warning.column as u64,
         message: warning.text.clone(),
@@ -146,7 +146,7 @@ fn warnings(input: &MachineInput) -> Vec<CheckWarning> {
         column: 0,
         message: format!("`graver simulate` cannot simulate it: {error}"),
     });
-    doubts.chain(refused).collect()
+    warnings.chain(refused).collect()
 }
 
 /// The picture of the workspace, as SVG.

@@ -3,11 +3,11 @@
 use crate::arguments::ExportArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::Sources;
+use messages::{MAX_AXES, run_folder};
 use monitor::recording::file::{RecordingError, RecordingReader};
 use monitor::recording::table::TableWriter;
 use monitor::summary::Summary;
 use runtime::message;
-use signals::{MAX_AXES, run_folder};
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, ErrorKind, Write};
 use std::path::Path;

@@ -8,12 +8,12 @@ use self::lines::{Branch, Ellipse, ErrorBody, Reply, ReplyPose, Request, Request
 use crate::arguments::{KinematicsArguments, KinematicsVerb};
 use crate::exit::{Exit, Failure};
 use crate::inputs;
-use machine::kinematics::{Branch as _, Freedom, Joints, KinematicsError};
+use machine::kinematics::{Branch as _, Joints, KinematicsError, TaskSpace};
 use machine::{Machine, Mechanism, MechanismVisitor, Pose};
+use messages::finite::first_not_finite;
+use messages::math;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SMatrix, SVD, SymmetricEigen, Vector3};
 use serde_json::Value;
-use signals::finite::first_not_finite;
-use signals::math;
 use std::io::{self, BufRead, BufWriter, ErrorKind, Write};
 
 /// Turns of the iterations behind singular values and eigenvalues before they are given up; a matrix
@@ -125,7 +125,7 @@ struct Answer<'a, const N: usize, M: Mechanism<N>> {
     machine: &'a Machine,
     arguments: &'a KinematicsArguments,
     previous: Joints<N>,
-    near: Option<M::Assembly>,
+    near: Option<M::ChainState>,
 }
 
 impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
@@ -183,36 +183,36 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     }
 
     /// The chain with the joints at `q`, solved from the one before.
-    fn assemble(&mut self, q: &Joints<N>, branch: M::Branch) -> Result<M::Assembly, ErrorBody> {
-        let assembly = self
+    fn solve(&mut self, q: &Joints<N>, branch: M::Branch) -> Result<M::ChainState, ErrorBody> {
+        let state = self
             .mechanism
-            .assemble(q, branch, self.near.as_ref())
-            .or_else(|_| self.mechanism.assemble(q, branch, None))
+            .solve(q, branch, self.near.as_ref())
+            .or_else(|_| self.mechanism.solve(q, branch, None))
             .map_err(|error| self.kinematics_error(&error))?;
-        self.near = Some(assembly);
-        Ok(assembly)
+        self.near = Some(state);
+        Ok(state)
     }
 
     /// The chain that a line speaks of.
-    fn assembly(&mut self, request: &Request) -> Result<M::Assembly, ErrorBody> {
+    fn state(&mut self, request: &Request) -> Result<M::ChainState, ErrorBody> {
         let q = self.joints("q", request.q.as_ref())?;
         let branch = self.branch(request)?;
-        self.assemble(&q, branch)
+        self.solve(&q, branch)
     }
 
     fn forward(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
         let q = self.joints("q", request.q.as_ref())?;
         self.check_limits(&q)?;
         let branch = self.branch(request)?;
-        let assembly = self.assemble(&q, branch)?;
-        let pose = self.mechanism.pose(&assembly);
-        let freedom = self.mechanism.freedom();
-        let rotation = (freedom == Freedom::Pose).then(|| {
+        let state = self.solve(&q, branch)?;
+        let pose = self.mechanism.pose(&state);
+        let task_space = self.mechanism.task_space();
+        let rotation = (task_space == TaskSpace::Pose).then(|| {
             core::array::from_fn(|row| core::array::from_fn(|column| pose.rotation[(row, column)]))
         });
-        let axis = (freedom == Freedom::Axis).then(|| beam(&pose).into());
+        let axis = (task_space == TaskSpace::Axis).then(|| beam(&pose).into());
         let pose = ReplyPose { position: self.shown(&pose.position), rotation, axis };
-        Ok(Reply::Forward { pose, branch: shown_branch(self.mechanism.branch_of(&assembly)) })
+        Ok(Reply::Forward { pose, branch: shown_branch(self.mechanism.branch_of(&state)) })
     }
 
     fn inverse(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
@@ -253,35 +253,35 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         let q = solved.map_err(|error| self.kinematics_error(&error))?;
         self.check_limits(&q)?;
         self.previous = q;
-        let assembly = match pose {
+        let state = match pose {
             Some(pose) => {
                 let near = self.near.as_ref();
-                let assembly = self
+                let state = self
                     .mechanism
-                    .assemble_at(&pose, &q, branch, near)
-                    .or_else(|_| self.mechanism.assemble(&q, branch, None))
+                    .solve_at(&pose, &q, branch, near)
+                    .or_else(|_| self.mechanism.solve(&q, branch, None))
                     .map_err(|error| self.kinematics_error(&error))?;
-                *self.near.insert(assembly)
+                *self.near.insert(state)
             }
-            None => self.assemble(&q, branch)?,
+            None => self.solve(&q, branch)?,
         };
         let axes = self.machine.axes.iter().zip(q.iter()).filter_map(|(axis, value)| {
             let [lower, upper] = axis.limits.position;
             let distance = (value - lower).min(upper - value);
             distance.is_finite().then(|| (axis.name.clone(), distance))
         });
-        let singularities = self.mechanism.margins(&assembly);
+        let singularities = self.mechanism.margins(&state);
         let margin = axes
             .chain(singularities.iter().map(|margin| (margin.name.to_owned(), margin.value)))
             .collect();
         let shown = q.component_div(&self.ratios());
-        let branch = shown_branch(self.mechanism.branch_of(&assembly));
+        let branch = shown_branch(self.mechanism.branch_of(&state));
         Ok(Reply::Inverse { q: shown.as_slice().to_vec(), branch, margin })
     }
 
     /// Tool velocity per joint rate, in the joint values that the user speaks of.
-    fn tool_jacobian(&self, assembly: &M::Assembly) -> SMatrix<f64, 6, N> {
-        let mut jacobian = self.mechanism.jacobian(assembly);
+    fn tool_jacobian(&self, state: &M::ChainState) -> SMatrix<f64, 6, N> {
+        let mut jacobian = self.mechanism.jacobian(state);
         for (axis, ratio) in self.ratios().iter().enumerate() {
             jacobian.column_mut(axis).scale_mut(*ratio);
         }
@@ -289,17 +289,17 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     }
 
     /// The rows of the tool's Jacobian in which the mechanism can choose the tool's motion.
-    fn task_jacobian(&self, assembly: &M::Assembly) -> DMatrix<f64> {
-        let jacobian = self.tool_jacobian(assembly);
-        let rows = match self.mechanism.freedom() {
-            Freedom::Plane => 2,
-            Freedom::Space => 3,
-            Freedom::Axis | Freedom::Pose => 6,
+    fn task_jacobian(&self, state: &M::ChainState) -> DMatrix<f64> {
+        let jacobian = self.tool_jacobian(state);
+        let rows = match self.mechanism.task_space() {
+            TaskSpace::Plane => 2,
+            TaskSpace::Space => 3,
+            TaskSpace::Axis | TaskSpace::Pose => 6,
         };
         let mut task = DMatrix::from_fn(rows, N, |row, column| jacobian[(row, column)]);
-        if self.mechanism.freedom() == Freedom::Axis {
+        if self.mechanism.task_space() == TaskSpace::Axis {
             // The rate of the beam's direction, ω×t: turning about the beam does not show in it.
-            let beam = beam(&self.mechanism.pose(assembly));
+            let beam = beam(&self.mechanism.pose(state));
             for column in 0..N {
                 let turning: Vector3<f64> = jacobian.fixed_view::<3, 1>(3, column).into_owned();
                 task.view_mut((3, column), (3, 1)).copy_from(&turning.cross(&beam));
@@ -309,8 +309,8 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     }
 
     fn jacobian(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
-        let assembly = self.assembly(request)?;
-        let task = self.task_jacobian(&assembly);
+        let state = self.state(request)?;
+        let task = self.task_jacobian(&state);
         let rows: Vec<Vec<f64>> =
             task.row_iter().map(|row| row.iter().copied().collect()).collect();
         let determinant = if task.is_square() {
@@ -331,8 +331,8 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     fn dynamics(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
         let velocity = self.joints("qd", request.qd.as_ref())?;
         let acceleration = self.joints("qdd", request.qdd.as_ref())?;
-        let assembly = self.assembly(request)?;
-        let mut effort = self.mechanism.inverse_dynamics(&assembly, &velocity, &acceleration)
+        let state = self.state(request)?;
+        let mut effort = self.mechanism.inverse_dynamics(&state, &velocity, &acceleration)
             + self.mechanism.friction(&velocity);
         if let Some(wrench) = &request.wrench {
             if wrench.len() > 6 {
@@ -344,7 +344,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
             // The tool pushes on the work with this wrench: virtual work gives Jᵀ·w at the joints.
             let wrench =
                 nalgebra::Vector6::from_fn(|row, _| wrench.get(row).copied().unwrap_or(0.0));
-            effort += self.mechanism.jacobian(&assembly).transpose() * wrench;
+            effort += self.mechanism.jacobian(&state).transpose() * wrench;
         }
         let ratios = self.ratios();
         let mut shown = effort.component_mul(&ratios);
@@ -358,8 +358,8 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     }
 
     fn ellipse(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
-        let assembly = self.assembly(request)?;
-        let jacobian = self.tool_jacobian(&assembly);
+        let state = self.state(request)?;
+        let jacobian = self.tool_jacobian(&state);
         let size = self.dimensions();
         let linear = DMatrix::from_fn(size, N, |row, column| jacobian[(row, column)]);
         let axes = principal_axes(&linear * linear.transpose())?;
@@ -385,7 +385,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     }
 
     fn dimensions(&self) -> usize {
-        if self.mechanism.freedom() == Freedom::Plane { 2 } else { 3 }
+        if self.mechanism.task_space() == TaskSpace::Plane { 2 } else { 3 }
     }
 
     fn shown(&self, position: &Vector3<f64>) -> Vec<f64> {

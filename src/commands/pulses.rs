@@ -2,9 +2,9 @@
 
 use drives::pulses::{Direction, Segment};
 use machine::{Axis, Machine};
+use messages::Setpoint;
+use messages::time::CYCLE_TIME;
 use planner::Plan;
-use signals::Setpoint;
-use signals::time::CYCLE_TIME;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 

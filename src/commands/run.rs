@@ -6,7 +6,7 @@ use crate::files::Claim;
 use crate::pipeline::configuration::Configuration;
 use crate::pipeline::job_run::JobRun;
 use crate::pipeline::operators::{self, Submission};
-use crate::pipeline::{LOOK, Pipeline, Starter};
+use crate::pipeline::{POLL_INTERVAL, Pipeline, ServiceOwner};
 use crate::{inputs, output};
 use monitor::run_folder::RunFolder;
 use runtime::{Instance, message, signal};
@@ -32,7 +32,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let configuration = Configuration::new(input.source, &arguments.drives)?;
     // From here on a signal brings the machine to rest before it ends anything.
     signal::install().map_err(Failure::service)?;
-    let mut pipeline = Pipeline::start(&instance, &configuration, Starter::Own)?;
+    let mut pipeline = Pipeline::start(&instance, &configuration, ServiceOwner::Own)?;
     let folder = run_folder(arguments.out.as_deref(), &job.drawing.name)?;
     let claim = Claim::of(&folder)?;
     let request = request.absolute();
@@ -60,14 +60,14 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
     let source = inputs::machine(&arguments.machine)?.source;
     let configuration = Configuration::new(source, &arguments.drives)?;
     signal::install().map_err(Failure::service)?;
-    let mut pipeline = Pipeline::start(&instance, &configuration, Starter::Others)?;
+    let mut pipeline = Pipeline::start(&instance, &configuration, ServiceOwner::Others)?;
     message::tell(&format!("instance {} waits for its services and jobs", instance.name()));
     while signal::termination().is_none() {
-        pipeline.look()?;
+        pipeline.poll()?;
         if let Some(submission) = pipeline.submission() {
             run_submission(&mut pipeline, submission);
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
     pipeline.shut_down();
     Ok(Exit::Done)
@@ -76,7 +76,7 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
 /// Runs a submitted job to its end; whoever submitted it hears of it in any case.
 fn run_submission(pipeline: &mut Pipeline, submission: Submission) {
     let started = Instant::now();
-    let (number, news) = (submission.number, submission.news.clone());
+    let (number, events) = (submission.number, submission.events.clone());
     let (job, out) = (submission.job.clone(), submission.out.clone());
     let ran = if pipeline.control.begin(number) {
         run_folder(out.as_deref(), "job").and_then(|folder| {
@@ -90,6 +90,6 @@ fn run_submission(pipeline: &mut Pipeline, submission: Submission) {
     if let Err(failure) = ran {
         message::tell(failure.refusal.text.trim());
         pipeline.control.end();
-        operators::tell_end(&news, &failure.summary());
+        operators::tell_end(&events, &failure.summary());
     }
 }

@@ -6,14 +6,14 @@ use crate::files::Claim;
 use crate::simulation::simulate;
 use crate::{inputs, output};
 use drives::PlantOptions;
-use monitor::conclusion::{self, Ending};
-use monitor::examination::{Clock, Examination};
+use messages::run_folder;
+use messages::time::CYCLE_TIME;
+use monitor::conclusion::{self, RunOutcome};
 use monitor::marks::StreamEnd;
 use monitor::recording::CycleRecord;
 use monitor::recording::file::RecordingWriter;
+use monitor::run_analysis::{Clock, RunAnalysis};
 use monitor::run_folder::RunFolder;
-use signals::run_folder;
-use signals::time::CYCLE_TIME;
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::PathBuf;
@@ -40,10 +40,10 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     let _claim = folder.as_ref().map(Claim::of).transpose()?;
     folder.as_ref().map_or(Ok(()), RunFolder::clear).map_err(Failure::bad_input)?;
     let mut recording = folder.as_ref().map(Recording::begin);
-    let mut examination = Examination::new(&plan.artwork, Clock::Virtual);
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual);
     let options = PlantOptions { seed: arguments.seed, ..PlantOptions::default() };
     let simulated = simulate(&input.machine, &input.plant, &plan, options, |records| {
-        records.iter().for_each(|record| examination.push(record));
+        records.iter().for_each(|record| analysis.push(record));
         if let Some(recording) = &mut recording {
             recording.write(records);
         }
@@ -53,26 +53,26 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     warnings.extend(recording.and_then(Recording::finish));
 
     let examining = Instant::now();
-    let findings = examination.finish(StreamEnd::Reported(&simulated.controller));
+    let results = analysis.finish(StreamEnd::Reported(&simulated.controller));
     let time = simulated.controller.cycles as f64 * CYCLE_TIME;
-    let ending = Ending {
+    let run_outcome = RunOutcome {
         controller: Some(simulated.controller),
         drives: Some(simulated.drives),
         plan_time,
         warnings,
         realtime_factor: Some(time / simulated.stepping.as_secs_f64()),
-        ..Ending::default()
+        ..RunOutcome::default()
     };
     let (machine, facts) = (&input.machine, &plan.facts);
     let mut summary =
-        conclusion::summarise(machine, facts, &ending, Some(&findings), Clock::Virtual);
+        conclusion::summarise(machine, facts, &run_outcome, Some(&results), Clock::Virtual);
     summary.report_time = examining.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
     if let Some(folder) = &folder {
         if let Err(error) = folder.write_json(run_folder::ARTWORK, &plan.artwork) {
             summary.warnings.push(format!("cannot write {error}"));
         }
-        conclusion::write(folder, &input.machine, &plan.artwork, &mut summary, Some(&findings));
+        conclusion::write(folder, &input.machine, &plan.artwork, &mut summary, Some(&results));
     }
     Ok(output::summary(&summary, arguments.json))
 }

@@ -1,19 +1,19 @@
 //! One job in a pipeline, from the start of the machine to the summary.
 
 use super::control::JobControl;
-use super::operators::{self, News, Submission};
+use super::operators::{self, JobEvent, Submission};
 use super::power_up::{NotReady, PowerUp};
-use super::services::{Ended, Remedy};
-use super::{LOOK, Pipeline, Starter, is_dark_and_at_rest};
+use super::services::{Ended, Recovery};
+use super::{POLL_INTERVAL, Pipeline, ServiceOwner, is_dark_and_at_rest};
 use crate::exit::{Failure, error_summary};
 use crate::output::ProgressLine;
-use monitor::conclusion::{self, Ending, RecordingState};
+use messages::{Cycle, DrivesReport, Fault, FaultCode, OperatorVerb, PlannerPhase, run_folder};
+use monitor::conclusion::{self, RecordingState, RunOutcome};
 use monitor::run_folder::RunFolder;
 use monitor::summary::{ErrorSummary, Outcome, Summary};
 use planner::request::{JobRequest, Refusal};
 use runtime::domain::Role;
 use runtime::{message, signal};
-use signals::{Cycle, DrivesReport, Fault, FaultCode, OperatorVerb, PlannerPhase, run_folder};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -73,7 +73,7 @@ pub struct JobRun<'a> {
     /// The newest cycle of drives that was heard of, and when.
     drives_heard: (Cycle, Instant),
     started: Instant,
-    ending: Ending,
+    run_outcome: RunOutcome,
     submission: Option<Submission>,
 }
 
@@ -94,7 +94,7 @@ impl<'a> JobRun<'a> {
         folder.write(run_folder::REQUEST, request).map_err(Failure::bad_input)?;
         let name = job_name(job);
         pipeline.board.name_job(Some(&name));
-        let ending = Ending { job: name.clone(), ..Ending::default() };
+        let run_outcome = RunOutcome { job: name.clone(), ..RunOutcome::default() };
         Ok(Self {
             control: pipeline.control.clone(),
             pipeline,
@@ -107,7 +107,7 @@ impl<'a> JobRun<'a> {
             quiet: None,
             drives_heard: (Cycle::default(), Instant::now()),
             started,
-            ending,
+            run_outcome,
             submission,
         })
     }
@@ -116,7 +116,7 @@ impl<'a> JobRun<'a> {
     pub fn follow(mut self) -> Summary {
         let line = ProgressLine::on_terminal();
         loop {
-            match self.pipeline.look() {
+            match self.pipeline.poll() {
                 Ok(ended) => {
                     for ended in ended {
                         line.clear();
@@ -144,9 +144,9 @@ impl<'a> JobRun<'a> {
             line.draw(share, &text);
             if let Some(submission) = &self.submission {
                 // A submitter that left hears nothing; the job goes on.
-                let _ = submission.news.send(News::Share(share));
+                let _ = submission.events.send(JobEvent::Share(share));
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
         line.clear();
         self.conclude()
@@ -179,7 +179,7 @@ impl<'a> JobRun<'a> {
         let path = std::path::absolute(self.folder.path()).map_err(|error| {
             Failure::bad_input(format!("{}: {error}", self.folder.path().display()))
         })?;
-        self.ending.overruns_before = self.pipeline.heard.drives.overruns;
+        self.run_outcome.overruns_before = self.pipeline.latest.drives.overruns;
         self.stream = Some(self.pipeline.offer(&path.to_string_lossy())?);
         self.stage = Stage::Planning;
         Ok(())
@@ -187,7 +187,7 @@ impl<'a> JobRun<'a> {
 
     /// Whether the planner has refused the job; a plan that it streams is ready to be played.
     fn heed_planner(&mut self) -> Result<bool, Failure> {
-        let report = self.pipeline.heard.planner;
+        let report = self.pipeline.latest.planner;
         if Some(report.stream) != self.stream {
             return Ok(false);
         }
@@ -197,7 +197,7 @@ impl<'a> JobRun<'a> {
                 return Ok(true);
             }
             PlannerPhase::Streaming => {
-                self.ending.plan_time = report.plan_time;
+                self.run_outcome.plan_time = report.plan_time;
                 self.stage = Stage::Ready(Instant::now());
             }
             _ => {}
@@ -218,7 +218,7 @@ impl<'a> JobRun<'a> {
             return;
         }
         if !recorded {
-            self.ending.warnings.push("the monitor is not recording this job".into());
+            self.run_outcome.warnings.push("the monitor is not recording this job".into());
         }
         let answer = self.pipeline.request(OperatorVerb::Start, stream as f64, WORD_PATIENCE);
         if !answer.is_ok_and(|reply| reply.accepted == 0) {
@@ -227,7 +227,7 @@ impl<'a> JobRun<'a> {
             self.played = true;
             return;
         }
-        // The fault for which it refuses is heard with the next look, if there is one.
+        // The fault for which it refuses is heard with the next poll, if there is one.
         let refused = *self.refused.get_or_insert_with(Instant::now);
         if refused.elapsed() > WORD_PATIENCE {
             self.end_with("the controller refused to start the job".into());
@@ -236,40 +236,41 @@ impl<'a> JobRun<'a> {
 
     /// Whether the controller has said how the job ended, or nothing more can be expected of it.
     fn is_over(&mut self) -> bool {
-        let report = self.pipeline.heard.controller;
+        let report = self.pipeline.latest.controller;
         if Some(report.stream) == self.stream && report.is_final == 1 {
-            self.ending.controller = Some(report);
+            self.run_outcome.controller = Some(report);
             return true;
         }
         self.hear_drives();
         let since = match self.stage {
             // What was never played only holds, or is being stopped.
             Stage::Resting(since) if !self.played => {
-                let holds = self.pipeline.has(Role::Controller) && !self.ending.latched.is_some();
+                let holds =
+                    self.pipeline.has(Role::Controller) && !self.run_outcome.latched.is_some();
                 let gone = !self.pipeline.has(Role::Drives);
-                let at_rest = is_dark_and_at_rest(&self.pipeline.heard);
+                let at_rest = is_dark_and_at_rest(&self.pipeline.latest);
                 return holds || gone || at_rest || since.elapsed() > UNPLAYED_PATIENCE;
             }
             Stage::Resting(since) => Some(since),
             _ => None,
         };
-        let heard = &self.pipeline.heard;
+        let latest = &self.pipeline.latest;
         // Without drives nothing moves, and axes that drives has stopped rest by themselves.
         let gone = !self.pipeline.has(Role::Drives);
         let at_rest =
-            is_dark_and_at_rest(heard) && (since.is_some() || heard.drives.fault.is_some());
+            is_dark_and_at_rest(latest) && (since.is_some() || latest.drives.fault.is_some());
         self.quiet =
             if gone || at_rest { self.quiet.or_else(|| Some(Instant::now())) } else { None };
         let silent = self.quiet.is_some_and(|quiet| quiet.elapsed() > WORD_PATIENCE);
         if silent && since.is_none() {
-            self.fail(heard.drives.fault);
+            self.fail(latest.drives.fault);
         }
         silent || since.is_some_and(|since| since.elapsed() > REST_PATIENCE)
     }
 
     /// Gives a job up that is being played while drives says nothing: it reports ten times a second.
     fn hear_drives(&mut self) {
-        let cycle = self.pipeline.heard.drives.cycle;
+        let cycle = self.pipeline.latest.drives.cycle;
         if cycle != self.drives_heard.0 {
             self.drives_heard = (cycle, Instant::now());
         } else if self.drives_heard.1.elapsed() > DRIVES_PATIENCE {
@@ -282,12 +283,12 @@ impl<'a> JobRun<'a> {
 
     /// The fault that the controller or drives holds.
     fn latched(&self) -> Fault {
-        let heard = &self.pipeline.heard;
-        if heard.progress.fault.is_some() { heard.progress.fault } else { heard.drives.fault }
+        let latest = &self.pipeline.latest;
+        if latest.progress.fault.is_some() { latest.progress.fault } else { latest.drives.fault }
     }
 
     fn progress(&self) -> (f64, String) {
-        let heard = &self.pipeline.heard;
+        let latest = &self.pipeline.latest;
         let what = match self.stage {
             Stage::Starting(_) => "starting".to_owned(),
             Stage::Planning => "planning".to_owned(),
@@ -295,15 +296,15 @@ impl<'a> JobRun<'a> {
             Stage::Ready(_) => "starting".to_owned(),
             Stage::Playing => format!(
                 "stroke {} of {}, rate {:.0} %",
-                heard.progress.stroke,
-                heard.planner.strokes,
-                heard.progress.rate * 100.0
+                latest.progress.stroke,
+                latest.planner.strokes,
+                latest.progress.rate * 100.0
             ),
             Stage::Resting(_) => "coming to rest".to_owned(),
         };
-        let is_ours = Some(heard.progress.stream) == self.stream;
-        let played = if is_ours { heard.progress.played } else { 0 };
-        let share = played as f64 / heard.planner.samples.max(1) as f64;
+        let is_ours = Some(latest.progress.stream) == self.stream;
+        let played = if is_ours { latest.progress.played } else { 0 };
+        let share = played as f64 / latest.planner.samples.max(1) as f64;
         (share, format!("{}: {what}", self.name))
     }
 
@@ -314,7 +315,7 @@ impl<'a> JobRun<'a> {
             return false;
         }
         if !matches!(self.stage, Stage::Resting(_)) {
-            self.ending.outcome = Some(Outcome::Stopped);
+            self.run_outcome.outcome = Some(Outcome::Stopped);
             self.rest();
             if self.played {
                 self.pipeline.ask(OperatorVerb::Stop, 0.0);
@@ -337,21 +338,21 @@ impl<'a> JobRun<'a> {
         };
         let message = format!("{ended}{consequence}");
         message::tell(&message);
-        match ended.remedy {
-            Remedy::Stop => {
-                if !self.ending.latched.is_some() {
-                    self.ending.latched = Fault::new(death_of(ended.role));
+        match ended.recovery {
+            Recovery::Stop => {
+                if !self.run_outcome.latched.is_some() {
+                    self.run_outcome.latched = Fault::new(death_of(ended.role));
                 }
                 self.end_with(message);
             }
-            _ => self.ending.warnings.push(message),
+            _ => self.run_outcome.warnings.push(message),
         }
     }
 
     /// What ails a job whose services somebody else starts, when one that it cannot end without is
     /// gone. Of the others' deaths the controller tells.
     fn missing(&self) -> Option<&'static str> {
-        if self.pipeline.starter() == Starter::Own {
+        if self.pipeline.owner() == ServiceOwner::Own {
             return None;
         }
         match self.stage {
@@ -369,18 +370,18 @@ impl<'a> JobRun<'a> {
     }
 
     fn end_with(&mut self, message: String) {
-        if self.ending.error.is_none() {
-            self.ending.error =
+        if self.run_outcome.error.is_none() {
+            self.run_outcome.error =
                 Some(ErrorSummary { file: None, line: None, column: None, message });
-            self.ending.outcome = Some(Outcome::Aborted);
+            self.run_outcome.outcome = Some(Outcome::Aborted);
         }
         self.rest();
     }
 
     /// A fault that the controller does not report with the stream.
     fn fail(&mut self, fault: Fault) {
-        self.ending.latched = fault;
-        self.ending.outcome = Some(Outcome::Faulted);
+        self.run_outcome.latched = fault;
+        self.run_outcome.outcome = Some(Outcome::Faulted);
         self.rest();
     }
 
@@ -405,30 +406,30 @@ impl<'a> JobRun<'a> {
             ))
         });
         message::tell(refusal.text.trim());
-        self.ending.outcome = Some(Outcome::Refused);
-        self.ending.error = Some(error_summary(&refusal));
+        self.run_outcome.outcome = Some(Outcome::Refused);
+        self.run_outcome.error = Some(error_summary(&refusal));
     }
 
     fn conclude(mut self) -> Summary {
         if self.stream.is_some() {
-            if self.ending.controller.is_none() {
+            if self.run_outcome.controller.is_none() {
                 // The planner rests, and the monitor ends its recording. Without channels neither
                 // can be told; they end with the domain.
                 let _ = self.pipeline.close();
             }
             self.await_recording();
         }
-        self.ending.drives = Some(self.drives_with_cause());
-        if !self.ending.latched.is_some() {
-            self.ending.latched = self.pipeline.heard.progress.fault;
+        self.run_outcome.drives = Some(self.drives_with_cause());
+        if !self.run_outcome.latched.is_some() {
+            self.run_outcome.latched = self.pipeline.latest.progress.fault;
         }
         let machine = &self.pipeline.machine;
-        self.ending.warnings.splice(0..0, machine.job_warnings());
-        let summary = conclusion::conclude(&self.folder, machine, &self.ending, self.started);
+        self.run_outcome.warnings.splice(0..0, machine.job_warnings());
+        let summary = conclusion::conclude(&self.folder, machine, &self.run_outcome, self.started);
         self.pipeline.board.name_job(None);
         self.control.end();
         if let Some(submission) = self.submission.take() {
-            operators::tell_end(&submission.news, &summary);
+            operators::tell_end(&submission.events, &summary);
         }
         summary
     }
@@ -444,10 +445,10 @@ impl<'a> JobRun<'a> {
                 Some(_) => WRITING_PATIENCE,
                 None => return,
             };
-            if since.elapsed() > patience || self.pipeline.look().is_err() {
+            if since.elapsed() > patience || self.pipeline.poll().is_err() {
                 return;
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
     }
 
@@ -459,8 +460,8 @@ impl<'a> JobRun<'a> {
     /// What drives reported, with the cause of a death that the dead cannot tell: a controller
     /// without feedback says nothing, and drives without commands may name those first.
     fn drives_with_cause(&self) -> DrivesReport {
-        let mut drives = self.pipeline.heard.drives;
-        if self.ending.controller.is_some() || self.ending.error.is_none() {
+        let mut drives = self.pipeline.latest.drives;
+        if self.run_outcome.controller.is_some() || self.run_outcome.error.is_none() {
             return drives;
         }
         let vague = matches!(drives.fault.code(), FaultCode::None | FaultCode::StaleCommand);

@@ -4,11 +4,12 @@
 //! submitted job waits in a queue for the supervisor's loop, and its progress goes back to whoever
 //! submitted it.
 
-use super::Starter;
+use super::ServiceOwner;
 use super::control::{JobControl, Phase};
-use super::status::Board;
+use super::status::StatusBoard;
 use crate::exit::Failure;
 use crossbeam::channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
+use messages::{ControllerState, OperatorReply, OperatorVerb};
 use monitor::summary::Summary;
 use planner::request::JobRequest;
 use runtime::Domain;
@@ -16,7 +17,6 @@ use runtime::operator::OperatorLink;
 use runtime::socket::{Conversation, OperatorServer};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use signals::{ControllerState, OperatorReply, OperatorVerb};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -143,19 +143,19 @@ pub struct Submission {
     /// The run folder.
     pub out: Option<PathBuf>,
     /// Takes parts while it runs and, last, its reply.
-    pub news: Sender<News>,
+    pub events: Sender<JobEvent>,
 }
 
 /// Tells a submitter how its job ended.
-pub fn tell_end(submitter: &Sender<News>, summary: &Summary) {
+pub fn tell_end(submitter: &Sender<JobEvent>, summary: &Summary) {
     let reply =
         serde_json::to_value(summary).unwrap_or_else(|error| json!({ "error": error.to_string() }));
-    // A submitter that left hears nothing.
-    let _ = submitter.send(News::End(reply));
+    // A submitter that has left is told nothing.
+    let _ = submitter.send(JobEvent::End(reply));
 }
 
-/// What a submitter hears.
-pub enum News {
+/// What a submitter is told of its job.
+pub enum JobEvent {
     /// How far it has come, 0 to 1.
     Share(f64),
     /// The end: the summary.
@@ -173,7 +173,7 @@ impl Operators {
     ///
     /// # Errors
     /// A socket that cannot be opened.
-    pub fn bind(domain: &Domain, answers: Answers, starter: Starter) -> Result<Self, Failure> {
+    pub fn bind(domain: &Domain, answers: Answers, owner: ServiceOwner) -> Result<Self, Failure> {
         let (queue, submissions) = bounded(QUEUE);
         let numbers = AtomicU64::new(1);
         let answer = move |request: Value, conversation: &mut Conversation<'_>| {
@@ -182,19 +182,19 @@ impl Operators {
                 Err(error) => return json!({ "error": format!("not a request: {error}") }),
             };
             match request {
-                Request::Submit { .. } if starter == Starter::Own => json!({
+                Request::Submit { .. } if owner == ServiceOwner::Own => json!({
                     "error": "this pipeline belongs to a `graver run` and takes no other job; \
                               submit to a `graver domain`"
                 }),
                 Request::Submit { job, out } => {
                     let number = numbers.fetch_add(1, Ordering::Relaxed);
-                    let (news, heard) = unbounded();
-                    if queue.try_send(Submission { number, job, out, news }).is_err() {
+                    let (events, follower) = unbounded();
+                    if queue.try_send(Submission { number, job, out, events }).is_err() {
                         return json!({
                             "error": format!("{QUEUE} jobs wait already; submit again later")
                         });
                     }
-                    follow(number, &heard, conversation)
+                    follow(number, &follower, conversation)
                 }
                 Request::Status => json!(answers.board.read()),
                 Request::Withdraw { job } => {
@@ -214,20 +214,20 @@ impl Operators {
     }
 }
 
-/// Passes on what is heard of a job until it ends or the submitter leaves; the job goes on either
+/// Passes on what becomes of a job until it ends or the submitter leaves; the job goes on either
 /// way.
-fn follow(number: u64, heard: &Receiver<News>, conversation: &mut Conversation<'_>) -> Value {
+fn follow(number: u64, events: &Receiver<JobEvent>, conversation: &mut Conversation<'_>) -> Value {
     if conversation.tell(&json!(Part::Accepted(number))).is_err() {
         return Value::Null;
     }
     loop {
-        match heard.try_recv() {
-            Ok(News::Share(share)) => {
+        match events.try_recv() {
+            Ok(JobEvent::Share(share)) => {
                 if conversation.tell(&json!(Part::Share(share))).is_err() {
                     return Value::Null;
                 }
             }
-            Ok(News::End(reply)) => return reply,
+            Ok(JobEvent::End(reply)) => return reply,
             Err(TryRecvError::Disconnected) => {
                 return json!({ "error": "the pipeline ended before the job" });
             }
@@ -244,13 +244,13 @@ fn follow(number: u64, heard: &Receiver<News>, conversation: &mut Conversation<'
 /// What operators' requests are answered from.
 pub struct Answers {
     link: Arc<OperatorLink>,
-    board: Arc<Board>,
+    board: Arc<StatusBoard>,
     control: Arc<JobControl>,
 }
 
 impl Answers {
     /// Answers for one pipeline.
-    pub fn new(link: Arc<OperatorLink>, board: Arc<Board>, control: Arc<JobControl>) -> Self {
+    pub fn new(link: Arc<OperatorLink>, board: Arc<StatusBoard>, control: Arc<JobControl>) -> Self {
         Self { link, board, control }
     }
 

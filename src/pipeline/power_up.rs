@@ -1,9 +1,9 @@
 //! From processes that were just started to motors that are powered and wait for a job.
 
 use super::Pipeline;
+use messages::{ControllerState, Fault, OperatorVerb};
 use runtime::DomainError;
 use runtime::domain::Role;
-use signals::{ControllerState, Fault, OperatorVerb};
 use std::time::{Duration, Instant};
 
 /// How long services may take to come up.
@@ -47,7 +47,7 @@ enum Step {
     Motors { asked: bool },
 }
 
-/// The way to powered motors, one look after the other.
+/// The way to powered motors, one poll after the other.
 #[derive(Debug, Clone, Copy)]
 pub struct PowerUp {
     since: Instant,
@@ -60,7 +60,7 @@ impl PowerUp {
         Self { since: Instant::now(), step: Step::Services }
     }
 
-    /// Goes on after a look at the pipeline; whether the motors are powered.
+    /// Goes on after a poll of the pipeline; whether the motors are powered.
     ///
     /// # Errors
     /// A service that stays silent, a fault, or a controller that does not become ready.
@@ -79,7 +79,7 @@ impl PowerUp {
                 Some(_) => {}
             },
             Step::Motors { asked } => {
-                let progress = &pipeline.heard.progress;
+                let progress = &pipeline.latest.progress;
                 let state = ControllerState::from_wire(progress.state);
                 match state {
                     ControllerState::Idle => return Ok(true),
@@ -103,11 +103,11 @@ impl PowerUp {
 /// A service that is not there or has not spoken yet. Nobody waits for a monitor that others start,
 /// or that has died.
 fn silent(pipeline: &Pipeline) -> Option<Role> {
-    let heard = &pipeline.heard;
+    let latest = &pipeline.latest;
     [
-        (Role::Planner, heard.planner.published.0 != 0),
-        (Role::Controller, heard.progress.published.0 != 0),
-        (Role::Drives, heard.drives.cycle.0 != 0),
+        (Role::Planner, latest.planner.published.0 != 0),
+        (Role::Controller, latest.progress.published.0 != 0),
+        (Role::Drives, latest.drives.cycle.0 != 0),
         (Role::Monitor, true),
     ]
     .into_iter()

@@ -35,12 +35,12 @@ pub struct Ended {
     /// How, in words.
     pub how: String,
     /// What was done about it.
-    pub remedy: Remedy,
+    pub recovery: Recovery,
 }
 
 /// What was done about a service that ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Remedy {
+pub enum Recovery {
     /// Started again: nothing depends on it.
     Restarted,
     /// Nothing: it has been started again before.
@@ -54,11 +54,11 @@ pub enum Remedy {
 impl std::fmt::Display for Ended {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(formatter, "{} (pid {}) {}", self.role, self.pid, self.how)?;
-        match &self.remedy {
-            Remedy::Restarted => write!(formatter, "; started again"),
-            Remedy::None => write!(formatter, " once more; not started again"),
-            Remedy::Impossible(reason) => write!(formatter, "; not started again: {reason}"),
-            Remedy::Stop => Ok(()),
+        match &self.recovery {
+            Recovery::Restarted => write!(formatter, "; started again"),
+            Recovery::None => write!(formatter, " once more; not started again"),
+            Recovery::Impossible(reason) => write!(formatter, "; not started again: {reason}"),
+            Recovery::Stop => Ok(()),
         }
     }
 }
@@ -93,9 +93,9 @@ impl Services {
         Self { services: Vec::new() }
     }
 
-    /// The services that have ended since the last look. A monitor is started again once, if that
+    /// The services that have ended since the last poll. A monitor is started again once, if that
     /// can be done.
-    pub fn look(&mut self, domain: &Domain) -> Vec<Ended> {
+    pub fn poll(&mut self, domain: &Domain) -> Vec<Ended> {
         let mut ended = Vec::new();
         for service in &mut self.services {
             let Some(child) = &mut service.child else { continue };
@@ -106,12 +106,12 @@ impl Services {
             if let Err(error) = domain.allocate() {
                 message::tell(&error.to_string());
             }
-            let remedy = match (service.role, service.restarts) {
+            let recovery = match (service.role, service.restarts) {
                 (Role::Monitor, 0) => service.restart(domain),
-                (Role::Monitor, _) => Remedy::None,
-                _ => Remedy::Stop,
+                (Role::Monitor, _) => Recovery::None,
+                _ => Recovery::Stop,
             };
-            ended.push(Ended { role: service.role, pid, how: describe(status), remedy });
+            ended.push(Ended { role: service.role, pid, how: describe(status), recovery });
         }
         ended
     }
@@ -187,14 +187,14 @@ fn await_end(child: &mut ChildProcess) -> End {
 }
 
 impl Service {
-    fn restart(&mut self, domain: &Domain) -> Remedy {
+    fn restart(&mut self, domain: &Domain) -> Recovery {
         self.restarts += 1;
         match spawn(domain, self.role) {
             Ok(child) => {
                 self.child = Some(child);
-                Remedy::Restarted
+                Recovery::Restarted
             }
-            Err(reason) => Remedy::Impossible(reason),
+            Err(reason) => Recovery::Impossible(reason),
         }
     }
 }

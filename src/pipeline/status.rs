@@ -1,14 +1,14 @@
 //! What operators see of a running pipeline.
 
-use super::Heard;
+use super::Latest;
+use messages::{ControllerState, PlannerPhase};
 use serde::Serialize;
-use signals::{ControllerState, PlannerPhase};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 /// A notice board: the supervisor writes, operators' threads read.
 #[derive(Debug, Default)]
-pub struct Board {
+pub struct StatusBoard {
     status: Mutex<Status>,
 }
 
@@ -43,11 +43,11 @@ pub struct Status {
     pub services: BTreeMap<String, Option<i32>>,
 }
 
-impl Board {
-    /// Writes what was heard; `held` when a person holds a job that is not played yet.
-    pub fn post(&self, heard: &Heard, held: bool, pids: &[(&'static str, Option<i32>)]) {
+impl StatusBoard {
+    /// Writes the latest samples; `held` when a person holds a job that is not played yet.
+    pub fn post(&self, latest: &Latest, held: bool, pids: &[(&'static str, Option<i32>)]) {
         let mut status = self.lock();
-        let Heard { progress, drives, planner, .. } = heard;
+        let Latest { progress, drives, planner, .. } = latest;
         let state = ControllerState::from_wire(progress.state);
         let state = if held { ControllerState::Holding } else { state };
         status.state = state.name().to_owned();

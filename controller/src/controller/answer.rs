@@ -5,7 +5,7 @@ use crate::cascade::Measurement;
 use crate::exchange::Inputs;
 use crate::state::State;
 use crate::supervision::Finding;
-use signals::{
+use messages::{
     Command, CommandMode, Fault, FaultCode, FaultQuantity, Feedback, LaserCycle, MAX_AXES,
     MAX_EDGES, Nanoseconds, Progress,
 };

@@ -2,7 +2,7 @@
 
 use super::Controller;
 use crate::state::{AfterRest, State};
-use signals::{Cycle, Fault, OperatorReply, OperatorRequest, OperatorVerb};
+use messages::{Cycle, Fault, OperatorReply, OperatorRequest, OperatorVerb};
 
 impl Controller {
     /// Carries a request out in `cycle`, or refuses it.

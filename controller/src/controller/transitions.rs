@@ -4,8 +4,8 @@ use super::Controller;
 use crate::alignment::Alignment;
 use crate::state::{AfterRest, State};
 use crate::supervision::{Finding, Tracking};
-use signals::feedback::status;
-use signals::{Cycle, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds};
+use messages::feedback::status;
+use messages::{Cycle, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds};
 
 /// Cycles of standing still before an axis counts as at rest without a plan, and of holding
 /// before it counts as enabled.
@@ -62,7 +62,7 @@ impl Controller {
     fn enable(&mut self, now: Nanoseconds, feedback: &Feedback, waited: u32, held: u32) {
         let ready = held > 0
             || feedback.has(status::POWERED)
-                && !feedback.has(status::STOPPED_ALONE)
+                && !feedback.has(status::WATCHDOG_TRIPPED)
                 && !feedback.fault.is_some()
                 && self.supervision.standing() > 0;
         self.state = if held >= STANDING {
@@ -136,15 +136,15 @@ impl Controller {
         self.ended = Some(self.statistics.finish(completed, self.fault));
     }
 
-    /// Whether the stream rests, and what a stall left is made up for: what followed would jump by it.
+    /// Whether the stream rests, and what a stall left behind has been compensated: without that the next motion would jump by it.
     fn stands_on_plan(&self) -> bool {
         self.player.is_at_rest() && self.catch_up.is_done()
     }
 
-    /// Whether the stream in hand has been played to its last setpoint, no light being owed.
+    /// Whether the stream in hand has been played to its last setpoint, with no light left to make up for.
     fn is_over(&self) -> bool {
         let lookahead = self.intake.lookahead();
         let at_end = lookahead.is_complete() && self.player.after().time >= lookahead.end();
-        at_end && !self.player.owes_light()
+        at_end && !self.player.has_missed_light()
     }
 }

@@ -5,10 +5,10 @@
 
 use controller::{Controller, Inputs, Outputs, Peers};
 use machine::{Axis, Machine, StallTolerance};
-use signals::feedback::status;
-use signals::setpoint::flags;
-use signals::time::CYCLE_PERIOD;
-use signals::{
+use messages::feedback::status;
+use messages::setpoint::flags;
+use messages::time::CYCLE_PERIOD;
+use messages::{
     Command, CommandMode, ControllerReport, ControllerState, Feedback, GateEdge, LaserCycle,
     Nanoseconds, OperatorReply, OperatorRequest, OperatorVerb, Setpoint,
 };
@@ -47,8 +47,7 @@ impl Motor {
             self.current = match voltage {
                 Some(voltage) => {
                     let voltage = voltage.clamp(-motor.voltage, motor.voltage);
-                    let drop = motor.resistance * self.current + motor.torque_constant * self.speed;
-                    self.current + (voltage - drop) / motor.inductance * STEP
+                    self.current + motor.current_rate(voltage, self.current, self.speed) * STEP
                 }
                 None => 0.0,
             };
@@ -350,7 +349,7 @@ impl Bench {
         self.reports.extend(outputs.report);
         let joints: Vec<f64> =
             self.motors.iter().map(|motor| motor.angle * motor.axis.ratio).collect();
-        let tracking = signals::artwork::distance(&tool(&joints), &outputs.command.tool);
+        let tracking = messages::artwork::distance(&tool(&joints), &outputs.command.tool);
         self.records.push(Record { feedback: self.feedback, command: outputs.command, tracking });
         self.run_motors();
         if self.late == 0 {

@@ -10,13 +10,15 @@
 //! motor after its ramp, there it is held; within one encoder count the position counts as
 //! reached. So integral action and stiction do not hunt.
 //!
-//! Deceleration: what half the current limit, or half a stepper's torque at its fastest, gives to rotor and load seen at the shaft, leaving
-//! the other half to the loops, and never more than the axis's own limit of acceleration.
+//! Deceleration: what half the current limit, or half a stepper's torque at its fastest, gives to
+//! rotor and load seen at the shaft, leaving the other half to the loops, and never more than the
+//! axis's own limit of acceleration.
 
-use machine::{Axis, Motor};
+use machine::Axis;
 use nalgebra::SVector;
 
-use super::dynamics::{Motors, State};
+use super::motors::Motors;
+use super::state::State;
 
 /// Share of the current limit that the ramp may use.
 const RAMP_SHARE: f64 = 0.5;
@@ -30,13 +32,9 @@ const CURRENT_SHARE: f64 = 0.1;
 
 /// What the ramp of `axis` takes from its motor's speed [rad/s²].
 pub(super) fn deceleration(axis: &Axis) -> f64 {
-    let torque = match &axis.motor {
-        Motor::Dc(motor) => RAMP_SHARE * motor.current * motor.torque_constant,
-        Motor::Stepper(motor) => {
-            RAMP_SHARE * motor.pull_out_torque(axis.limits.velocity / axis.ratio)
-        }
-    };
-    (torque / axis.gains.inertia).min(axis.limits.acceleration / axis.ratio)
+    let fastest = axis.velocity_limit().plan / axis.ratio;
+    let torque = RAMP_SHARE * axis.motor.largest_torque(fastest);
+    (torque / axis.gains.inertia).min(axis.acceleration_limit().plan / axis.ratio)
 }
 
 /// The braking loop of all axes.
@@ -96,15 +94,14 @@ impl<const N: usize> Brake<N> {
                 + motors.viscous[row] * self.speed[row]
                 + motors.coulomb[row] * direction;
             let limit = motors.current[row];
-            let unlimited = torque / motors.windings.torque_constant[row];
+            let motor = &motors.windings.motors()[row];
+            let unlimited = torque / motor.torque_constant;
             let target = unlimited.clamp(-limit, limit);
             if unlimited == target {
                 self.integral[row] += INTEGRAL_CORNER * bandwidth * error * step;
             }
-            let correction = CURRENT_SHARE / step * motors.windings.inductance[row];
-            motors.windings.resistance[row] * target
-                + motors.windings.torque_constant[row] * state.speed[row]
-                + correction * (target - state.current[row])
+            let rate = CURRENT_SHARE / step * (target - state.current[row]);
+            motor.voltage(target, rate, state.speed[row])
         })
     }
 }

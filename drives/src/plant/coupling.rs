@@ -59,7 +59,7 @@ struct Solution<const N: usize> {
 pub(super) struct Coupling<const N: usize, M: Mechanism<N>> {
     law: Law,
     /// The chain at the newest position that it was solved at.
-    assembly: M::Assembly,
+    chain: M::ChainState,
     /// Inertia of the rotors that is the load's own, zero behind an elastic transmission.
     rotors: SMatrix<f64, N, N>,
     /// Half-way through the substeps: the newest at `newest`, and from there on those before it.
@@ -96,7 +96,7 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
     /// If the mass matrix cannot be inverted there.
     pub(super) fn new(
         mechanism: &M,
-        home: M::Assembly,
+        home: M::ChainState,
         rotors: Option<SMatrix<f64, N, N>>,
     ) -> Result<Self, Unsolvable> {
         let law = if mechanism.has_constant_mass() { Law::Constant } else { Law::Varying };
@@ -110,7 +110,7 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
         };
         Ok(Self {
             law,
-            assembly: home,
+            chain: home,
             rotors: rotors.unwrap_or_else(SMatrix::zeros),
             solutions: [Solution { inertia, response }; 1 + EARLIER],
             newest: 0,
@@ -127,8 +127,8 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
     }
 
     /// The chain at the newest position that it was solved at.
-    pub(super) fn assembly(&self) -> &M::Assembly {
-        &self.assembly
+    pub(super) fn chain(&self) -> &M::ChainState {
+        &self.chain
     }
 
     /// Inverse of the inertia half-way through the newest substep.
@@ -165,17 +165,17 @@ impl<const N: usize, M: Mechanism<N>> Coupling<N, M> {
             load + (load_speed + (self.acceleration / 2.0 + growth * (half / 6.0)) * half) * half;
 
         // The chain of another motion is no place to start from: it may lie on another branch.
-        let near = (self.known > 0).then_some(&self.assembly);
-        match mechanism.assemble(&place, mechanism.branch(), near) {
-            Ok(assembly) => self.assembly = assembly,
+        let near = (self.known > 0).then_some(&self.chain);
+        match mechanism.solve(&place, mechanism.branch(), near) {
+            Ok(chain) => self.chain = chain,
             Err(error) => return Err(error.into()),
         }
-        let inertia = mechanism.mass_matrix(&self.assembly) + self.rotors;
+        let inertia = mechanism.mass_matrix(&self.chain) + self.rotors;
         let Some(mobility) = positive_inverse(&inertia) else {
             self.known = 0;
             return Err(Unsolvable::Mass);
         };
-        let bias = mechanism.bias(&self.assembly, &speed);
+        let bias = mechanism.bias(&self.chain, &speed);
         // In the place of the oldest.
         self.newest = (self.newest + EARLIER) % self.solutions.len();
         self.solutions[self.newest] = Solution { inertia, response: Response { mobility, bias } };

@@ -17,93 +17,18 @@
 //! [`friction`](super::friction) sees to that. How the inertia of the load changes during it says
 //! [`coupling`](super::coupling).
 
+use machine::Mechanism;
 use machine::kinematics::{Joints, KinematicsError, Pose};
 use machine::transmission::backlash;
-use machine::{Axis, DcMotor, Mechanism};
 use nalgebra::{SMatrix, SVector};
 
 use super::PlantError;
+use super::contacts::Contacts;
 use super::coupling::{Coupling, Response, Unsolvable, positive_inverse};
-use super::friction::Contacts;
+use super::motors::Motors;
+use super::state::{Phases, State};
 use super::stepping::Field;
-use super::winding::{Weights, Windings};
-
-/// Where the plant is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct State<const N: usize> {
-    /// Motor currents [A].
-    pub current: SVector<f64, N>,
-    /// Motor angles [rad].
-    pub angle: SVector<f64, N>,
-    /// Motor speeds [rad/s].
-    pub speed: SVector<f64, N>,
-    /// Load side of the joints [m or rad].
-    pub load: Joints<N>,
-    /// Velocity of the load side [m/s or rad/s].
-    pub load_speed: Joints<N>,
-}
-
-/// What the power stages do with the motors' phases.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Phases<const N: usize> {
-    /// Open: no current. It dies within `L·i/V` of opening, under 1 ms, here at once.
-    Open,
-    /// Driven with these voltages [V].
-    Driven(SVector<f64, N>),
-}
-
-/// What the motors are made of, one entry each.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motors<const N: usize> {
-    /// The electrical part.
-    pub windings: Windings<N>,
-    /// Inertia at the shaft [kg·m²].
-    pub inertia: SVector<f64, N>,
-    /// Coulomb friction torque in force: that of the shaft, with its brake while that is closed [N·m].
-    pub coulomb: SVector<f64, N>,
-    /// Coulomb friction torque of the shaft [N·m].
-    sliding: SVector<f64, N>,
-    /// Torque of the brake [N·m].
-    brake: SVector<f64, N>,
-    /// Viscous friction [N·m·s/rad].
-    pub viscous: SVector<f64, N>,
-    /// Joint units per radian.
-    pub ratio: SVector<f64, N>,
-    /// Half of the backlash [joint units].
-    pub gap: SVector<f64, N>,
-    /// Largest voltage of the power stage [V].
-    pub voltage: SVector<f64, N>,
-    /// Largest current that the power stage lets through [A].
-    pub current: SVector<f64, N>,
-}
-
-impl<const N: usize> Motors<N> {
-    /// The motors of `axes`, of which there are `N`.
-    pub fn of(axes: &[Axis; N]) -> Self {
-        let each = |value: fn(&Axis) -> f64| SVector::from_fn(|row, _| value(&axes[row]));
-        Self {
-            windings: Windings::new(
-                each(|axis| dc(axis, 1.0, |motor| motor.resistance)),
-                each(|axis| dc(axis, 1.0, |motor| motor.inductance)),
-                each(|axis| dc(axis, 0.0, |motor| motor.torque_constant)),
-            ),
-            inertia: each(|axis| axis.motor.rotor_inertia()),
-            coulomb: each(|axis| axis.friction.coulomb),
-            sliding: each(|axis| axis.friction.coulomb),
-            brake: each(|axis| axis.brake),
-            viscous: each(|axis| axis.friction.viscous),
-            ratio: each(|axis| axis.ratio),
-            gap: each(|axis| axis.backlash / 2.0),
-            voltage: each(|axis| dc(axis, 0.0, |motor| motor.voltage)),
-            current: each(|axis| dc(axis, 0.0, |motor| motor.current)),
-        }
-    }
-}
-
-/// A value of a DC motor, or what stands for it in a stepper: a winding without current and torque.
-fn dc(axis: &Axis, other: f64, value: fn(&DcMotor) -> f64) -> f64 {
-    axis.motor.dc().map_or(other, value)
-}
+use super::winding::Weights;
 
 /// What joins motors and load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -168,7 +93,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     ///
     /// # Errors
     /// If the mass matrix at `home` cannot be inverted.
-    pub fn new(mechanism: M, motors: Motors<N>, home: M::Assembly) -> Result<Self, PlantError> {
+    pub fn new(mechanism: M, motors: Motors<N>, home: M::ChainState) -> Result<Self, PlantError> {
         let transmission = match mechanism.stiffness() {
             Some(stiffness) => Transmission::Elastic {
                 stiffness,
@@ -203,7 +128,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// # Errors
     /// Where it cannot close.
     pub fn locate(&self, load: &Joints<N>) -> Result<Pose, KinematicsError> {
-        self.mechanism.locate(load, self.mechanism.branch(), Some(self.coupling.assembly()))
+        self.mechanism.locate(load, self.mechanism.branch(), Some(self.coupling.chain()))
     }
 
     /// The same with steppers, which turn in `field`.
@@ -218,8 +143,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
 
     /// Closes the brakes of motors that are not powered, and opens those of motors that are.
     pub(super) fn power(&mut self, powered: bool) {
-        let motors = &mut self.motors;
-        motors.coulomb = if powered { motors.sliding } else { motors.sliding + motors.brake };
+        self.motors.power(powered);
     }
 
     /// The motors.

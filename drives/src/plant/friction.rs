@@ -13,8 +13,10 @@
 use machine::Mechanism;
 use nalgebra::SVector;
 
+use super::contacts::{Contact, Contacts};
 use super::coupling::Unsolvable;
-use super::dynamics::{Dynamics, Part, Phases, State};
+use super::dynamics::{Dynamics, Part};
+use super::state::{Phases, State};
 use super::winding::Weights;
 
 /// Refinements of the instant of an event; the margins are smooth, so that each takes regula
@@ -24,107 +26,57 @@ const REFINEMENTS: usize = 4;
 /// An event this close to the end of a step, as a share of it, is at its end.
 const TIME_RESOLUTION: f64 = 1e-12;
 
-/// One motor and its friction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Contact {
-    /// There is no Coulomb friction.
-    Frictionless,
-    /// At rest, and held there.
-    Held,
-    /// Sliding in the direction of this sign.
-    Sliding(f64),
-}
-
-/// The contacts of all motors through one smooth stretch.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contacts<const N: usize> {
-    contact: [Contact; N],
-    torque: SVector<f64, N>,
-    free: SVector<f64, N>,
-    held: usize,
-}
-
-impl<const N: usize> Contacts<N> {
-    fn new() -> Self {
-        Self {
-            contact: [Contact::Frictionless; N],
-            torque: SVector::zeros(),
-            free: SVector::repeat(1.0),
-            held: 0,
+/// The contacts in which `state` goes on.
+fn decide<const N: usize, M: Mechanism<N>>(
+    dynamics: &Dynamics<N, M>,
+    state: &State<N>,
+) -> Contacts<N> {
+    let coulomb = dynamics.motors().coulomb;
+    let mut contacts = Contacts::new();
+    for motor in 0..N {
+        if coulomb[motor] > 0.0 {
+            let speed = state.speed[motor];
+            let contact =
+                if speed == 0.0 { Contact::Held } else { Contact::Sliding(speed.signum()) };
+            contacts.set(motor, contact, coulomb[motor]);
         }
     }
-
-    fn set(&mut self, motor: usize, contact: Contact, coulomb: f64) {
-        self.contact[motor] = contact;
-        (self.torque[motor], self.free[motor]) = match contact {
-            Contact::Frictionless => (0.0, 1.0),
-            Contact::Held => (0.0, 0.0),
-            Contact::Sliding(sign) => (coulomb * sign, 1.0),
-        };
-        self.held = self.contact.iter().filter(|contact| **contact == Contact::Held).count();
-    }
-
-    /// Coulomb torque against each motor [N·m].
-    pub fn torque(&self) -> &SVector<f64, N> {
-        &self.torque
-    }
-
-    /// 1 for a motor that can move, 0 for one that is held.
-    pub fn free(&self) -> &SVector<f64, N> {
-        &self.free
-    }
-
-    /// Whether any motor is held.
-    pub fn any_held(&self) -> bool {
-        self.held != 0
-    }
-
-    /// The contacts in which `state` goes on.
-    fn decide<M: Mechanism<N>>(dynamics: &Dynamics<N, M>, state: &State<N>) -> Self {
-        let coulomb = dynamics.motors().coulomb;
-        let mut contacts = Self::new();
+    // Behind a rigid transmission, one motor that lets go changes what the others must bear:
+    // the worst lets go first, and the rest are asked again.
+    while contacts.any_held() {
+        let torque = dynamics.net_torque(state, &contacts, 0.0);
+        let mut worst = None;
+        let mut excess = 0.0;
         for motor in 0..N {
-            if coulomb[motor] > 0.0 {
-                let speed = state.speed[motor];
-                let contact =
-                    if speed == 0.0 { Contact::Held } else { Contact::Sliding(speed.signum()) };
-                contacts.set(motor, contact, coulomb[motor]);
+            let over = torque[motor].abs() - coulomb[motor];
+            if contacts.of(motor) == Contact::Held && over > excess {
+                (worst, excess) = (Some(motor), over);
             }
         }
-        // Behind a rigid transmission, one motor that lets go changes what the others must bear:
-        // the worst lets go first, and the rest are asked again.
-        while contacts.any_held() {
-            let torque = dynamics.net_torque(state, &contacts, 0.0);
-            let mut worst = None;
-            let mut excess = 0.0;
-            for motor in 0..N {
-                let over = torque[motor].abs() - coulomb[motor];
-                if contacts.contact[motor] == Contact::Held && over > excess {
-                    (worst, excess) = (Some(motor), over);
-                }
-            }
-            let Some(motor) = worst else { break };
-            contacts.set(motor, Contact::Sliding(torque[motor].signum()), coulomb[motor]);
-        }
-        contacts
+        let Some(motor) = worst else { break };
+        contacts.set(motor, Contact::Sliding(torque[motor].signum()), coulomb[motor]);
     }
+    contacts
+}
 
-    /// How far each motor is from the end of its contact; negative once it is past it.
-    fn margins<M: Mechanism<N>>(
-        &self,
-        dynamics: &Dynamics<N, M>,
-        state: &State<N>,
-        at: f64,
-    ) -> [f64; N] {
-        let torque =
-            if self.any_held() { dynamics.net_torque(state, self, at) } else { SVector::zeros() };
-        let coulomb = dynamics.motors().coulomb;
-        core::array::from_fn(|motor| match self.contact[motor] {
-            Contact::Frictionless => f64::INFINITY,
-            Contact::Held => coulomb[motor] - torque[motor].abs(),
-            Contact::Sliding(sign) => sign * state.speed[motor],
-        })
-    }
+/// How far each motor is from the end of its contact; negative once it is past it.
+fn margins<const N: usize, M: Mechanism<N>>(
+    contacts: &Contacts<N>,
+    dynamics: &Dynamics<N, M>,
+    state: &State<N>,
+    at: f64,
+) -> [f64; N] {
+    let torque = if contacts.any_held() {
+        dynamics.net_torque(state, contacts, at)
+    } else {
+        SVector::zeros()
+    };
+    let coulomb = dynamics.motors().coulomb;
+    core::array::from_fn(|motor| match contacts.of(motor) {
+        Contact::Frictionless => f64::INFINITY,
+        Contact::Held => coulomb[motor] - torque[motor].abs(),
+        Contact::Sliding(sign) => sign * state.speed[motor],
+    })
 }
 
 /// Takes `state` one step on, through all events inside it.
@@ -142,16 +94,16 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
     let mut state = *state;
     let mut part = Part::WHOLE;
     let mut weights = *weights;
-    let mut contacts = Contacts::decide(dynamics, &state);
+    let mut contacts = decide(dynamics, &state);
     // Every motor may stop and start again within a step; more than that is chatter.
     for _ in 0..2 * N + 2 {
         let end = dynamics.step(&state, &contacts, phases, &weights, part);
-        let after = contacts.margins(dynamics, &end.state, part.end());
+        let after = margins(&contacts, dynamics, &end.state, part.end());
         if after.iter().all(|margin| *margin >= 0.0) {
             dynamics.end(&end);
             return Ok(end.state);
         }
-        let before = contacts.margins(dynamics, &state, part.from);
+        let before = margins(&contacts, dynamics, &state, part.from);
         let first = earliest(&before, &after);
         let (motor, _) = first;
         let margins = (before[motor], after[motor]);
@@ -164,7 +116,7 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
             part.from = part.end();
         }
         let coulomb = dynamics.motors().coulomb[motor];
-        match contacts.contact[motor] {
+        match contacts.of(motor) {
             Contact::Held => {
                 let sign = dynamics.net_torque(&state, &contacts, part.from)[motor].signum();
                 contacts.set(motor, Contact::Sliding(sign), coulomb);
@@ -188,7 +140,7 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
     }
     // Chatter: what changes its mind again and again within a step is at rest in it.
     for motor in 0..N {
-        if contacts.contact[motor] != Contact::Frictionless && state.speed[motor].abs() == 0.0 {
+        if contacts.of(motor) != Contact::Frictionless && state.speed[motor].abs() == 0.0 {
             contacts.set(motor, Contact::Held, 0.0);
         }
     }
@@ -235,7 +187,7 @@ fn locate<const N: usize, M: Mechanism<N>>(
         let part = dynamics.motors().windings.weights(weights.step * share);
         let reached = Part { length: whole.length * share, ..whole };
         let there = dynamics.step(state, contacts, phases, &part, reached).state;
-        let margin = contacts.margins(dynamics, &there, reached.end())[motor];
+        let margin = margins(contacts, dynamics, &there, reached.end())[motor];
         if margin >= 0.0 {
             low = (share, margin);
         } else {

@@ -1,7 +1,7 @@
 //! The laser source: light follows the gate, later by the source's delays.
 
 use machine::LaserSource;
-use signals::{GateEdge, LaserCycle, MAX_EDGES, Nanoseconds, time::CYCLE_PERIOD};
+use messages::{GateEdge, LaserCycle, MAX_EDGES, Nanoseconds, time::CYCLE_PERIOD};
 
 /// A change of the light that is still to come.
 #[derive(Debug, Clone, Copy, Default)]

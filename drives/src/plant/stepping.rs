@@ -10,11 +10,11 @@
 //! when the power comes back.
 
 use machine::{Axis, StepperMotor};
+use messages::{CommandMode, Fault, FaultCode, FaultQuantity};
 use nalgebra::SVector;
-use signals::{CommandMode, Fault, FaultCode, FaultQuantity};
 
 use super::brake;
-use super::dynamics::State;
+use super::state::State;
 use crate::port::{Actuation, Freshness};
 use crate::pulses::{Segment, count};
 

@@ -7,16 +7,18 @@
 //! is therefore of fourth order (exponential time differencing, Cox and Matthews 2002, J. Comput.
 //! Phys. 176, sec. 3).
 
+use machine::DcMotor;
+use messages::math;
 use nalgebra::SVector;
-use signals::math;
 
 /// Where series take over from the closed form of the weights: below it the first omitted term
 /// is under 1e-14, above it cancellation is under 1e-12.
 const SERIES_BOUND: f64 = 1e-3;
 
-/// Resistance, inductance and torque constant of `N` motors.
+/// The windings of `N` motors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Windings<const N: usize> {
+    motors: [DcMotor; N],
     /// [Ω].
     pub resistance: SVector<f64, N>,
     /// [H].
@@ -57,15 +59,24 @@ pub struct Course<const N: usize> {
 }
 
 impl<const N: usize> Windings<N> {
-    /// Windings of `resistance` [Ω], `inductance` [H] and `torque_constant` [N·m/A].
-    pub fn new(
-        resistance: SVector<f64, N>,
-        inductance: SVector<f64, N>,
-        torque_constant: SVector<f64, N>,
-    ) -> Self {
-        let conductance = resistance.map(|resistance| 1.0 / resistance);
-        let back = torque_constant.component_mul(&conductance);
-        Self { resistance, inductance, torque_constant, conductance, back }
+    /// The windings of `motors`.
+    pub fn new(motors: [DcMotor; N]) -> Self {
+        let each = |value: fn(&DcMotor) -> f64| SVector::from_fn(|row, _| value(&motors[row]));
+        let torque_constant = each(|motor| motor.torque_constant);
+        let conductance = each(|motor| 1.0 / motor.resistance);
+        Self {
+            motors,
+            resistance: each(|motor| motor.resistance),
+            inductance: each(|motor| motor.inductance),
+            torque_constant,
+            conductance,
+            back: torque_constant.component_mul(&conductance),
+        }
+    }
+
+    /// The motors themselves.
+    pub fn motors(&self) -> &[DcMotor; N] {
+        &self.motors
     }
 
     /// The weights for steps of `step` [s].
@@ -154,7 +165,15 @@ mod tests {
     use nalgebra::Vector1;
 
     fn winding(time_constant: f64) -> Windings<1> {
-        Windings::new(Vector1::new(2.3), Vector1::new(2.3 * time_constant), Vector1::new(0.021))
+        Windings::new([DcMotor {
+            resistance: 2.3,
+            inductance: 2.3 * time_constant,
+            torque_constant: 0.021,
+            rotor_inertia: 2e-6,
+            voltage: 12.0,
+            current: 5.2,
+            continuous_current: None,
+        }])
     }
 
     #[test]

@@ -2,10 +2,10 @@
 //! joints and changes with the position.
 
 use machine::kinematics::{
-    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
+    Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, TaskSpace, ToolMotion,
 };
+use messages::math;
 use nalgebra::{Matrix2, Vector2, Vector3};
-use signals::math;
 
 /// Two links of 0.2 m that swing in a plane, the second joint relative to the first link.
 #[derive(Debug, Clone, Copy)]
@@ -30,18 +30,18 @@ impl Arm {
 
 impl Mechanism<2> for Arm {
     type Branch = ();
-    type Assembly = Joints<2>;
+    type ChainState = Joints<2>;
     const NAME: &'static str = "arm";
 
-    fn freedom(&self) -> Freedom {
-        Freedom::Plane
+    fn task_space(&self) -> TaskSpace {
+        TaskSpace::Plane
     }
 
     fn branch(&self) {}
 
     fn branch_of(&self, _q: &Joints<2>) {}
 
-    fn assemble(
+    fn solve(
         &self,
         q: &Joints<2>,
         _branch: (),

@@ -2,7 +2,7 @@
 //! the motor's own tests.
 
 use machine::kinematics::{
-    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
+    Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, TaskSpace, ToolMotion,
 };
 use machine::transmission::gear::Efficiency;
 use machine::{AxisLimits, DcMotor, Encoder, Friction, LoopGains, Motor};
@@ -19,18 +19,18 @@ pub(crate) struct Shaft {
 
 impl Mechanism<1> for Shaft {
     type Branch = ();
-    type Assembly = Joints<1>;
+    type ChainState = Joints<1>;
     const NAME: &'static str = "shaft";
 
-    fn freedom(&self) -> Freedom {
-        Freedom::Plane
+    fn task_space(&self) -> TaskSpace {
+        TaskSpace::Plane
     }
 
     fn branch(&self) {}
 
     fn branch_of(&self, _q: &Joints<1>) {}
 
-    fn assemble(
+    fn solve(
         &self,
         q: &Joints<1>,
         _branch: (),

@@ -3,9 +3,9 @@
 //! The bounds of a document are rows of one list. A value outside of what is possible is an error, one
 //! outside of what is usual a warning; both stand at the value and name the bounds.
 
+use super::diagnostics::Diagnostics;
 use super::error::ProblemKind;
-use super::findings::Findings;
-use super::node::Place;
+use super::node::Span;
 use crate::quantity::{Dimension, read_any};
 
 /// The bounds of some keys, as a person writes them. Both ends belong to the range.
@@ -29,7 +29,7 @@ pub struct Measured {
     /// What it is measured in.
     pub dimension: Dimension,
     /// Where it stands.
-    pub place: Place,
+    pub span: Span,
 }
 
 impl Bounds {
@@ -54,8 +54,8 @@ impl Bounds {
 
 /// Holds `number`, the value of `key` in the table of type `table`, to its bounds: refuses what is not
 /// possible, and notes what is unusual.
-pub(super) fn check(table: &str, key: &str, number: &Measured, findings: &mut Findings) {
-    let mut rows = findings.bounds().iter().filter(|bounds| bounds.is_of(table, key));
+pub(super) fn check(table: &str, key: &str, number: &Measured, diagnostics: &mut Diagnostics) {
+    let mut rows = diagnostics.bounds().iter().filter(|bounds| bounds.is_of(table, key));
     let mut row = rows.next();
     // A joint's travel has a row for lengths, and one for angles.
     while let (Some(bounds), Some(next)) = (row, rows.next()) {
@@ -68,7 +68,7 @@ pub(super) fn check(table: &str, key: &str, number: &Measured, findings: &mut Fi
     }
     let Some(bounds) = row else { return };
     let Bounds { possible, usual, reason, .. } = bounds;
-    let written = findings.written(number.place);
+    let written = diagnostics.written(number.span);
     let written = written.trim_matches('"').trim();
     if !Bounds::holds(*possible, number.value) {
         let message = format!("`{key}` cannot be `{written}`");
@@ -76,12 +76,12 @@ pub(super) fn check(table: &str, key: &str, number: &Measured, findings: &mut Fi
             "possible is {} to {}, usual {} to {}: {reason}",
             possible[0], possible[1], usual[0], usual[1]
         );
-        findings.refuse(ProblemKind::OutOfRange, number.place, message, Some(help));
+        diagnostics.refuse(ProblemKind::OutOfRange, number.span, message, Some(help));
     } else if !Bounds::holds(*usual, number.value) {
         let message = format!(
             "`{key}` of {written} is unusual: it is mostly {} to {} ({reason})",
             usual[0], usual[1]
         );
-        findings.warn(number.place, message);
+        diagnostics.warn(number.span, message);
     }
 }

@@ -3,18 +3,18 @@
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 use super::bounds::Measured;
+use super::diagnostics::Diagnostics;
 use super::error::ProblemKind;
-use super::findings::Findings;
-use super::node::{Node, Place, Value};
+use super::node::{Node, Span, Value};
 
 /// A type that a document can hold.
 pub trait Decode: Sized + JsonSchema {
-    /// Reads `node`; notes in `findings` why not.
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self>;
+    /// Reads `node`; notes in `diagnostics` why not.
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self>;
 
-    /// The value of a key that is not there, in the table at `place`; `None` when it must be.
-    fn absent(place: Place, findings: &mut Findings) -> Option<Self> {
-        let _ = (place, findings);
+    /// The value of a key that is not there, in the table at `span`; `None` when it must be.
+    fn absent(span: Span, diagnostics: &mut Diagnostics) -> Option<Self> {
+        let _ = (span, diagnostics);
         None
     }
 
@@ -41,30 +41,30 @@ pub trait Decode: Sized + JsonSchema {
 
 /// A value with its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Located<T> {
+pub struct Spanned<T> {
     /// The value.
     pub value: T,
     /// Where it stands.
-    pub place: Place,
+    pub span: Span,
 }
 
-impl<T> Located<T> {
-    pub(super) fn new(value: T, place: Place) -> Self {
-        Self { value, place }
+impl<T> Spanned<T> {
+    pub(super) fn new(value: T, span: Span) -> Self {
+        Self { value, span }
     }
 }
 
 /// Notes that `node` is of the wrong type.
-pub(super) fn wrong_type(node: &Node, due: &str, findings: &mut Findings) {
-    findings.refuse(
+pub(super) fn wrong_type(node: &Node, due: &str, diagnostics: &mut Diagnostics) {
+    diagnostics.refuse(
         ProblemKind::WrongType,
-        node.place,
-        format!("this is {}, {due} is due", node.type_name()),
+        node.span,
+        format!("this is {}, but {due} is needed", node.type_name()),
         None,
     );
 }
 
-impl<T: JsonSchema> JsonSchema for Located<T> {
+impl<T: JsonSchema> JsonSchema for Spanned<T> {
     fn inline_schema() -> bool {
         T::inline_schema()
     }
@@ -78,32 +78,32 @@ impl<T: JsonSchema> JsonSchema for Located<T> {
     }
 }
 
-impl Decode for Located<String> {
+impl Decode for Spanned<String> {
     fn example() -> Option<String> {
         Some("\"…\"".to_owned())
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
         match &node.value {
-            Value::Text(text) => Some(Self::new(text.clone(), node.place)),
+            Value::Text(text) => Some(Self::new(text.clone(), node.span)),
             _ => {
-                wrong_type(node, "a text", findings);
+                wrong_type(node, "a text", diagnostics);
                 None
             }
         }
     }
 }
 
-impl Decode for Located<bool> {
+impl Decode for Spanned<bool> {
     fn example() -> Option<String> {
         Some("true".to_owned())
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
         match node.value {
-            Value::Flag(flag) => Some(Self::new(flag, node.place)),
+            Value::Flag(flag) => Some(Self::new(flag, node.span)),
             _ => {
-                wrong_type(node, "true or false", findings);
+                wrong_type(node, "true or false", diagnostics);
                 None
             }
         }
@@ -115,15 +115,15 @@ impl<T: Decode> Decode for Option<T> {
         T::example()
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
-        T::decode(node, findings).map(Some)
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
+        T::decode(node, diagnostics).map(Some)
     }
 
     fn numbers(&self) -> Vec<Measured> {
         self.as_ref().map(T::numbers).unwrap_or_default()
     }
 
-    fn absent(_place: Place, _findings: &mut Findings) -> Option<Self> {
+    fn absent(_place: Span, _findings: &mut Diagnostics) -> Option<Self> {
         Some(None)
     }
 
@@ -141,13 +141,14 @@ impl<T: Decode> Decode for Vec<T> {
         Some(format!("[{}]", T::example()?))
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
         let Value::List(nodes) = &node.value else {
-            wrong_type(node, "a list", findings);
+            wrong_type(node, "a list", diagnostics);
             return None;
         };
-        // Every element is looked at, so that every error is reported.
-        let values: Vec<Option<T>> = nodes.iter().map(|node| T::decode(node, findings)).collect();
+        // Every element is decoded, so that every error is reported.
+        let values: Vec<Option<T>> =
+            nodes.iter().map(|node| T::decode(node, diagnostics)).collect();
         values.into_iter().collect()
     }
 
@@ -164,21 +165,21 @@ where
         Some(format!("[{}]", vec![T::example()?; N].join(", ")))
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
         let Value::List(nodes) = &node.value else {
-            wrong_type(node, &format!("a list of {N}"), findings);
+            wrong_type(node, &format!("a list of {N}"), diagnostics);
             return None;
         };
         if nodes.len() != N {
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::WrongType,
-                node.place,
-                format!("this is a list of {}, a list of {N} is due", nodes.len()),
+                node.span,
+                format!("this is a list of {}, but a list of {N} is needed", nodes.len()),
                 None,
             );
             return None;
         }
-        Vec::decode(node, findings)?.try_into().ok()
+        Vec::decode(node, diagnostics)?.try_into().ok()
     }
 
     fn numbers(&self) -> Vec<Measured> {

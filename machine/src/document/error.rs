@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
-use super::node::Place;
+use super::node::Span;
 
 /// The name of a text that came with `--set`.
 pub(super) const COMMAND_LINE: &str = "--set";
@@ -56,13 +56,13 @@ pub enum ProblemKind {
     UnknownKey,
     /// A key that must be there is not.
     MissingKey,
-    /// A value of another type than is due.
+    /// A value of another type than is needed.
     WrongType,
-    /// A number without a unit where a quantity is due.
+    /// A number without a unit where a quantity is needed.
     BareNumber,
     /// A unit that does not exist or cannot be read.
     UnknownUnit,
-    /// A quantity of another kind than is due.
+    /// A quantity of another kind than is needed.
     WrongUnit,
     /// A word that is none of those possible.
     UnknownWord,
@@ -80,7 +80,7 @@ pub struct Problem {
     /// What kind of thing.
     pub kind: ProblemKind,
     pub(super) source: Arc<Source>,
-    pub(super) place: Place,
+    pub(super) span: Span,
     pub(super) message: String,
     pub(super) help: Option<String>,
 }
@@ -108,7 +108,7 @@ impl Problem {
         if self.kind == ProblemKind::Unreadable {
             return None;
         }
-        self.source.position(self.place.start)
+        self.source.position(self.span.start)
     }
 }
 
@@ -140,10 +140,10 @@ impl Diagnostic for Problem {
         if self.kind == ProblemKind::Unreadable {
             return None;
         }
-        let length = self.place.end.saturating_sub(self.place.start);
+        let length = self.span.end.saturating_sub(self.span.start);
         let label = LabeledSpan::new_primary_with_span(
             Some(self.message.clone()),
-            (self.place.start, length),
+            (self.span.start, length),
         );
         Some(Box::new(core::iter::once(label)))
     }
@@ -168,7 +168,7 @@ impl DocumentError {
         let first = Problem {
             kind: ProblemKind::Unreadable,
             source: Source::file(file, ""),
-            place: Place { source: 0, start: 0, end: 0 },
+            span: Span { source: 0, start: 0, end: 0 },
             message,
             help: None,
         };

@@ -6,11 +6,11 @@ use std::borrow::Cow;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use super::bounds::Measured;
-use super::decode::{Decode, Located, wrong_type};
+use super::decode::{Decode, Spanned, wrong_type};
+use super::diagnostics::Diagnostics;
 use super::error::ProblemKind;
-use super::findings::Findings;
 use super::nearest;
-use super::node::{Node, Place, Value};
+use super::node::{Node, Span, Value};
 use crate::quantity::{self, Dimension, Kind, LARGEST, Length, QuantityErrorKind, SMALLEST};
 
 /// The range of a number.
@@ -63,15 +63,15 @@ impl Range for NonNegative {
 fn check_range<R: Range>(
     value: f64,
     written: &str,
-    place: Place,
-    findings: &mut Findings,
+    span: Span,
+    diagnostics: &mut Diagnostics,
 ) -> Option<f64> {
     if R::contains(value) {
         return Some(value);
     }
-    findings.refuse(
+    diagnostics.refuse(
         ProblemKind::OutOfRange,
-        place,
+        span,
         format!("`{written}` is out of range"),
         Some(R::DUE.to_owned()),
     );
@@ -79,7 +79,7 @@ fn check_range<R: Range>(
 }
 
 /// The finite number of `node`.
-fn finite(number: f64, place: Place, findings: &mut Findings) -> Option<f64> {
+fn finite(number: f64, span: Span, diagnostics: &mut Diagnostics) -> Option<f64> {
     if number.abs() <= LARGEST {
         return Some(number);
     }
@@ -88,7 +88,7 @@ fn finite(number: f64, place: Place, findings: &mut Findings) -> Option<f64> {
     } else {
         "this is not a finite number".to_owned()
     };
-    findings.refuse(ProblemKind::NotFinite, place, message, None);
+    diagnostics.refuse(ProblemKind::NotFinite, span, message, None);
     None
 }
 
@@ -100,7 +100,7 @@ pub struct Quantity<K, R = Any> {
     /// Which of the dimensions of its kind it was given in.
     pub form: usize,
     /// Where it stands.
-    pub place: Place,
+    pub span: Span,
     kind: PhantomData<(K, R)>,
 }
 
@@ -109,30 +109,30 @@ impl<K: Kind, R: Range> Decode for Quantity<K, R> {
         Some(format!("\"{}\"", K::EXAMPLE))
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
-        let place = node.place;
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
+        let span = node.span;
         let due = || format!("write {} such as \"{}\"", K::NAME, K::EXAMPLE);
         let text = match &node.value {
             Value::Text(text) => text,
             Value::Number(number) => {
-                let number = finite(*number, place, findings)?;
-                findings.refuse(
+                let number = finite(*number, span, diagnostics)?;
+                diagnostics.refuse(
                     ProblemKind::BareNumber,
-                    place,
-                    format!("`{number}` has no unit, {} is due", K::NAME),
+                    span,
+                    format!("`{number}` has no unit, but {} is needed", K::NAME),
                     Some(format!("write it with its unit, such as \"{number} {}\"", K::UNIT)),
                 );
                 return None;
             }
             _ => {
-                wrong_type(node, K::NAME, findings);
+                wrong_type(node, K::NAME, diagnostics);
                 return None;
             }
         };
         match quantity::read_form::<K>(text) {
             Ok((value, form)) => {
-                let value = check_range::<R>(value, text.trim(), place, findings)?;
-                Some(Self { value, form, place, kind: PhantomData })
+                let value = check_range::<R>(value, text.trim(), span, diagnostics)?;
+                Some(Self { value, form, span, kind: PhantomData })
             }
             Err(error) => {
                 let kind = match error.kind {
@@ -145,7 +145,7 @@ impl<K: Kind, R: Range> Decode for Quantity<K, R> {
                     QuantityErrorKind::WrongDimension => ProblemKind::WrongUnit,
                 };
                 let help = error.help().map_or_else(due, str::to_owned);
-                findings.refuse(kind, place, error.message().to_owned(), Some(help));
+                diagnostics.refuse(kind, span, error.message().to_owned(), Some(help));
                 None
             }
         }
@@ -153,7 +153,7 @@ impl<K: Kind, R: Range> Decode for Quantity<K, R> {
 
     fn numbers(&self) -> Vec<Measured> {
         let dimension = K::DIMENSIONS[self.form];
-        vec![Measured { value: self.value, dimension, place: self.place }]
+        vec![Measured { value: self.value, dimension, span: self.span }]
     }
 }
 
@@ -187,7 +187,7 @@ pub struct Number<R = Any> {
     /// The number.
     pub value: f64,
     /// Where it stands.
-    pub place: Place,
+    pub span: Span,
     range: PhantomData<R>,
 }
 
@@ -196,18 +196,18 @@ impl<R: Range> Decode for Number<R> {
         Some("1".to_owned())
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
         let Value::Number(number) = node.value else {
-            wrong_type(node, "a number without unit", findings);
+            wrong_type(node, "a number without unit", diagnostics);
             return None;
         };
-        let number = finite(number, node.place, findings)?;
-        let value = check_range::<R>(number, &number.to_string(), node.place, findings)?;
-        Some(Self { value, place: node.place, range: PhantomData })
+        let number = finite(number, node.span, diagnostics)?;
+        let value = check_range::<R>(number, &number.to_string(), node.span, diagnostics)?;
+        Some(Self { value, span: node.span, range: PhantomData })
     }
 
     fn numbers(&self) -> Vec<Measured> {
-        vec![Measured { value: self.value, dimension: Dimension::NONE, place: self.place }]
+        vec![Measured { value: self.value, dimension: Dimension::NONE, span: self.span }]
     }
 }
 
@@ -237,7 +237,7 @@ pub struct Fraction<R = NonNegative> {
     /// The share, up to 1.
     pub value: f64,
     /// Where it stands.
-    pub place: Place,
+    pub span: Span,
     range: PhantomData<R>,
 }
 
@@ -246,21 +246,21 @@ impl<R: Range> Decode for Fraction<R> {
         Some("\"80 %\"".to_owned())
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
-        let place = node.place;
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
+        let span = node.span;
         let (number, written) = match &node.value {
-            Value::Number(number) => (finite(*number, place, findings)?, number.to_string()),
+            Value::Number(number) => (finite(*number, span, diagnostics)?, number.to_string()),
             Value::Text(text) => match quantity::read_share(text) {
                 Ok(number) => (number, text.trim().to_owned()),
                 Err(error) => {
-                    findings.refuse(
+                    diagnostics.refuse(
                         match error.kind {
                             QuantityErrorKind::NotFinite => ProblemKind::NotFinite,
                             QuantityErrorKind::WrongDimension => ProblemKind::WrongUnit,
                             QuantityErrorKind::NotANumber => ProblemKind::WrongType,
                             _ => ProblemKind::UnknownUnit,
                         },
-                        place,
+                        span,
                         error.message().to_owned(),
                         Some("write a share such as \"80 %\" or 0.8".to_owned()),
                     );
@@ -268,25 +268,25 @@ impl<R: Range> Decode for Fraction<R> {
                 }
             },
             _ => {
-                wrong_type(node, "a share such as \"80 %\"", findings);
+                wrong_type(node, "a share such as \"80 %\"", diagnostics);
                 return None;
             }
         };
-        let value = check_range::<R>(number, &written, place, findings)?;
+        let value = check_range::<R>(number, &written, span, diagnostics)?;
         if value > 1.0 {
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::OutOfRange,
-                place,
+                span,
                 format!("`{written}` is more than the whole"),
                 Some("write a share up to \"100 %\"".to_owned()),
             );
             return None;
         }
-        Some(Self { value, place, range: PhantomData })
+        Some(Self { value, span, range: PhantomData })
     }
 
     fn numbers(&self) -> Vec<Measured> {
-        vec![Measured { value: self.value, dimension: Dimension::NONE, place: self.place }]
+        vec![Measured { value: self.value, dimension: Dimension::NONE, span: self.span }]
     }
 }
 
@@ -318,31 +318,31 @@ pub trait Keyword: Copy + 'static {
     const WORDS: &'static [(&'static str, Self)];
 }
 
-impl<K: Keyword> Decode for Located<K>
+impl<K: Keyword> Decode for Spanned<K>
 where
-    Located<K>: JsonSchema,
+    Spanned<K>: JsonSchema,
 {
     fn example() -> Option<String> {
         Some(format!("\"{}\"", K::WORDS.first()?.0))
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
         let words = || K::WORDS.iter().map(|(word, _)| *word);
         let list = || words().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ");
         let Value::Text(text) = &node.value else {
-            wrong_type(node, &format!("{} ({})", K::NAME, list()), findings);
+            wrong_type(node, &format!("{} ({})", K::NAME, list()), diagnostics);
             return None;
         };
         if let Some((_, value)) = K::WORDS.iter().find(|(word, _)| word == text) {
-            return Some(Self::new(*value, node.place));
+            return Some(Self::new(*value, node.span));
         }
         let help = match nearest(text, words()) {
             Some(near) => format!("did you mean \"{near}\"?"),
             None => format!("write one of {}", list()),
         };
-        findings.refuse(
+        diagnostics.refuse(
             ProblemKind::UnknownWord,
-            node.place,
+            node.span,
             format!("`{text}` is not {}", K::NAME),
             Some(help),
         );
@@ -354,30 +354,30 @@ where
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Either<K, T> {
     /// One of the words.
-    Word(Located<K>),
+    Word(Spanned<K>),
     /// A value.
     Value(T),
 }
 
 impl<K: Keyword, T: Decode> Decode for Either<K, T>
 where
-    Located<K>: JsonSchema,
+    Spanned<K>: JsonSchema,
 {
     fn example() -> Option<String> {
         Some(format!("\"{}\"", K::WORDS.first()?.0))
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
         if let Value::Text(text) = &node.value {
             let words = || K::WORDS.iter().map(|(word, _)| *word);
             // A text without a digit is a word, and reported as one when it is misspelt.
             let is_word = words().any(|word| word == text);
             let is_quantity = text.contains(|letter: char| letter.is_ascii_digit());
             if is_word || (!is_quantity && nearest(text, words()).is_some()) {
-                return Located::<K>::decode(node, findings).map(Self::Word);
+                return Spanned::<K>::decode(node, diagnostics).map(Self::Word);
             }
         }
-        T::decode(node, findings).map(Self::Value)
+        T::decode(node, diagnostics).map(Self::Value)
     }
 
     fn numbers(&self) -> Vec<Measured> {
@@ -410,7 +410,7 @@ pub struct Point {
     /// The point [m].
     pub value: [f64; 3],
     /// Where it stands.
-    pub place: Place,
+    pub span: Span,
 }
 
 impl Decode for Point {
@@ -418,31 +418,31 @@ impl Decode for Point {
         Some("[\"10 mm\", \"5 mm\"]".to_owned())
     }
 
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
         let Value::List(nodes) = &node.value else {
-            wrong_type(node, "a point such as [\"10 mm\", \"5 mm\"]", findings);
+            wrong_type(node, "a point such as [\"10 mm\", \"5 mm\"]", diagnostics);
             return None;
         };
         if !matches!(nodes.len(), 2 | 3) {
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::WrongType,
-                node.place,
+                node.span,
                 format!("this is a list of {}, a point has x, y and perhaps z", nodes.len()),
                 Some("write a point such as [\"10 mm\", \"5 mm\"]".to_owned()),
             );
             return None;
         }
-        let lengths: Vec<Quantity<Length>> = Vec::decode(node, findings)?;
+        let lengths: Vec<Quantity<Length>> = Vec::decode(node, diagnostics)?;
         let mut value = [0.0; 3];
         for (coordinate, length) in value.iter_mut().zip(lengths) {
             *coordinate = length.value;
         }
-        Some(Self { value, place: node.place })
+        Some(Self { value, span: node.span })
     }
 
     fn numbers(&self) -> Vec<Measured> {
-        let (dimension, place) = (Length::DIMENSIONS[0], self.place);
-        self.value.map(|value| Measured { value, dimension, place }).into()
+        let (dimension, span) = (Length::DIMENSIONS[0], self.span);
+        self.value.map(|value| Measured { value, dimension, span }).into()
     }
 }
 
@@ -465,25 +465,25 @@ impl JsonSchema for Point {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Named<T> {
     /// Names and tables.
-    pub entries: Vec<(Located<String>, T)>,
+    pub entries: Vec<(Spanned<String>, T)>,
     /// Where the table that holds them stands.
-    pub place: Place,
+    pub span: Span,
 }
 
 impl<T: Decode> Decode for Named<T> {
-    fn decode(node: &Node, findings: &mut Findings) -> Option<Self> {
+    fn decode(node: &Node, diagnostics: &mut Diagnostics) -> Option<Self> {
         let Value::Table(entries) = &node.value else {
-            wrong_type(node, "a table of tables", findings);
+            wrong_type(node, "a table of tables", diagnostics);
             return None;
         };
-        let decoded: Vec<Option<(Located<String>, T)>> = entries
+        let decoded: Vec<Option<(Spanned<String>, T)>> = entries
             .iter()
             .map(|entry| {
-                let name = Located::new(entry.key.clone(), entry.place);
-                T::decode(&entry.node, findings).map(|value| (name, value))
+                let name = Spanned::new(entry.key.clone(), entry.span);
+                T::decode(&entry.node, diagnostics).map(|value| (name, value))
             })
             .collect();
-        Some(Self { entries: decoded.into_iter().collect::<Option<_>>()?, place: node.place })
+        Some(Self { entries: decoded.into_iter().collect::<Option<_>>()?, span: node.span })
     }
 }
 

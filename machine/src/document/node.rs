@@ -3,12 +3,12 @@
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::diagnostics::Diagnostics;
 use super::error::ProblemKind;
-use super::findings::Findings;
 
 /// Where something stands: which text, and which bytes of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Place {
+pub struct Span {
     pub(super) source: usize,
     pub(super) start: usize,
     pub(super) end: usize,
@@ -18,7 +18,7 @@ pub struct Place {
 #[derive(Debug, Clone)]
 pub struct Node {
     /// Where it stands; of a table, its key.
-    pub place: Place,
+    pub span: Span,
     pub(super) value: Value,
 }
 
@@ -38,7 +38,7 @@ pub(super) enum Value {
 #[derive(Debug, Clone)]
 pub(super) struct Entry {
     pub(super) key: String,
-    pub(super) place: Place,
+    pub(super) span: Span,
     pub(super) node: Node,
 }
 
@@ -72,14 +72,14 @@ impl From<bool> for Literal {
 }
 
 impl Literal {
-    /// The default as a node of a table at `place`.
-    pub fn node(self, place: Place) -> Node {
+    /// The default as a node of a table at `span`.
+    pub fn node(self, span: Span) -> Node {
         let value = match self {
             Self::Text(text) => Value::Text(text.to_owned()),
             Self::Number(number) => Value::Number(number),
             Self::Flag(flag) => Value::Flag(flag),
         };
-        Node { place, value }
+        Node { span, value }
     }
 
     /// The default for a schema.
@@ -94,8 +94,8 @@ impl Literal {
 
 impl Node {
     /// A table without keys.
-    pub fn empty_table(place: Place) -> Self {
-        Self { place, value: Value::Table(Vec::new()) }
+    pub fn empty_table(span: Span) -> Self {
+        Self { span, value: Value::Table(Vec::new()) }
     }
 
     /// What it is, with its article, for error texts.
@@ -112,20 +112,20 @@ impl Node {
 }
 
 /// Parses a whole document; `None` when something was found wrong.
-pub(super) fn parse(text: &str, source: usize, findings: &mut Findings) -> Option<Node> {
+pub(super) fn parse(text: &str, source: usize, diagnostics: &mut Diagnostics) -> Option<Node> {
     let (table, errors) = DeTable::parse_recoverable(text);
     if errors.is_empty() {
-        let place = Place { source, start: 0, end: 0 };
-        return Some(Node { place, value: from_table(table.get_ref(), source) });
+        let span = Span { source, start: 0, end: 0 };
+        return Some(Node { span, value: from_table(table.get_ref(), source) });
     }
     for error in errors {
-        let span = error.span().unwrap_or(text.len()..text.len());
-        let place = Place { source, start: span.start, end: span.end };
-        let message = match text.get(span) {
+        let bytes = error.span().unwrap_or(text.len()..text.len());
+        let span = Span { source, start: bytes.start, end: bytes.end };
+        let message = match text.get(bytes) {
             Some(key) if error.message() == "duplicate key" => format!("duplicate key `{key}`"),
             _ => error.message().to_owned(),
         };
-        findings.refuse(ProblemKind::Syntax, place, message, None);
+        diagnostics.refuse(ProblemKind::Syntax, span, message, None);
     }
     None
 }
@@ -133,25 +133,25 @@ pub(super) fn parse(text: &str, source: usize, findings: &mut Findings) -> Optio
 /// Parses one value of an override, which starts at byte `offset` of its source; a text that is
 /// no TOML value is a string, so that shells need no second layer of quotes.
 pub(super) fn parse_value(text: &str, source: usize, offset: usize) -> Node {
-    let place = Place { source, start: offset, end: offset + text.len() };
+    let span = Span { source, start: offset, end: offset + text.len() };
     let value = match DeValue::parse(text) {
         Ok(value) => from_value(value.get_ref(), source),
         Err(_) => Value::Text(text.to_owned()),
     };
     // Places inside the value would be off by the key's length: the whole value is named.
-    let mut node = Node { place, value };
-    relocate(&mut node, place);
+    let mut node = Node { span, value };
+    relocate(&mut node, span);
     node
 }
 
-fn relocate(node: &mut Node, place: Place) {
-    node.place = place;
+fn relocate(node: &mut Node, span: Span) {
+    node.span = span;
     match &mut node.value {
-        Value::List(nodes) => nodes.iter_mut().for_each(|node| relocate(node, place)),
+        Value::List(nodes) => nodes.iter_mut().for_each(|node| relocate(node, span)),
         Value::Table(entries) => {
             for entry in entries {
-                entry.place = place;
-                relocate(&mut entry.node, place);
+                entry.span = span;
+                relocate(&mut entry.node, span);
             }
         }
         Value::Text(_) | Value::Number(_) | Value::Flag(_) | Value::Time => {}
@@ -163,22 +163,22 @@ fn from_table(table: &DeTable<'_>, source: usize) -> Value {
         .iter()
         .map(|(key, value)| {
             let span = key.span();
-            let place = Place { source, start: span.start, end: span.end };
+            let span = Span { source, start: span.start, end: span.end };
             let mut node = from_spanned(value, source);
             if matches!(node.value, Value::Table(_)) {
-                node.place = place;
+                node.span = span;
             }
-            Entry { key: key.get_ref().to_string(), place, node }
+            Entry { key: key.get_ref().to_string(), span, node }
         })
         .collect();
-    entries.sort_by_key(|entry| entry.place);
+    entries.sort_by_key(|entry| entry.span);
     Value::Table(entries)
 }
 
 fn from_spanned(value: &Spanned<DeValue<'_>>, source: usize) -> Node {
     let span = value.span();
-    let place = Place { source, start: span.start, end: span.end };
-    Node { place, value: from_value(value.get_ref(), source) }
+    let span = Span { source, start: span.start, end: span.end };
+    Node { span, value: from_value(value.get_ref(), source) }
 }
 
 fn from_value(value: &DeValue<'_>, source: usize) -> Value {

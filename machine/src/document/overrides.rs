@@ -2,9 +2,9 @@
 
 use core::str::FromStr;
 
+use super::diagnostics::Diagnostics;
 use super::error::{ProblemKind, Source};
-use super::findings::Findings;
-use super::node::{Entry, Node, Place, Value, parse_value};
+use super::node::{Entry, Node, Span, Value, parse_value};
 
 /// One setting of the command line.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,18 +45,18 @@ pub(super) fn lay_over(
     setting: &Override,
     prefix: &str,
     source: usize,
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) {
     let mut node = root;
     let mut start = prefix.len();
     let mut keys = setting.key.split('.').peekable();
     while let Some(key) = keys.next() {
-        let place = Place { source, start, end: start + key.len() };
+        let span = Span { source, start, end: start + key.len() };
         start += key.len() + 1;
         if key.is_empty() {
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::Syntax,
-                place,
+                span,
                 format!("`{}` has an empty part", setting.key),
                 Some("write the keys with a dot between them, such as path.jerk".to_owned()),
             );
@@ -64,23 +64,23 @@ pub(super) fn lay_over(
         }
         let found = node.type_name();
         let Value::Table(entries) = &mut node.value else {
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::WrongType,
-                place,
+                span,
                 format!("`{key}` is looked for in {found}, not in a table"),
                 None,
             );
             return;
         };
         let index = entries.iter().position(|entry| entry.key == key).unwrap_or_else(|| {
-            let node = Node { place, value: Value::Table(Vec::new()) };
-            entries.push(Entry { key: key.to_owned(), place, node });
+            let node = Node { span, value: Value::Table(Vec::new()) };
+            entries.push(Entry { key: key.to_owned(), span, node });
             entries.len() - 1
         });
         let Some(entry) = entries.get_mut(index) else { return };
         if keys.peek().is_none() {
             let offset = prefix.len() + setting.key.len() + 1;
-            entry.place = place;
+            entry.span = span;
             entry.node = parse_value(&setting.value, source, offset);
             return;
         }

@@ -3,7 +3,6 @@
 use miette::{Diagnostic, SourceSpan};
 
 use super::error::COMMAND_LINE;
-use super::node::Place;
 
 /// The place of an error as people count it.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -16,9 +15,9 @@ pub struct Position {
     pub column: Option<u64>,
 }
 
-impl Place {
+impl Position {
     /// Where the first label of any `diagnostic` points.
-    pub fn of(diagnostic: &dyn Diagnostic) -> Position {
+    pub fn of(diagnostic: &dyn Diagnostic) -> Self {
         position(diagnostic).unwrap_or_default()
     }
 }

@@ -4,10 +4,10 @@ use schemars::{Schema, SchemaGenerator, json_schema};
 
 use super::bounds;
 use super::decode::{Decode, wrong_type};
+use super::diagnostics::Diagnostics;
 use super::error::ProblemKind;
-use super::findings::Findings;
 use super::nearest;
-use super::node::{Entry, Literal, Node, Place, Value};
+use super::node::{Entry, Literal, Node, Span, Value};
 
 /// A key of a declared table.
 #[derive(Debug, Clone)]
@@ -27,7 +27,7 @@ pub struct Field {
 pub struct TableReader<'a> {
     name: &'static str,
     entries: &'a [Entry],
-    place: Place,
+    span: Span,
     misspelt: Vec<&'static str>,
 }
 
@@ -38,10 +38,10 @@ impl<'a> TableReader<'a> {
         name: &'static str,
         node: &'a Node,
         fields: &[Field],
-        findings: &mut Findings,
+        diagnostics: &mut Diagnostics,
     ) -> Option<Self> {
         let Value::Table(entries) = &node.value else {
-            wrong_type(node, "a table", findings);
+            wrong_type(node, "a table", diagnostics);
             return None;
         };
         let mut misspelt = Vec::new();
@@ -66,14 +66,14 @@ impl<'a> TableReader<'a> {
             if let Some(near) = fields.iter().find(|field| Some(field.key) == near) {
                 misspelt.push(near.key);
             }
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::UnknownKey,
-                entry.place,
+                entry.span,
                 format!("unknown key `{}`", entry.key),
                 Some(help),
             );
         }
-        Some(Self { name, entries, place: node.place, misspelt })
+        Some(Self { name, entries, span: node.span, misspelt })
     }
 
     /// The value of `key`, its default, or what its absence means.
@@ -81,22 +81,22 @@ impl<'a> TableReader<'a> {
         &self,
         key: &str,
         default: Option<Literal>,
-        findings: &mut Findings,
+        diagnostics: &mut Diagnostics,
     ) -> Option<T> {
         if let Some(entry) = self.entries.iter().find(|entry| entry.key == key) {
-            let value = T::decode(&entry.node, findings)?;
+            let value = T::decode(&entry.node, diagnostics)?;
             for number in value.numbers() {
-                bounds::check(self.name, key, &number, findings);
+                bounds::check(self.name, key, &number, diagnostics);
             }
             return Some(value);
         }
         if let Some(default) = default {
-            return T::decode(&default.node(self.place), findings);
+            return T::decode(&default.node(self.span), diagnostics);
         }
-        let absent = T::absent(self.place, findings);
+        let absent = T::absent(self.span, diagnostics);
         // A misspelt key was reported where it stands; that it is missing too would be noise.
         if absent.is_none() && !self.misspelt.contains(&key) {
-            let table = match findings.text(self.place) {
+            let table = match diagnostics.text(self.span) {
                 "" => "the file".to_owned(),
                 table => format!("the table `{table}`"),
             };
@@ -104,9 +104,9 @@ impl<'a> TableReader<'a> {
                 Some(example) => format!("add `{key} = {example}` to {table}"),
                 None => format!("add the table `{key}` to {table}"),
             };
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::MissingKey,
-                self.place,
+                self.span,
                 format!("`{key}` is missing in {table}"),
                 Some(help),
             );
@@ -157,7 +157,7 @@ pub fn table_schema(
 ///
 /// A field is a key; its documentation goes into the schema. `= literal` is its default, written
 /// as in the document. Without one, [`Option`]s and tables without required keys may be left out,
-/// and everything else must be there. The struct gets a further field `place`, that of its key.
+/// and everything else must be there. The struct gets a further field `span`, that of its key.
 #[macro_export]
 macro_rules! table {
     (
@@ -171,7 +171,7 @@ macro_rules! table {
         pub struct $name {
             $( $(#[doc = $doc])* pub $field: $type, )*
             /// Where the table stands.
-            pub place: $crate::document::Place,
+            pub span: $crate::document::Span,
         }
 
         impl $name {
@@ -194,34 +194,34 @@ macro_rules! table {
         impl $crate::document::Decode for $name {
             fn decode(
                 node: &$crate::document::Node,
-                findings: &mut $crate::document::Findings,
+                diagnostics: &mut $crate::document::Diagnostics,
             ) -> Option<Self> {
                 let reader = $crate::document::TableReader::open(
                     stringify!($name),
                     node,
                     &Self::fields(),
-                    findings,
+                    diagnostics,
                 )?;
                 $(
                     let $field: Option<$type> = reader.read(
                         stringify!($field),
                         $crate::table!(@default $($default)?),
-                        findings,
+                        diagnostics,
                     );
                 )*
-                Some(Self { $( $field: $field?, )* place: node.place })
+                Some(Self { $( $field: $field?, )* span: node.span })
             }
 
             fn absent(
-                place: $crate::document::Place,
-                findings: &mut $crate::document::Findings,
+                span: $crate::document::Span,
+                diagnostics: &mut $crate::document::Diagnostics,
             ) -> Option<Self> {
                 if <Self as $crate::document::Decode>::required() {
                     return None;
                 }
                 <Self as $crate::document::Decode>::decode(
-                    &$crate::document::Node::empty_table(place),
-                    findings,
+                    &$crate::document::Node::empty_table(span),
+                    diagnostics,
                 )
             }
 

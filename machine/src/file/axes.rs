@@ -3,7 +3,7 @@
 use super::motors::{counts, motor};
 use super::tables::{AxisTable, LimitsTable, LoopsTable};
 use crate::actuator::{Axis, Friction, LoopGains};
-use crate::document::{Decode, Either, Findings, ProblemKind, Quantity, Range};
+use crate::document::{Decode, Diagnostics, Either, ProblemKind, Quantity, Range};
 use crate::limits::AxisLimits;
 use crate::motor::Motor;
 use crate::quantity::Kind;
@@ -56,7 +56,7 @@ impl JointUnit {
         self,
         quantity: &Quantity<K, R>,
         axis: &str,
-        findings: &mut Findings,
+        diagnostics: &mut Diagnostics,
     ) -> bool {
         if quantity.form == self as usize {
             return true;
@@ -65,9 +65,9 @@ impl JointUnit {
             Self::Length => ("moves along a line", "a length, such as \"1 mm\""),
             Self::Angle => ("turns", "an angle, such as \"1 deg\""),
         };
-        findings.refuse(
+        diagnostics.refuse(
             ProblemKind::WrongUnit,
-            quantity.place,
+            quantity.span,
             format!("axis `{axis}` {moves}: this unit does not fit"),
             Some(format!("write it with {due}")),
         );
@@ -76,16 +76,20 @@ impl JointUnit {
 }
 
 /// The axis that `table` describes, driving `joint`; `None` where it has no motor.
-pub(super) fn axis(table: &AxisTable, joint: &Joint, findings: &mut Findings) -> Option<Axis> {
+pub(super) fn axis(
+    table: &AxisTable,
+    joint: &Joint,
+    diagnostics: &mut Diagnostics,
+) -> Option<Axis> {
     let gear = table.gear.value;
     let ratio = joint.travel / gear;
-    let motor = motor(table, joint, findings)?;
+    let motor = motor(table, joint, diagnostics)?;
     let inertia = motor.rotor_inertia() + ratio * ratio * joint.load;
     Some(Axis {
         name: joint.name.to_owned(),
         unit: joint.unit,
         ratio,
-        backlash: backlash(table, joint, findings),
+        backlash: backlash(table, joint, diagnostics),
         efficiency: Efficiency {
             dynamic: table.efficiency.value,
             at_start: table.static_efficiency.value,
@@ -96,27 +100,27 @@ pub(super) fn axis(table: &AxisTable, joint: &Joint, findings: &mut Findings) ->
             viscous: table.friction.viscous.value,
         },
         brake: table.friction.brake.value,
-        encoder: counts(table, &motor, findings)?,
+        encoder: counts(table, &motor, diagnostics)?,
         gains: match motor {
-            Motor::Dc(_) => gains(table, inertia, findings)?,
+            Motor::Dc(_) => gains(table, inertia, diagnostics)?,
             Motor::Stepper(_) => LoopGains { position: 0.0, velocity: 0.0, current: 0.0, inertia },
         },
-        limits: limits(&table.limits, joint, &motor, ratio, findings),
+        limits: limits(&table.limits, joint, &motor, ratio, diagnostics),
     })
 }
 
-fn backlash(table: &AxisTable, joint: &Joint, findings: &mut Findings) -> f64 {
+fn backlash(table: &AxisTable, joint: &Joint, diagnostics: &mut Diagnostics) -> f64 {
     let Some(backlash) = &table.backlash else { return 0.0 };
-    joint.unit.expect(backlash, joint.name, findings);
+    joint.unit.expect(backlash, joint.name, diagnostics);
     backlash.value
 }
 
-fn gains(table: &AxisTable, inertia: f64, findings: &mut Findings) -> Option<LoopGains> {
+fn gains(table: &AxisTable, inertia: f64, diagnostics: &mut Diagnostics) -> Option<LoopGains> {
     let defaults;
     let loops = match &table.loops {
         Some(loops) => loops,
         None => {
-            defaults = LoopsTable::absent(table.place, findings)?;
+            defaults = LoopsTable::absent(table.span, diagnostics)?;
             &defaults
         }
     };
@@ -126,9 +130,9 @@ fn gains(table: &AxisTable, inertia: f64, findings: &mut Findings) -> Option<Loo
     ] {
         if outer.value >= inner.value {
             // The place of a default is that of its table: what was written is what is wrong.
-            let place = if outer.place == loops.place { inner.place } else { outer.place };
-            findings.contradict(
-                place,
+            let span = if outer.span == loops.span { inner.span } else { outer.span };
+            diagnostics.contradict(
+                span,
                 format!(
                     "the {} loop ({} rad/s) must be faster than the {} loop around it ({} rad/s)",
                     words[0], inner.value, words[1], outer.value
@@ -150,22 +154,22 @@ fn limits(
     joint: &Joint,
     motor: &Motor,
     ratio: f64,
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) -> AxisLimits {
     let (unit, name) = (joint.unit, joint.name);
-    let following_error = table.following_error.map_or(unit.following_error(), |given| {
-        unit.expect(&given, name, findings);
-        given.value
+    let following_error = table.following_error.map_or(unit.following_error(), |declared| {
+        unit.expect(&declared, name, diagnostics);
+        declared.value
     });
     if let Some(limit) = &table.acceleration {
-        unit.expect(limit, name, findings);
+        unit.expect(limit, name, diagnostics);
     }
     if let Some(limit) = &table.jerk {
-        unit.expect(limit, name, findings);
+        unit.expect(limit, name, diagnostics);
     }
     AxisLimits {
-        position: position(table, joint, following_error, findings),
-        velocity: velocity(table, joint, motor.largest_speed() * ratio, findings),
+        position: position(table, joint, following_error, diagnostics),
+        velocity: velocity(table, joint, motor.largest_speed() * ratio, diagnostics),
         acceleration: table.acceleration.map_or(f64::INFINITY, |limit| limit.value),
         jerk: table.jerk.map_or(f64::INFINITY, |limit| limit.value),
         following_error,
@@ -174,14 +178,19 @@ fn limits(
 
 /// The soft limits of `joint` [m or rad]: as given, or the range that the area needs with `margin`
 /// beyond it.
-fn position(table: &LimitsTable, joint: &Joint, margin: f64, findings: &mut Findings) -> [f64; 2] {
+fn position(
+    table: &LimitsTable,
+    joint: &Joint,
+    margin: f64,
+    diagnostics: &mut Diagnostics,
+) -> [f64; 2] {
     let unit = joint.unit;
     match (&table.position, joint.range) {
         (None, Some([lower, upper])) => [lower - margin, upper + margin],
         (None, None) => {
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::MissingKey,
-                table.place,
+                table.span,
                 format!("the range of axis `{}` does not follow from the area", joint.name),
                 Some(format!("add `position = {}` to the axis's `limits`", unit.example_range())),
             );
@@ -189,8 +198,8 @@ fn position(table: &LimitsTable, joint: &Joint, margin: f64, findings: &mut Find
         }
         (Some(Either::Word(word)), _) => {
             if unit == JointUnit::Length {
-                findings.contradict(
-                    word.place,
+                diagnostics.contradict(
+                    word.span,
                     format!("axis `{}` moves along a line, which ends somewhere", joint.name),
                     "write [from, to]",
                 );
@@ -198,9 +207,9 @@ fn position(table: &LimitsTable, joint: &Joint, margin: f64, findings: &mut Find
             [f64::NEG_INFINITY, f64::INFINITY]
         }
         (Some(Either::Value([lower, upper])), _) => {
-            let fits = [lower, upper].map(|end| unit.expect(end, joint.name, findings));
+            let fits = [lower, upper].map(|end| unit.expect(end, joint.name, diagnostics));
             if fits == [true, true] {
-                range([lower, upper], joint, findings);
+                range([lower, upper], joint, diagnostics);
             }
             [lower.value, upper.value]
         }
@@ -208,18 +217,18 @@ fn position(table: &LimitsTable, joint: &Joint, margin: f64, findings: &mut Find
 }
 
 /// Refuses a range of soft limits that is empty or has `joint` at home outside of it.
-fn range<K: Kind>([lower, upper]: [&Quantity<K>; 2], joint: &Joint, findings: &mut Findings) {
+fn range<K: Kind>([lower, upper]: [&Quantity<K>; 2], joint: &Joint, diagnostics: &mut Diagnostics) {
     let name = joint.unit.name();
     if lower.value >= upper.value {
-        findings.contradict(
-            lower.place,
+        diagnostics.contradict(
+            lower.span,
             format!("the range from {} {name} to {} {name} is empty", lower.value, upper.value),
             "write [from, to], the smaller first",
         );
     } else if joint.home < lower.value || joint.home > upper.value {
-        let place = if joint.home < lower.value { lower.place } else { upper.place };
-        findings.contradict(
-            place,
+        let span = if joint.home < lower.value { lower.span } else { upper.span };
+        diagnostics.contradict(
+            span,
             format!(
                 "axis `{}` is at {} {name} at home, outside its limits {} {name} to {} {name}",
                 joint.name, joint.home, lower.value, upper.value
@@ -230,11 +239,16 @@ fn range<K: Kind>([lower, upper]: [&Quantity<K>; 2], joint: &Joint, findings: &m
 }
 
 /// The largest speed of `joint` [m/s or rad/s], whose motor reaches `no_load` without load.
-fn velocity(table: &LimitsTable, joint: &Joint, no_load: f64, findings: &mut Findings) -> f64 {
+fn velocity(
+    table: &LimitsTable,
+    joint: &Joint,
+    no_load: f64,
+    diagnostics: &mut Diagnostics,
+) -> f64 {
     let Some(velocity) = table.velocity else { return SPEED_SHARE * no_load };
-    if joint.unit.expect(&velocity, joint.name, findings) && velocity.value > no_load {
-        findings.contradict(
-            velocity.place,
+    if joint.unit.expect(&velocity, joint.name, diagnostics) && velocity.value > no_load {
+        diagnostics.contradict(
+            velocity.span,
             format!(
                 "the motor reaches {no_load:.4} {name}/s without load, not {} {name}/s",
                 velocity.value,

@@ -138,10 +138,10 @@ pub const BOUNDS: &[Bounds] = &[
         "a cheap spur gear has 3 degrees"),
     // Motors.
     row(&["DcMotorTable.voltage", "StepperMotorTable.voltage"],
-        ["0.1 V", "1e4 V"], ["1 V", "1000 V"],
+        ["0.1 V", "1e6 V"], ["1 V", "1000 V"],
         "from one battery cell to the link of a 690 V mains drive"),
     row(&["DcMotorTable.current", "DcMotorTable.continuous_current", "StepperMotorTable.current"],
-        ["1e-5 A", "1e4 A"], ["10 mA", "500 A"],
+        ["1e-5 A", "1e6 A"], ["10 mA", "500 A"],
         "motors of 6 mm bear 50 mA, large servo drives give 400 A"),
     row(&["DcMotorTable.resistance", "StepperMotorTable.resistance"],
         ["1e-4 ohm", "1e5 ohm"], ["0.01 ohm", "1000 ohm"],

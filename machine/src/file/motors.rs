@@ -5,22 +5,26 @@ use core::f64::consts::TAU;
 use super::axes::Joint;
 use super::tables::{AxisTable, DcMotorTable, StepperMotorTable};
 use crate::actuator::{Axis, Encoder};
-use crate::document::{Findings, Number, Positive, ProblemKind};
+use crate::document::{Diagnostics, Number, Positive, ProblemKind};
 use crate::motor::{DcMotor, Motor, StepperMotor};
 
 /// Rounding of a whole number that was computed from other units.
 const WHOLE: f64 = 1e-6;
 
 /// The motor of `table`, which drives `joint`; `None` where there is not exactly one.
-pub(super) fn motor(table: &AxisTable, joint: &Joint, findings: &mut Findings) -> Option<Motor> {
+pub(super) fn motor(
+    table: &AxisTable,
+    joint: &Joint,
+    diagnostics: &mut Diagnostics,
+) -> Option<Motor> {
     let stiff = joint.stiff_inertia / (table.gear.value * table.gear.value);
     match (&table.motor.dc, &table.motor.stepper) {
-        (Some(data), None) => Some(Motor::Dc(dc(data, stiff, findings))),
-        (None, Some(data)) => Some(Motor::Stepper(stepper(data, stiff, findings))),
+        (Some(data), None) => Some(Motor::Dc(dc(data, stiff, diagnostics))),
+        (None, Some(data)) => Some(Motor::Stepper(stepper(data, stiff, diagnostics))),
         (None, None) => {
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::MissingKey,
-                table.motor.place,
+                table.motor.span,
                 format!("axis `{}` has no motor", joint.name),
                 Some(format!(
                     "add [axis.{name}.motor.dc] or [axis.{name}.motor.stepper]",
@@ -30,8 +34,8 @@ pub(super) fn motor(table: &AxisTable, joint: &Joint, findings: &mut Findings) -
             None
         }
         (Some(dc), Some(stepper)) => {
-            findings.contradict(
-                dc.place.max(stepper.place),
+            diagnostics.contradict(
+                dc.span.max(stepper.span),
                 format!("axis `{}` has two motors", joint.name),
                 "keep either the table `dc` or the table `stepper`",
             );
@@ -40,12 +44,12 @@ pub(super) fn motor(table: &AxisTable, joint: &Joint, findings: &mut Findings) -
     }
 }
 
-fn dc(data: &DcMotorTable, stiff_inertia: f64, findings: &mut Findings) -> DcMotor {
+fn dc(data: &DcMotorTable, stiff_inertia: f64, diagnostics: &mut Diagnostics) -> DcMotor {
     if let Some(continuous) = data.continuous_current
         && continuous.value > data.current.value
     {
-        findings.contradict(
-            continuous.place,
+        diagnostics.contradict(
+            continuous.span,
             format!(
                 "the continuous current of {:.3} A is above the power stage's {:.3} A",
                 continuous.value, data.current.value
@@ -54,8 +58,8 @@ fn dc(data: &DcMotorTable, stiff_inertia: f64, findings: &mut Findings) -> DcMot
         );
     }
     if data.nominal_torque.is_some() != data.nominal_speed.is_some() {
-        findings.contradict(
-            data.place,
+        diagnostics.contradict(
+            data.span,
             "`nominal_torque` and `nominal_speed` only say something together".to_owned(),
             "give both or none",
         );
@@ -71,14 +75,18 @@ fn dc(data: &DcMotorTable, stiff_inertia: f64, findings: &mut Findings) -> DcMot
     }
 }
 
-fn stepper(data: &StepperMotorTable, stiff_inertia: f64, findings: &mut Findings) -> StepperMotor {
+fn stepper(
+    data: &StepperMotorTable,
+    stiff_inertia: f64,
+    diagnostics: &mut Diagnostics,
+) -> StepperMotor {
     let mut whole = |number: &Number<Positive>, of: f64, due: &str| {
         let rounded = (number.value / of).round();
         if rounded < 1.0 || (number.value / of - rounded).abs() > WHOLE {
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::OutOfRange,
-                number.place,
-                format!("{} of them cannot be", number.value),
+                number.span,
+                format!("{} is not possible here: it must be a multiple of {of}", number.value),
                 Some(due.to_owned()),
             );
         }
@@ -89,8 +97,8 @@ fn stepper(data: &StepperMotorTable, stiff_inertia: f64, findings: &mut Findings
     let microsteps = whole(&data.microsteps, 1.0, "a driver divides into whole parts, such as 16");
     let driven = data.voltage.value / data.resistance.value;
     if driven < data.current.value {
-        findings.contradict(
-            data.current.place,
+        diagnostics.contradict(
+            data.current.span,
             format!(
                 "{:.1} V across {:.3} Ω drive at most {driven:.2} A, not {:.2} A",
                 data.voltage.value, data.resistance.value, data.current.value
@@ -114,15 +122,19 @@ fn stepper(data: &StepperMotorTable, stiff_inertia: f64, findings: &mut Findings
 }
 
 /// What the position of `motor` is counted in; `None` where that is not said.
-pub(super) fn counts(table: &AxisTable, motor: &Motor, findings: &mut Findings) -> Option<Encoder> {
+pub(super) fn counts(
+    table: &AxisTable,
+    motor: &Motor,
+    diagnostics: &mut Diagnostics,
+) -> Option<Encoder> {
     if let Motor::Stepper(motor) = motor {
         let extra = [
-            table.encoder.as_ref().map(|encoder| (encoder.place, "encoder")),
-            table.loops.as_ref().map(|loops| (loops.place, "loops")),
+            table.encoder.as_ref().map(|encoder| (encoder.span, "encoder")),
+            table.loops.as_ref().map(|loops| (loops.span, "loops")),
         ];
-        for (place, key) in extra.into_iter().flatten() {
-            findings.contradict(
-                place,
+        for (span, key) in extra.into_iter().flatten() {
+            diagnostics.contradict(
+                span,
                 format!("an axis with a stepper has no `{key}`"),
                 "remove the table: a stepper counts its pulses, and no loop is closed",
             );
@@ -130,10 +142,10 @@ pub(super) fn counts(table: &AxisTable, motor: &Motor, findings: &mut Findings) 
         return Some(Encoder { counts: motor.pulses_per_turn() });
     }
     let Some(encoder) = &table.encoder else {
-        let axis = findings.text(table.place).to_owned();
-        findings.refuse(
+        let axis = diagnostics.text(table.span).to_owned();
+        diagnostics.refuse(
             ProblemKind::MissingKey,
-            table.place,
+            table.span,
             format!("`encoder` is missing in the table `{axis}`"),
             Some(format!("add the table `encoder` to the table `{axis}`")),
         );
@@ -142,9 +154,9 @@ pub(super) fn counts(table: &AxisTable, motor: &Motor, findings: &mut Findings) 
     let resolution = encoder.resolution;
     let counts = (resolution.value * TAU).round();
     if counts < 1.0 || (resolution.value * TAU - counts).abs() > WHOLE * counts {
-        findings.refuse(
+        diagnostics.refuse(
             ProblemKind::OutOfRange,
-            resolution.place,
+            resolution.span,
             format!("{} counts in a revolution cannot be", resolution.value * TAU),
             Some("an encoder has a whole number of counts, such as \"4096 counts/rev\"".to_owned()),
         );
@@ -156,14 +168,14 @@ pub(super) fn counts(table: &AxisTable, motor: &Motor, findings: &mut Findings) 
 /// position.
 pub(super) fn of_one_kind<'a>(
     axes: impl IntoIterator<Item = (&'a AxisTable, &'a Axis)>,
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) {
     let mut axes = axes.into_iter();
     let Some((_, first)) = axes.next() else { return };
     for (table, axis) in axes {
         if axis.motor.dc().is_some() != first.motor.dc().is_some() {
-            findings.contradict(
-                table.motor.place,
+            diagnostics.contradict(
+                table.motor.span,
                 format!("axes `{}` and `{}` have motors of different kinds", first.name, axis.name),
                 "give all axes DC motors, or all of them steppers",
             );

@@ -4,13 +4,13 @@
 //! The arithmetic is that of the machine at home. It is a doubt and no proof: the planner holds every
 //! job to the machine's limits, and the controller every motion.
 
+use messages::time::CYCLE_TIME;
 use nalgebra::{DMatrix, SMatrix};
-use signals::time::CYCLE_TIME;
 
 use super::axes::Joint;
 use super::tables::{AxisTable, MachineTable, PathTable};
 use crate::actuator::{Axis, JointUnit};
-use crate::document::{Findings, Place};
+use crate::document::{Diagnostics, Span};
 use crate::kinematics::{Joints, Mechanism};
 use crate::mechanisms::spectrum::smallest_eigenvalue;
 use crate::mechanisms::{MechanismKind, MechanismVisitor};
@@ -84,10 +84,10 @@ impl MechanismVisitor for AtHome<'_> {
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
         let Self { joints, axes } = self;
         let home = Joints::<N>::from_fn(|row, _| joints.get(row).map_or(0.0, |joint| joint.home));
-        let assembly = mechanism.assemble(&home, mechanism.branch(), None).ok()?;
-        let jacobian = mechanism.jacobian(&assembly);
+        let chain = mechanism.solve(&home, mechanism.branch(), None).ok()?;
+        let jacobian = mechanism.jacobian(&chain);
         let linear = DMatrix::from_fn(3, N, |row, column| jacobian[(row, column)]);
-        let mass = mechanism.mass_matrix(&assembly);
+        let mass = mechanism.mass_matrix(&chain);
         let seen = SMatrix::<f64, N, N>::from_fn(|row, column| {
             let rotor = if row == column { axes[row].motor.rotor_inertia() } else { 0.0 };
             let inertia = rotor + axes[row].ratio * mass[(row, column)] * axes[column].ratio;
@@ -96,7 +96,7 @@ impl MechanismVisitor for AtHome<'_> {
         Some(Standing {
             lever: linear.column_iter().map(|column| column.norm()).collect(),
             worst_speed: inverse_rows(&linear).unwrap_or_else(|| vec![0.0; N]),
-            gravity: mechanism.gravity(&assembly).iter().copied().collect(),
+            gravity: mechanism.gravity(&chain).iter().copied().collect(),
             resonance: mechanism.stiffness().and_then(|stiffness| lowest(&mass, &stiffness)),
             smallest_share: smallest_eigenvalue(seen),
         })
@@ -151,7 +151,7 @@ pub(super) fn check(
     tables: &[&AxisTable],
     joints: &[Joint],
     axes: &[Axis],
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) {
     if tables.len() != axes.len() || joints.len() != axes.len() {
         return;
@@ -169,23 +169,23 @@ pub(super) fn check(
             worst_speed,
             gravity: standing.gravity[index],
         };
-        subject.following_error(&table.path, standing.resonance, findings);
-        subject.resolution(&table.path, findings);
-        subject.speeds(&table.path, findings);
-        subject.lead(table, findings);
-        subject.load(standing.resonance.is_some(), findings);
-        subject.weight(&table.path, findings);
+        subject.following_error(&table.path, standing.resonance, diagnostics);
+        subject.resolution(&table.path, diagnostics);
+        subject.speeds(&table.path, diagnostics);
+        subject.lead(table, diagnostics);
+        subject.load(standing.resonance.is_some(), diagnostics);
+        subject.weight(&table.path, diagnostics);
         match &axis.motor {
-            Motor::Dc(motor) => subject.dc(motor, &table.path, findings),
-            Motor::Stepper(motor) => subject.stepper(motor, findings),
+            Motor::Dc(motor) => subject.dc(motor, &table.path, diagnostics),
+            Motor::Stepper(motor) => subject.stepper(motor, diagnostics),
         }
     }
-    loops(tables, axes, &standing, findings);
+    loops(tables, axes, &standing, diagnostics);
 }
 
 /// Whether the loops are fast enough for the springs, and slow enough for the cycle, where the axes
 /// move each other's loads.
-fn loops(tables: &[&AxisTable], axes: &[Axis], standing: &Standing, findings: &mut Findings) {
+fn loops(tables: &[&AxisTable], axes: &[Axis], standing: &Standing, diagnostics: &mut Diagnostics) {
     let Some((table, axis)) = tables
         .iter()
         .zip(axes)
@@ -195,12 +195,12 @@ fn loops(tables: &[&AxisTable], axes: &[Axis], standing: &Standing, findings: &m
         return;
     };
     let bandwidth = axis.gains.velocity;
-    let place = table.loops.as_ref().map_or(table.place, |loops| loops.velocity.place);
+    let span = table.loops.as_ref().map_or(table.span, |loops| loops.velocity.span);
     if let Some(resonance) = standing.resonance
         && resonance < bandwidth
     {
-        findings.warn(
-            place,
+        diagnostics.warn(
+            span,
             format!(
                 "axis `{}`: the velocity loop has a bandwidth of {bandwidth:.1} rad/s, and the load on \
                  its springs resonates at {resonance:.1} rad/s: lower the one or stiffen the other",
@@ -212,8 +212,8 @@ fn loops(tables: &[&AxisTable], axes: &[Axis], standing: &Standing, findings: &m
     // Put this way a share that is no number is doubted.
     let slow_enough = fastest <= FASTEST_LOOP;
     if !slow_enough {
-        findings.warn(
-            place,
+        diagnostics.warn(
+            span,
             format!(
                 "the axes move each other's load: where they work against each other the inertia is \
                  {:.3} of what the velocity loops of {bandwidth:.1} rad/s are made for, which makes \
@@ -226,8 +226,8 @@ fn loops(tables: &[&AxisTable], axes: &[Axis], standing: &Standing, findings: &m
 }
 
 impl Subject<'_> {
-    fn warn(&self, place: Place, text: &str, findings: &mut Findings) {
-        findings.warn(place, format!("axis `{}`: {text}", self.axis.name));
+    fn warn(&self, span: Span, text: &str, diagnostics: &mut Diagnostics) {
+        diagnostics.warn(span, format!("axis `{}`: {text}", self.axis.name));
     }
 
     /// What the loops of position and velocity, without their integral, hold a shaft with
@@ -242,17 +242,22 @@ impl Subject<'_> {
     }
 
     /// The largest following error against the encoder, and against what supervision takes for a jump.
-    fn following_error(&self, path: &PathTable, resonance: Option<f64>, findings: &mut Findings) {
+    fn following_error(
+        &self,
+        path: &PathTable,
+        resonance: Option<f64>,
+        diagnostics: &mut Diagnostics,
+    ) {
         let Self { table, axis, .. } = self;
         let limit = axis.limits.following_error;
-        let place = table.limits.following_error.map_or(table.limits.place, |given| given.place);
+        let span = table.limits.following_error.map_or(table.limits.span, |declared| declared.span);
         let [unit, ..] = self.units();
         let count = axis.encoder.resolution() * axis.ratio;
         let what = counted(&axis.motor);
-        let line = self.count_line(findings);
+        let line = self.count_line(diagnostics);
         if limit < count {
-            findings.contradict(
-                place,
+            diagnostics.contradict(
+                span,
                 format!(
                     "axis `{}`: a following error of {limit:.3e} {unit} stops the machine, and one {what} \
                      is {count:.3e} {unit}{line}: it would stop at once",
@@ -268,7 +273,7 @@ impl Subject<'_> {
                  {FEWEST_COUNTS} times the {what} of {count:.3e} {unit}{line}: noise of the encoder \
                  may stop it"
             );
-            self.warn(place, &text, findings);
+            self.warn(span, &text, diagnostics);
         }
         // The jerk of a join, once more for what the mechanism adds to it.
         let jerk = 2.0 * path.jerk.value * self.worst_speed;
@@ -282,40 +287,40 @@ impl Subject<'_> {
                  of {} m/s³{} changes by what supervision takes for a jump below {least:.3e} {unit}: \
                  raise `following_error`, or lower the jerk",
                 path.jerk.value,
-                at_line(path.jerk.place, findings)
+                at_line(path.jerk.span, diagnostics)
             );
-            self.warn(place, &text, findings);
+            self.warn(span, &text, diagnostics);
         }
     }
 
     /// Where the counts of the axis are said, ", line 3" of the file.
-    fn count_line(&self, findings: &Findings) -> String {
-        let encoder = self.table.encoder.as_ref().map(|encoder| encoder.resolution.place);
-        let stepper = self.table.motor.stepper.as_ref().map(|stepper| stepper.microsteps.place);
-        encoder.or(stepper).map_or_else(String::new, |place| at_line(place, findings))
+    fn count_line(&self, diagnostics: &Diagnostics) -> String {
+        let encoder = self.table.encoder.as_ref().map(|encoder| encoder.resolution.span);
+        let stepper = self.table.motor.stepper.as_ref().map(|stepper| stepper.microsteps.span);
+        encoder.or(stepper).map_or_else(String::new, |span| at_line(span, diagnostics))
     }
 
     /// A count of the encoder against the path's tolerance.
-    fn resolution(&self, path: &PathTable, findings: &mut Findings) {
+    fn resolution(&self, path: &PathTable, diagnostics: &mut Diagnostics) {
         let Self { table, axis, lever, .. } = self;
         let count = axis.encoder.resolution() * axis.ratio * lever;
         if count > path.tolerance.value {
-            let encoder = table.encoder.as_ref().map(|encoder| encoder.resolution.place);
-            let stepper = table.motor.stepper.as_ref().map(|stepper| stepper.microsteps.place);
+            let encoder = table.encoder.as_ref().map(|encoder| encoder.resolution.span);
+            let stepper = table.motor.stepper.as_ref().map(|stepper| stepper.microsteps.span);
             let text = format!(
                 "one {} moves the tool by {:.3} µm, and the path's tolerance is {:.3} µm{}: give it a \
                  finer encoder or more gear, or the path more tolerance",
                 counted(&axis.motor),
                 count * 1e6,
                 path.tolerance.value * 1e6,
-                at_line(path.tolerance.place, findings)
+                at_line(path.tolerance.span, diagnostics)
             );
-            self.warn(encoder.or(stepper).unwrap_or(table.place), &text, findings);
+            self.warn(encoder.or(stepper).unwrap_or(table.span), &text, diagnostics);
         }
     }
 
     /// What the motor reaches through its gear against what path and limits ask for.
-    fn speeds(&self, path: &PathTable, findings: &mut Findings) {
+    fn speeds(&self, path: &PathTable, diagnostics: &mut Diagnostics) {
         let Self { table, axis, worst_speed, .. } = self;
         let [_, unit, ..] = self.units();
         let speed = if path.speed.value > path.rapid.value { path.speed } else { path.rapid };
@@ -323,16 +328,16 @@ impl Subject<'_> {
         let limit = axis.limits.velocity;
         // Where the tool's straight lines are the joints', `doubts` says it for each speed; a limit
         // that the file sets is meant.
-        let is_given = table.limits.velocity.is_some();
-        if self.joint.worst_speed == 0.0 && !is_given && asked > limit {
+        let is_declared = table.limits.velocity.is_some();
+        if self.joint.worst_speed == 0.0 && !is_declared && asked > limit {
             let text = format!(
                 "it reaches {limit:.3} {unit}, and near home a path at {} m/s may ask it for \
                  {asked:.3} {unit}: jobs that do are slowed or refused",
                 speed.value
             );
-            self.warn(speed.place, &text, findings);
+            self.warn(speed.span, &text, diagnostics);
         }
-        let used = table.limits.velocity.map_or(asked, |given| given.value).max(asked);
+        let used = table.limits.velocity.map_or(asked, |declared| declared.value).max(asked);
         let most = axis.motor.largest_speed() * axis.ratio;
         if axis.motor.dc().is_some() && used > 0.0 && most > LARGEST_SPEED_RESERVE * used {
             let text = format!(
@@ -340,28 +345,28 @@ impl Subject<'_> {
                  {used:.3} {unit}: more gear or less lead would use the motor, and its encoder, better",
                 table.gear.value
             );
-            self.warn(table.gear.place, &text, findings);
+            self.warn(table.gear.span, &text, diagnostics);
         }
     }
 
     /// The lead of a screw against its travel.
-    fn lead(&self, table: &MachineTable, findings: &mut Findings) {
+    fn lead(&self, table: &MachineTable, diagnostics: &mut Diagnostics) {
         let Self { joint, axis, .. } = self;
         let [lower, upper] = axis.limits.position;
         let turn = joint.travel * core::f64::consts::TAU;
         if joint.unit == JointUnit::Length && turn > upper - lower {
-            let place = lead_place(table, self.table, joint.name);
+            let span = lead_place(table, self.table, joint.name);
             let text = format!(
                 "one turn of the gear's output moves the joint by {turn:.4} m, and its whole travel is \
                  {:.4} m: is the lead or the radius right?",
                 upper - lower
             );
-            self.warn(place.unwrap_or(self.table.place), &text, findings);
+            self.warn(span.unwrap_or(self.table.span), &text, diagnostics);
         }
     }
 
     /// The load's inertia against the rotor's.
-    fn load(&self, is_elastic: bool, findings: &mut Findings) {
+    fn load(&self, is_elastic: bool, diagnostics: &mut Diagnostics) {
         let Self { table, axis, joint, .. } = self;
         let rotor = axis.motor.rotor_inertia();
         if axis.motor.stepper().is_some_and(StepperMotor::is_planar) {
@@ -375,15 +380,15 @@ impl Subject<'_> {
                 "seen through a gear of {} the load has {load:.3e} kg·m², {ratio:.1} times the motor's \
                  {rotor:.3e} kg·m²{}, and up to {most} times are usual: is the gear right?",
                 table.gear.value,
-                rotor_line(table, findings)
+                rotor_line(table, diagnostics)
             );
-            self.warn(table.gear.place, &text, findings);
+            self.warn(table.gear.span, &text, diagnostics);
         }
     }
 
     /// What gravity takes against what holds an axis whose motor is unpowered, and against the loops
     /// that take it over.
-    fn weight(&self, path: &PathTable, findings: &mut Findings) {
+    fn weight(&self, path: &PathTable, diagnostics: &mut Diagnostics) {
         let Self { table, axis, gravity, lever, .. } = self;
         let torque = (gravity * axis.ratio).abs();
         let teeth = axis.motor.stepper().map_or(0.0, |motor| motor.detent_torque);
@@ -393,7 +398,7 @@ impl Subject<'_> {
                 "at home gravity turns the motor with {torque:.3e} N·m, and friction and brake hold \
                  {held:.3e} N·m: it sinks while the motor is unpowered; give it a `brake`, or balance it"
             );
-            self.warn(table.friction.place, &text, findings);
+            self.warn(table.friction.span, &text, diagnostics);
         }
         if axis.motor.dc().is_none() {
             return;
@@ -405,18 +410,18 @@ impl Subject<'_> {
                  and the loops give way by {:.1} µm until they bear the rest: {:.0} times the path's \
                  tolerance of {:.3} µm{}, which marks soon after enabling show; balance it",
                 axis.friction.coulomb,
-                at_line(table.friction.coulomb.place, findings),
+                at_line(table.friction.coulomb.span, diagnostics),
                 push * 1e6,
                 push / path.tolerance.value,
                 path.tolerance.value * 1e6,
-                at_line(path.tolerance.place, findings)
+                at_line(path.tolerance.span, diagnostics)
             );
-            self.warn(table.friction.place, &text, findings);
+            self.warn(table.friction.span, &text, diagnostics);
         }
     }
 
     /// What the data of a DC motor say of each other, and of the loops.
-    fn dc(&self, motor: &DcMotor, path: &PathTable, findings: &mut Findings) {
+    fn dc(&self, motor: &DcMotor, path: &PathTable, diagnostics: &mut Diagnostics) {
         let Self { table, axis, lever, .. } = self;
         let Some(data) = &table.motor.dc else { return };
         let DcMotor { resistance, inductance, torque_constant, .. } = *motor;
@@ -425,11 +430,11 @@ impl Subject<'_> {
             let text = format!(
                 "{inductance:.3e} H over {resistance:.3e} Ω{} are a time constant of {electrical:.3e} \
                  s; windings have {:.0e} to {:.1} s, and the current loop a cycle of {CYCLE_TIME} s",
-                at_line(data.resistance.place, findings),
+                at_line(data.resistance.span, diagnostics),
                 ELECTRICAL[0],
                 ELECTRICAL[1]
             );
-            self.warn(data.inductance.place, &text, findings);
+            self.warn(data.inductance.span, &text, diagnostics);
         }
         let inertia = axis.gains.inertia;
         let mechanical = inertia * resistance / (torque_constant * torque_constant);
@@ -437,26 +442,25 @@ impl Subject<'_> {
             let text = format!(
                 "{torque_constant:.3e} N·m/A and {resistance:.3e} Ω{} turn {inertia:.3e} kg·m² with a \
                  time constant of {mechanical:.3e} s; motors have {:.0e} to {} s",
-                at_line(data.resistance.place, findings),
+                at_line(data.resistance.span, diagnostics),
                 MECHANICAL[0],
                 MECHANICAL[1]
             );
-            self.warn(data.torque_constant.place, &text, findings);
+            self.warn(data.torque_constant.span, &text, diagnostics);
         }
         let (position, velocity) = (axis.gains.position, axis.gains.velocity);
         if position * LOOP_RATIO > velocity {
-            let place = table.loops.as_ref().map_or(table.place, |loops| loops.position.place);
+            let span = table.loops.as_ref().map_or(table.span, |loops| loops.position.span);
             let text = format!(
                 "the position loop has a bandwidth of {position:.1} rad/s, and the velocity loop in it \
                  {velocity:.1} rad/s{}: less than {LOOP_RATIO} times as much, and they swing together",
-                table
-                    .loops
-                    .as_ref()
-                    .map_or_else(String::new, |loops| { at_line(loops.velocity.place, findings) })
+                table.loops.as_ref().map_or_else(String::new, |loops| {
+                    at_line(loops.velocity.span, diagnostics)
+                })
             );
-            self.warn(place, &text, findings);
+            self.warn(span, &text, diagnostics);
         }
-        self.friction(motor.stall_torque(), findings);
+        self.friction(motor.stall_torque(), diagnostics);
         let push = axis.friction.coulomb / self.stiffness() * axis.ratio * lever;
         if push > FRICTION_TOLERANCES * path.tolerance.value {
             let text = format!(
@@ -464,18 +468,18 @@ impl Subject<'_> {
                  pushes the tool off its path by {:.2} mm, {:.0} times the tolerance of {:.3} µm{}: its \
                  feedforward would have to be that exact",
                 axis.friction.coulomb,
-                rotor_line(table, findings),
+                rotor_line(table, diagnostics),
                 push * 1e3,
                 push / path.tolerance.value,
                 path.tolerance.value * 1e6,
-                at_line(path.tolerance.place, findings)
+                at_line(path.tolerance.span, diagnostics)
             );
-            self.warn(table.friction.coulomb.place, &text, findings);
+            self.warn(table.friction.coulomb.span, &text, diagnostics);
         }
     }
 
     /// Friction against what the motor gives at standstill [N·m].
-    fn friction(&self, stall: f64, findings: &mut Findings) {
+    fn friction(&self, stall: f64, diagnostics: &mut Diagnostics) {
         let coulomb = self.axis.friction.coulomb;
         if coulomb > LARGEST_FRICTION * stall {
             let text = format!(
@@ -483,22 +487,22 @@ impl Subject<'_> {
                  standstill: more than {:.0} % is unusual",
                 LARGEST_FRICTION * 100.0
             );
-            self.warn(self.table.friction.coulomb.place, &text, findings);
+            self.warn(self.table.friction.coulomb.span, &text, diagnostics);
         }
     }
 
     /// What the data of a stepper say of each other.
-    fn stepper(&self, motor: &StepperMotor, findings: &mut Findings) {
+    fn stepper(&self, motor: &StepperMotor, diagnostics: &mut Diagnostics) {
         let Some(data) = &self.table.motor.stepper else { return };
         let (detent, holding) = (motor.detent_torque, motor.holding_torque);
         if detent >= holding {
-            findings.contradict(
-                data.detent_torque.place,
+            diagnostics.contradict(
+                data.detent_torque.span,
                 format!(
                     "axis `{}`: a detent torque of {detent} N·m is not less than the holding torque of \
                      {holding} N·m{}: the motor could not turn",
                     self.axis.name,
-                    at_line(data.holding_torque.place, findings)
+                    at_line(data.holding_torque.span, diagnostics)
                 ),
                 "a detent torque is about a twentieth of the holding torque",
             );
@@ -507,11 +511,11 @@ impl Subject<'_> {
                 "a detent torque of {detent} N·m is {:.0} % of the holding torque of {holding} N·m{}: \
                  about 5 % are usual",
                 detent / holding * 100.0,
-                at_line(data.holding_torque.place, findings)
+                at_line(data.holding_torque.span, diagnostics)
             );
-            self.warn(data.detent_torque.place, &text, findings);
+            self.warn(data.detent_torque.span, &text, diagnostics);
         }
-        self.friction(holding, findings);
+        self.friction(holding, diagnostics);
     }
 }
 
@@ -524,19 +528,19 @@ fn counted(motor: &Motor) -> &'static str {
 }
 
 /// " (line 12)" for a place in the file.
-fn at_line(place: Place, findings: &Findings) -> String {
-    findings.position(place).map_or_else(String::new, |(line, _)| format!(" (line {line})"))
+fn at_line(span: Span, diagnostics: &Diagnostics) -> String {
+    diagnostics.position(span).map_or_else(String::new, |(line, _)| format!(" (line {line})"))
 }
 
 /// Where the rotor's inertia of an axis is said.
-fn rotor_line(table: &AxisTable, findings: &Findings) -> String {
-    let dc = table.motor.dc.as_ref().map(|motor| motor.rotor_inertia.place);
-    let stepper = table.motor.stepper.as_ref().map(|motor| motor.rotor_inertia.place);
-    dc.or(stepper).map_or_else(String::new, |place| at_line(place, findings))
+fn rotor_line(table: &AxisTable, diagnostics: &Diagnostics) -> String {
+    let dc = table.motor.dc.as_ref().map(|motor| motor.rotor_inertia.span);
+    let stepper = table.motor.stepper.as_ref().map(|motor| motor.rotor_inertia.span);
+    dc.or(stepper).map_or_else(String::new, |span| at_line(span, diagnostics))
 }
 
 /// Where the travel of the axis `name` per turn of its gear is said.
-fn lead_place(machine: &MachineTable, axis: &AxisTable, name: &str) -> Option<Place> {
+fn lead_place(machine: &MachineTable, axis: &AxisTable, name: &str) -> Option<Span> {
     let cartesian = machine.mechanism.cartesian.as_ref();
     let screw = cartesian.and_then(|cartesian| match name {
         "x" => Some(&cartesian.x),
@@ -546,9 +550,9 @@ fn lead_place(machine: &MachineTable, axis: &AxisTable, name: &str) -> Option<Pl
     let corexy = machine.mechanism.corexy.as_ref();
     let transmission = &axis.transmission;
     screw
-        .map(|screw| screw.lead.place)
-        .or(corexy.map(|corexy| corexy.pulley_radius.place))
-        .or(transmission.screw.as_ref().map(|screw| screw.lead.place))
-        .or(transmission.belt.as_ref().map(|belt| belt.pulley_radius.place))
-        .or(transmission.planar.as_ref().map(|planar| planar.pitch.place))
+        .map(|screw| screw.lead.span)
+        .or(corexy.map(|corexy| corexy.pulley_radius.span))
+        .or(transmission.screw.as_ref().map(|screw| screw.lead.span))
+        .or(transmission.belt.as_ref().map(|belt| belt.pulley_radius.span))
+        .or(transmission.planar.as_ref().map(|planar| planar.pitch.span))
 }

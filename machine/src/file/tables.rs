@@ -12,9 +12,10 @@ use super::mechanism::{
     serial::SerialTable, tri_planar::TriPlanarTable, twin_actuator::TwinActuatorTable,
 };
 use crate::document::{
-    Either, Fraction, Keyword, Located, Named, NonNegative, Number, Point, Positive,
+    Either, Fraction, Keyword, Named, NonNegative, Number, Point, Positive, Spanned,
 };
-use crate::process::ZMeaning;
+use crate::gcode_settings::ZMeaning;
+use crate::limits::CornerMode;
 use crate::quantity as unit;
 use crate::table;
 
@@ -29,9 +30,9 @@ table! {
     /// A machine for laser marking.
     pub struct MachineTable {
         /// The machine's name.
-        pub name: Located<String>,
+        pub name: Spanned<String>,
         /// What it is, for people.
-        pub description: Option<Located<String>>,
+        pub description: Option<Spanned<String>>,
         /// Where the tool rests, [x, y] or [x, y, z]; the centre of the area when left out.
         pub home: Option<Point>,
         /// How the axes stand at rest, one value each, for machines that can hold the tool in one
@@ -83,6 +84,9 @@ table! {
         /// How far a smoothed join may lie from the drawn line, and the tool from its path between two
         /// setpoints.
         pub tolerance: Above<unit::Length> = "5 um",
+        /// How corners are passed where a job says nothing of them: `blend`, on the way and rounded
+        /// within the tolerance, or `exact`, at rest.
+        pub corners: Spanned<CornerMode> = "blend",
     }
 }
 
@@ -376,9 +380,9 @@ table! {
         /// The S word that means full power.
         pub full_scale: Number<Positive> = 1000.0,
         /// What Z means: `ignored`, or the height of the `focus` on a machine with a z axis.
-        pub z: Located<ZMeaning> = "ignored",
+        pub z: Spanned<ZMeaning> = "ignored",
         /// Whether M7 and M8 switch an air assist.
-        pub air_assist: Located<bool> = true,
+        pub air_assist: Spanned<bool> = true,
         /// Origins of the work coordinate systems, machine frame; the home when left out.
         pub origins: OriginsTable,
     }
@@ -412,7 +416,7 @@ table! {
     /// The job that belongs to the machine.
     pub struct JobTable {
         /// The job that runs when none is named, relative to this file.
-        pub sample: Located<String>,
+        pub sample: Spanned<String>,
     }
 }
 
@@ -543,5 +547,25 @@ impl JsonSchema for ZMeaning {
 
     fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
         json_schema!({ "enum": ["ignored", "focus"] })
+    }
+}
+
+impl Keyword for CornerMode {
+    const NAME: &'static str = "a way to pass corners";
+    const WORDS: &'static [(&'static str, Self)] =
+        &[("blend", Self::Blend), ("exact", Self::Exact)];
+}
+
+impl JsonSchema for CornerMode {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "CornerMode".into()
+    }
+
+    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "enum": ["blend", "exact"] })
     }
 }

@@ -4,44 +4,45 @@ use std::path::PathBuf;
 
 use super::axes::{Joint, axis};
 use super::bounds::BOUNDS;
-use super::doubts;
 use super::mechanism::{self, Built};
 use super::motors;
 use super::relations;
 use super::tables::{
     AreaTable, AxisTable, LaserTable, MachineTable, OriginsTable, PathTable, RealtimeTable,
 };
+use super::warnings;
 use crate::actuator::Axis;
 use crate::document::{
-    Document, DocumentError, Findings, Located, Named, Place, Point, ProblemKind, nearest,
+    Diagnostics, Document, DocumentError, Named, Point, ProblemKind, Span, Spanned, nearest,
 };
+use crate::gcode_settings::{GcodeSettings, ZMeaning};
+use crate::laser::LaserSource;
 use crate::limits::{PathLimits, StallTolerance, WorkArea};
 use crate::machine::Machine;
 use crate::mechanisms::MechanismKind;
-use crate::process::{GcodeSettings, LaserSource, ZMeaning};
-use signals::Nanoseconds;
+use messages::Nanoseconds;
 
 pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
-    let (table, mut findings) = document.decode_within::<MachineTable>(BOUNDS)?;
-    let area = area(&table.area, &mut findings);
-    let home = home(table.home, &area, &mut findings);
+    let (table, mut diagnostics) = document.decode_within::<MachineTable>(BOUNDS)?;
+    let area = area(&table.area, &mut diagnostics);
+    let home = home(table.home, &area, &mut diagnostics);
     let Some(Built { mechanism, joints, home }) =
-        mechanism::build(&table, &area, home, &mut findings)
+        mechanism::build(&table, &area, home, &mut diagnostics)
     else {
-        return findings.fail();
+        return diagnostics.fail();
     };
-    let Some(tables) = axes_in_order(&table.axis, &joints, &mut findings) else {
-        return findings.fail();
+    let Some(tables) = axes_in_order(&table.axis, &joints, &mut diagnostics) else {
+        return diagnostics.fail();
     };
-    let axes = axes(&table, &tables, &joints, &mut findings);
-    if findings.is_empty() {
-        relations::check(&table, &mechanism, &tables, &joints, &axes, &mut findings);
+    let axes = axes(&table, &tables, &joints, &mut diagnostics);
+    if diagnostics.is_empty() {
+        relations::check(&table, &mechanism, &tables, &joints, &axes, &mut diagnostics);
     }
-    refuse_rigid_backlash(&mechanism, &table.axis, &mut findings);
-    check_z(&table, &mechanism, &mut findings);
-    let laser = laser(&table.laser, &mut findings);
-    let stall = stall(&table.realtime, &mut findings);
-    let PathTable { speed, rapid, acceleration, jerk, tolerance, place: _ } = &table.path;
+    refuse_rigid_backlash(&mechanism, &table.axis, &mut diagnostics);
+    check_z(&table, &mechanism, &mut diagnostics);
+    let laser = laser(&table.laser, &mut diagnostics);
+    let stall = stall(&table.realtime, &mut diagnostics);
+    let PathTable { speed, rapid, acceleration, jerk, tolerance, corners, span: _ } = &table.path;
     let gcode = &table.gcode;
     let machine = Machine {
         name: table.name.value.clone(),
@@ -57,6 +58,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
             jerk: jerk.value,
             tolerance: tolerance.value,
         },
+        corners: corners.value,
         stall,
         laser,
         gcode: GcodeSettings {
@@ -66,9 +68,9 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
             air_assist: gcode.air_assist.value,
         },
         sample_job: table.job.as_ref().map(|job| PathBuf::from(&job.sample.value)),
-        warnings: doubts::warnings(&mut findings),
+        warnings: warnings::warnings(&mut diagnostics),
     };
-    findings.finish(machine)
+    diagnostics.finish(machine)
 }
 
 /// The axes that `tables` describe, in the order of `joints`; what is doubtful about them and their
@@ -77,33 +79,33 @@ fn axes(
     table: &MachineTable,
     tables: &[&AxisTable],
     joints: &[Joint],
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) -> Vec<Axis> {
     let mut axes = Vec::with_capacity(joints.len());
     for (axis_table, joint) in tables.iter().copied().zip(joints) {
-        let Some(axis) = axis(axis_table, joint, findings) else { continue };
+        let Some(axis) = axis(axis_table, joint, diagnostics) else { continue };
         if let Some(dc) = &axis_table.motor.dc {
-            doubts::of_motor(joint.name, dc, findings);
+            warnings::of_motor(joint.name, dc, diagnostics);
         }
         let speeds = [&table.path.speed, &table.path.rapid];
-        doubts::of_speeds(speeds, joint, &axis, findings);
+        warnings::of_speeds(speeds, joint, &axis, diagnostics);
         axes.push(axis);
     }
     if axes.len() == tables.len() {
-        motors::of_one_kind(tables.iter().copied().zip(&axes), findings);
+        motors::of_one_kind(tables.iter().copied().zip(&axes), diagnostics);
     }
     for ratio in mechanism::damping_ratios(table) {
-        doubts::of_damping(ratio, findings);
+        warnings::of_damping(ratio, diagnostics);
     }
     axes
 }
 
 /// That the area has a range of z, and Z moves the focus, only where the mechanism moves in z.
-fn check_z(table: &MachineTable, mechanism: &MechanismKind, findings: &mut Findings) {
+fn check_z(table: &MachineTable, mechanism: &MechanismKind, diagnostics: &mut Diagnostics) {
     if mechanism.moves_in_z() {
         if table.area.z.is_none() {
-            findings.contradict(
-                table.area.place,
+            diagnostics.contradict(
+                table.area.span,
                 "the machine has a z axis, but its area has no range of z".to_owned(),
                 "add `z = [from, to]`",
             );
@@ -111,15 +113,15 @@ fn check_z(table: &MachineTable, mechanism: &MechanismKind, findings: &mut Findi
         return;
     }
     if let Some([lower, _]) = table.area.z {
-        findings.contradict(
-            lower.place,
+        diagnostics.contradict(
+            lower.span,
             "the area has a range of z, but the mechanism has no z axis".to_owned(),
             "remove `z`",
         );
     }
     if table.gcode.z.value == ZMeaning::Focus {
-        findings.contradict(
-            table.gcode.z.place,
+        diagnostics.contradict(
+            table.gcode.z.span,
             "Z cannot move the focus: the mechanism has no z axis".to_owned(),
             "write \"ignored\", or add the z axis",
         );
@@ -130,15 +132,15 @@ fn check_z(table: &MachineTable, mechanism: &MechanismKind, findings: &mut Findi
 fn refuse_rigid_backlash(
     mechanism: &MechanismKind,
     axes: &Named<AxisTable>,
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) {
     if mechanism.is_elastic() {
         return;
     }
     for (name, table) in &axes.entries {
         if let Some(backlash) = table.backlash.filter(|backlash| backlash.value > 0.0) {
-            findings.contradict(
-                backlash.place,
+            diagnostics.contradict(
+                backlash.span,
                 format!("axis `{}` has backlash, and its transmission is rigid", name.value),
                 "give its transmission a stiffness, or leave the backlash out",
             );
@@ -147,12 +149,12 @@ fn refuse_rigid_backlash(
 }
 
 /// Refuses delays that no source has: the stream would wait for them.
-fn laser(table: &LaserTable, findings: &mut Findings) -> LaserSource {
+fn laser(table: &LaserTable, diagnostics: &mut Diagnostics) -> LaserSource {
     for (key, delay) in [("on_delay", table.on_delay), ("off_delay", table.off_delay)] {
         if delay.value > LaserSource::LONGEST_DELAY {
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::OutOfRange,
-                delay.place,
+                delay.span,
                 format!("an `{key}` of {} s is too long", delay.value),
                 Some(format!("a laser source answers within {} s", LaserSource::LONGEST_DELAY)),
             );
@@ -162,14 +164,14 @@ fn laser(table: &LaserTable, findings: &mut Findings) -> LaserSource {
 }
 
 /// Refuses a tolerance shorter than a cycle, or longer than any axis could bear.
-fn stall(table: &RealtimeTable, findings: &mut Findings) -> StallTolerance {
+fn stall(table: &RealtimeTable, diagnostics: &mut Diagnostics) -> StallTolerance {
     let time = Nanoseconds::from_seconds(table.stall.value);
     StallTolerance::new(time).unwrap_or_else(|| {
         let [shortest, longest] = [StallTolerance::SHORTEST, StallTolerance::LONGEST]
             .map(|bound| bound.time().seconds() * 1e3);
-        findings.refuse(
+        diagnostics.refuse(
             ProblemKind::OutOfRange,
-            table.stall.place,
+            table.stall.span,
             format!("a `stall` of {} s cannot be tolerated", table.stall.value),
             Some(format!("write a time from {shortest} ms, one cycle, to {longest} ms")),
         );
@@ -178,14 +180,14 @@ fn stall(table: &RealtimeTable, findings: &mut Findings) -> StallTolerance {
 }
 
 /// The area as a box; z is from 0 to 0 where it has no range.
-fn area(table: &AreaTable, findings: &mut Findings) -> WorkArea {
+fn area(table: &AreaTable, diagnostics: &mut Diagnostics) -> WorkArea {
     let mut area = WorkArea { lower: [0.0; 3], upper: [0.0; 3] };
     let ranges = [Some(table.x), Some(table.y), table.z];
     for (index, (name, range)) in ["x", "y", "z"].into_iter().zip(ranges).enumerate() {
         let Some([lower, upper]) = range else { continue };
         if lower.value >= upper.value {
-            findings.contradict(
-                lower.place,
+            diagnostics.contradict(
+                lower.span,
                 format!("the range of {name} from {} m to {} m is empty", lower.value, upper.value),
                 "write [from, to], the smaller first",
             );
@@ -196,19 +198,19 @@ fn area(table: &AreaTable, findings: &mut Findings) -> WorkArea {
     area
 }
 
-fn home(point: Option<Point>, area: &WorkArea, findings: &mut Findings) -> [f64; 3] {
+fn home(point: Option<Point>, area: &WorkArea, diagnostics: &mut Diagnostics) -> [f64; 3] {
     let Some(point) = point else {
         return core::array::from_fn(|index| (area.lower[index] + area.upper[index]) / 2.0);
     };
-    if !findings.is_empty() {
+    if !diagnostics.is_empty() {
         // An empty range was found: where home should be cannot be said.
         return point.value;
     }
     for (index, name) in ["x", "y", "z"].into_iter().enumerate() {
         let (lower, upper) = (area.lower[index], area.upper[index]);
         if !(lower..=upper).contains(&point.value[index]) {
-            findings.contradict(
-                point.place,
+            diagnostics.contradict(
+                point.span,
                 format!(
                     "home lies outside the area: {name} is {} m, the area is from {lower} m to \
                      {upper} m",
@@ -225,13 +227,13 @@ fn home(point: Option<Point>, area: &WorkArea, findings: &mut Findings) -> [f64;
 fn axes_in_order<'a>(
     axes: &'a Named<AxisTable>,
     joints: &[Joint],
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) -> Option<Vec<&'a AxisTable>> {
     let names = || joints.iter().map(|joint| joint.name);
     let list = || names().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     let is_there = |name: &str| axes.entries.iter().any(|(found, _)| found.value == name);
     let mut renamed = 0;
-    for (Located { value: name, place }, _) in &axes.entries {
+    for (Spanned { value: name, span }, _) in &axes.entries {
         if names().all(|known| known != name) {
             renamed += 1;
             let free = names().filter(|name| !is_there(name));
@@ -239,15 +241,15 @@ fn axes_in_order<'a>(
                 Some(near) => format!("did you mean `{near}`?"),
                 None => format!("the axes of this mechanism are {}", list()),
             };
-            unknown_axis(name, *place, help, findings);
+            unknown_axis(name, *span, help, diagnostics);
         }
     }
     let missing: Vec<&str> = names().filter(|name| !is_there(name)).collect();
     // As many unknown axes as missing ones are misspelt, and were reported where they stand.
     for name in missing.iter().skip(renamed) {
-        findings.refuse(
+        diagnostics.refuse(
             ProblemKind::MissingKey,
-            axes.place,
+            axes.span,
             format!("axis `{name}` is missing"),
             Some(format!("add [axis.{name}]: the axes of this mechanism are {}", list())),
         );
@@ -262,10 +264,10 @@ fn axes_in_order<'a>(
         .collect()
 }
 
-fn unknown_axis(name: &str, place: Place, help: String, findings: &mut Findings) {
-    findings.refuse(
+fn unknown_axis(name: &str, span: Span, help: String, diagnostics: &mut Diagnostics) {
+    diagnostics.refuse(
         ProblemKind::UnknownKey,
-        place,
+        span,
         format!("the mechanism has no axis `{name}`"),
         Some(help),
     );

@@ -6,8 +6,8 @@
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use crate::kinematics::{
-    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose,
-    STANDARD_GRAVITY, ToolMotion, finite, in_plane,
+    Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, STANDARD_GRAVITY,
+    TaskSpace, ToolMotion, finite, in_plane,
 };
 use crate::transmission::{self, Elasticity};
 
@@ -33,19 +33,19 @@ impl<const N: usize> Cartesian<N> {
 
 impl<const N: usize> Mechanism<N> for Cartesian<N> {
     type Branch = ();
-    type Assembly = Joints<N>;
+    type ChainState = Joints<N>;
 
     const NAME: &'static str = "cartesian";
 
-    fn freedom(&self) -> Freedom {
-        if N < 3 { Freedom::Plane } else { Freedom::Space }
+    fn task_space(&self) -> TaskSpace {
+        if N < 3 { TaskSpace::Plane } else { TaskSpace::Space }
     }
 
     fn branch(&self) {}
 
     fn branch_of(&self, _q: &Joints<N>) {}
 
-    fn assemble(
+    fn solve(
         &self,
         q: &Joints<N>,
         _branch: (),

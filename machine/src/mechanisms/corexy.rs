@@ -6,7 +6,7 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use crate::kinematics::{
-    Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, ToolMotion,
+    Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, TaskSpace, ToolMotion,
     in_plane,
 };
 use crate::transmission::Elasticity;
@@ -38,19 +38,19 @@ fn seen_from_belts([x, y]: [f64; 2]) -> Matrix2<f64> {
 
 impl Mechanism<2> for CoreXy {
     type Branch = ();
-    type Assembly = Joints<2>;
+    type ChainState = Joints<2>;
 
     const NAME: &'static str = "corexy";
 
-    fn freedom(&self) -> Freedom {
-        Freedom::Plane
+    fn task_space(&self) -> TaskSpace {
+        TaskSpace::Plane
     }
 
     fn branch(&self) {}
 
     fn branch_of(&self, _q: &Joints<2>) {}
 
-    fn assemble(
+    fn solve(
         &self,
         q: &Joints<2>,
         _branch: (),

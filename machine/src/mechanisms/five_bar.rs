@@ -15,12 +15,12 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism,
-    Pose, ToolMotion, in_plane,
+    Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
+    TaskSpace, ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
 use crate::transmission::{self, Elasticity};
-use signals::math;
+use messages::math;
 
 /// How far an angle may be from the previous one before a turn is counted [rad]. Anything from
 /// the longest step of a path to a full turn less that keeps a path continuous; above half a turn,
@@ -90,7 +90,7 @@ impl Branch for FiveBarBranch {
 
 /// The linkage at one joint position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FiveBarAssembly {
+pub struct FiveBarChainState {
     /// From each motor to its elbow [m].
     pub proximal: [Vector2<f64>; 2],
     /// From each elbow to the tool [m].
@@ -104,7 +104,7 @@ pub struct FiveBarAssembly {
     branch: FiveBarBranch,
 }
 
-impl FiveBarAssembly {
+impl FiveBarChainState {
     /// Accelerations that joints moving evenly at `velocity` [rad/s] cause: of the tool [m/s²] and
     /// of the distal links' angles [rad/s²].
     pub fn even_accelerations(&self, velocity: &Joints<2>) -> (Vector2<f64>, [f64; 2]) {
@@ -338,29 +338,29 @@ impl FiveBar {
 
 impl Mechanism<2> for FiveBar {
     type Branch = FiveBarBranch;
-    type Assembly = FiveBarAssembly;
+    type ChainState = FiveBarChainState;
 
     const NAME: &'static str = "five_bar";
 
-    fn freedom(&self) -> Freedom {
-        Freedom::Plane
+    fn task_space(&self) -> TaskSpace {
+        TaskSpace::Plane
     }
 
     fn branch(&self) -> FiveBarBranch {
         self.branch
     }
 
-    fn branch_of(&self, assembly: &FiveBarAssembly) -> FiveBarBranch {
-        assembly.branch
+    fn branch_of(&self, chain: &FiveBarChainState) -> FiveBarBranch {
+        chain.branch
     }
 
     /// The assembly mode of `branch` decides; the working mode is then what the joints make it.
-    fn assemble(
+    fn solve(
         &self,
         q: &Joints<2>,
         branch: FiveBarBranch,
-        _near: Option<&FiveBarAssembly>,
-    ) -> Result<FiveBarAssembly, KinematicsError> {
+        _near: Option<&FiveBarChainState>,
+    ) -> Result<FiveBarChainState, KinematicsError> {
         let Closed { proximal, elbows, tool } = self.close(q, branch)?;
         let [d1, d2] = [tool - elbows[0], tool - elbows[1]];
         let distal = [d1, d2];
@@ -381,33 +381,32 @@ impl Mechanism<2> for FiveBar {
         });
         let working_mode = drive.map(|drive| if drive <= 0.0 { 1 } else { -1 });
         let branch = FiveBarBranch { working_mode, assembly_mode: branch.assembly_mode };
-        Ok(FiveBarAssembly { proximal, distal, tool, jacobian, distal_rates, branch })
+        Ok(FiveBarChainState { proximal, distal, tool, jacobian, distal_rates, branch })
     }
 
-    fn pose(&self, assembly: &FiveBarAssembly) -> Pose {
-        Pose::at(Vector3::new(assembly.tool.x, assembly.tool.y, 0.0))
+    fn pose(&self, chain: &FiveBarChainState) -> Pose {
+        Pose::at(Vector3::new(chain.tool.x, chain.tool.y, 0.0))
     }
 
     fn locate(
         &self,
         q: &Joints<2>,
         branch: FiveBarBranch,
-        _near: Option<&FiveBarAssembly>,
+        _near: Option<&FiveBarChainState>,
     ) -> Result<Pose, KinematicsError> {
         let Closed { tool, .. } = self.close(q, branch)?;
         Ok(Pose::at(Vector3::new(tool.x, tool.y, 0.0)))
     }
 
-    fn jacobian(&self, assembly: &FiveBarAssembly) -> Jacobian<2> {
-        plane::jacobian(&assembly.jacobian)
+    fn jacobian(&self, chain: &FiveBarChainState) -> Jacobian<2> {
+        plane::jacobian(&chain.jacobian)
     }
 
-    fn margins(&self, assembly: &FiveBarAssembly) -> Vec<Margin> {
+    fn margins(&self, chain: &FiveBarChainState) -> Vec<Margin> {
         let sine = |arm: usize| {
-            cross(assembly.proximal[arm], assembly.distal[arm]).abs()
-                / (self.proximal * self.distal)
+            cross(chain.proximal[arm], chain.distal[arm]).abs() / (self.proximal * self.distal)
         };
-        let [d1, d2] = assembly.distal;
+        let [d1, d2] = chain.distal;
         let type_2 = cross(d1, d2).abs() / (self.distal * self.distal);
         vec![
             Margin {
@@ -448,32 +447,32 @@ impl Mechanism<2> for FiveBar {
 
     // Source 003 eq. 5.7, 5.10 and 5.11 (where 2/m_e is m_e/2), in independent coordinates: the
     // loop is closed in the velocities, so that no multiplier is left.
-    fn mass_matrix(&self, assembly: &FiveBarAssembly) -> Matrix2<f64> {
+    fn mass_matrix(&self, chain: &FiveBarChainState) -> Matrix2<f64> {
         let forearm = self.forearm();
         let still = Vector2::zeros();
-        let mut mass = self.tool_and_bar().joint_mass(&assembly.jacobian, &still);
+        let mut mass = self.tool_and_bar().joint_mass(&chain.jacobian, &still);
         for arm in 0..2 {
-            mass += forearm.joint_mass(&assembly.centre(arm), &assembly.distal_rates[arm]);
+            mass += forearm.joint_mass(&chain.centre(arm), &chain.distal_rates[arm]);
             mass[(arm, arm)] += self.arm_inertia();
         }
         mass
     }
 
-    fn bias(&self, assembly: &FiveBarAssembly, velocity: &Joints<2>) -> Joints<2> {
-        let (tool, turning) = assembly.even_accelerations(velocity);
-        let pulls = assembly.pulls(velocity);
+    fn bias(&self, chain: &FiveBarChainState, velocity: &Joints<2>) -> Joints<2> {
+        let (tool, turning) = chain.even_accelerations(velocity);
+        let pulls = chain.pulls(velocity);
         let forearm = self.forearm();
         let still = Vector2::zeros();
-        let mut effort = self.tool_and_bar().joint_effort(&assembly.jacobian, &still, tool, 0.0);
+        let mut effort = self.tool_and_bar().joint_effort(&chain.jacobian, &still, tool, 0.0);
         for arm in 0..2 {
             let centre = (tool - pulls[arm]) / 2.0;
-            let rate = &assembly.distal_rates[arm];
-            effort += forearm.joint_effort(&assembly.centre(arm), rate, centre, turning[arm]);
+            let rate = &chain.distal_rates[arm];
+            effort += forearm.joint_effort(&chain.centre(arm), rate, centre, turning[arm]);
         }
         effort
     }
 
-    fn gravity(&self, _assembly: &FiveBarAssembly) -> Joints<2> {
+    fn gravity(&self, _chain: &FiveBarChainState) -> Joints<2> {
         Joints::zeros()
     }
 

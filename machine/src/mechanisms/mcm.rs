@@ -14,13 +14,13 @@ mod dynamics;
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
+use messages::math;
 use nalgebra::{Matrix3, SMatrix, Vector3};
-use signals::math;
 
 use super::polar::center;
 use crate::kinematics::{
-    Attitude, Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind,
-    Mechanism, Pose, ToolMotion, finite,
+    Attitude, Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind,
+    Mechanism, Pose, TaskSpace, ToolMotion, finite,
 };
 use crate::taylor::{Scalar, Taylor};
 use crate::transmission::{self, Elasticity};
@@ -169,7 +169,7 @@ impl Mcm {
     /// Joints that bring the focus to `position` with the beam along the unit vector `axis`, both
     /// in the workpiece's frame. `upright` says that the tool is, and stays so; `passing` gives signed
     /// lean and turn of a beam that passes the vertical, by its x and y in the machine's frame.
-    fn solve<S: Scalar>(
+    fn solve_inverse<S: Scalar>(
         &self,
         [position, axis]: [[S; 3]; 2],
         upright: bool,
@@ -241,12 +241,12 @@ fn planar<S: Scalar>(point: [S; 3]) -> S {
 
 impl Mechanism<5> for Mcm {
     type Branch = McmBranch;
-    type Assembly = Joints<5>;
+    type ChainState = Joints<5>;
 
     const NAME: &'static str = "mcm";
 
-    fn freedom(&self) -> Freedom {
-        Freedom::Axis
+    fn task_space(&self) -> TaskSpace {
+        TaskSpace::Axis
     }
 
     fn branch(&self) -> McmBranch {
@@ -258,7 +258,7 @@ impl Mechanism<5> for Mcm {
         McmBranch { side: sign(q[0]), lean: sign(q[3]) }
     }
 
-    fn assemble(
+    fn solve(
         &self,
         q: &Joints<5>,
         _branch: McmBranch,
@@ -347,7 +347,7 @@ impl Mechanism<5> for Mcm {
         let axis: [f64; 3] = (-pose.rotation.column(2)).into();
         let upright = math::hypot(axis[0], axis[1]) <= UPRIGHT;
         let target = [pose.position.into(), axis];
-        let joints = self.solve(target, upright, |_| None, branch, previous)?;
+        let joints = self.solve_inverse(target, upright, |_| None, branch, previous)?;
         finite(&pose.position)?;
         finite(&pose.rotation.column(2).into_owned())?;
         Ok(Joints::from(joints))
@@ -375,7 +375,8 @@ impl Mechanism<5> for Mcm {
             passed.set(found.is_some());
             found
         };
-        let joints = self.solve([tool.series(), axis], upright, passing, branch, previous)?;
+        let joints =
+            self.solve_inverse([tool.series(), axis], upright, passing, branch, previous)?;
         if lean <= UPRIGHT && !upright && !passed.get() {
             return Err(KinematicsError {
                 code: "singular_axis",

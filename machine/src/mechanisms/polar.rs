@@ -13,12 +13,12 @@ mod dynamics;
 
 use core::f64::consts::FRAC_PI_2;
 
+use messages::math;
 use nalgebra::{Matrix3, Vector3};
-use signals::math;
 
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism,
-    Pose, ToolMotion, finite,
+    Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
+    TaskSpace, ToolMotion, finite,
 };
 use crate::taylor::Scalar;
 use crate::transmission::{self, Elasticity};
@@ -202,12 +202,12 @@ impl Polar {
 
 impl Mechanism<3> for Polar {
     type Branch = PolarBranch;
-    type Assembly = Joints<3>;
+    type ChainState = Joints<3>;
 
     const NAME: &'static str = "polar";
 
-    fn freedom(&self) -> Freedom {
-        Freedom::Space
+    fn task_space(&self) -> TaskSpace {
+        TaskSpace::Space
     }
 
     fn branch(&self) -> PolarBranch {
@@ -220,7 +220,7 @@ impl Mechanism<3> for Polar {
         PolarBranch { side: Some(if arm < 0.0 { -1 } else { 1 }), table_turn: Some(turn) }
     }
 
-    fn assemble(
+    fn solve(
         &self,
         q: &Joints<3>,
         _branch: PolarBranch,
@@ -341,10 +341,6 @@ impl Mechanism<3> for Polar {
 
     fn has_constant_mass(&self) -> bool {
         true
-    }
-
-    fn turns(&self) -> [bool; 3] {
-        [false, self.endless, false]
     }
 
     fn friction(&self, velocity: &Joints<3>) -> Joints<3> {

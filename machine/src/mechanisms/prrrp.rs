@@ -15,8 +15,8 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross};
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism,
-    Pose, ToolMotion, in_plane,
+    Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
+    TaskSpace, ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
 use crate::transmission::{self, Elasticity};
@@ -69,7 +69,7 @@ impl Branch for PrrrpBranch {
 
 /// The linkage at one joint position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PrrrpAssembly {
+pub struct PrrrpChainState {
     /// The tool [m].
     pub tool: Vector2<f64>,
     /// From each cart to the tool [m].
@@ -81,7 +81,7 @@ pub struct PrrrpAssembly {
     side: i32,
 }
 
-impl PrrrpAssembly {
+impl PrrrpChainState {
     /// Accelerations that carts moving evenly at `velocity` [m/s] cause: of the tool [m/s²] and of
     /// the links' angles [rad/s²].
     pub fn even_accelerations(&self, velocity: &Joints<2>) -> (Vector2<f64>, [f64; 2]) {
@@ -169,28 +169,28 @@ impl Prrrp {
 
 impl Mechanism<2> for Prrrp {
     type Branch = PrrrpBranch;
-    type Assembly = PrrrpAssembly;
+    type ChainState = PrrrpChainState;
 
     const NAME: &'static str = "prrrp";
 
-    fn freedom(&self) -> Freedom {
-        Freedom::Plane
+    fn task_space(&self) -> TaskSpace {
+        TaskSpace::Plane
     }
 
     fn branch(&self) -> PrrrpBranch {
         self.branch
     }
 
-    fn branch_of(&self, assembly: &PrrrpAssembly) -> PrrrpBranch {
-        PrrrpBranch { side: assembly.side }
+    fn branch_of(&self, chain: &PrrrpChainState) -> PrrrpBranch {
+        PrrrpBranch { side: chain.side }
     }
 
-    fn assemble(
+    fn solve(
         &self,
         q: &Joints<2>,
         PrrrpBranch { side }: PrrrpBranch,
-        _near: Option<&PrrrpAssembly>,
-    ) -> Result<PrrrpAssembly, KinematicsError> {
+        _near: Option<&PrrrpChainState>,
+    ) -> Result<PrrrpChainState, KinematicsError> {
         let half = (q[1] - q[0]) / 2.0;
         let square = self.link * self.link - half * half;
         // Written so that joints that are not numbers fail too.
@@ -221,19 +221,19 @@ impl Mechanism<2> for Prrrp {
             rate[cart] -= link.x;
             rate / length
         });
-        Ok(PrrrpAssembly { tool, links, jacobian, link_rates, side })
+        Ok(PrrrpChainState { tool, links, jacobian, link_rates, side })
     }
 
-    fn pose(&self, assembly: &PrrrpAssembly) -> Pose {
-        Pose::at(Vector3::new(assembly.tool.x, assembly.tool.y, 0.0))
+    fn pose(&self, chain: &PrrrpChainState) -> Pose {
+        Pose::at(Vector3::new(chain.tool.x, chain.tool.y, 0.0))
     }
 
-    fn jacobian(&self, assembly: &PrrrpAssembly) -> Jacobian<2> {
-        plane::jacobian(&assembly.jacobian)
+    fn jacobian(&self, chain: &PrrrpChainState) -> Jacobian<2> {
+        plane::jacobian(&chain.jacobian)
     }
 
-    fn margins(&self, assembly: &PrrrpAssembly) -> Vec<Margin> {
-        let [first, _] = assembly.links;
+    fn margins(&self, chain: &PrrrpChainState) -> Vec<Margin> {
+        let [first, _] = chain.links;
         vec![
             Margin {
                 name: "type_1",
@@ -273,29 +273,29 @@ impl Mechanism<2> for Prrrp {
 
     // Source 003 eq. 5.7 with 6.7 and 6.8, carts added and 2/m_e read as m_e/2, in independent
     // coordinates: the loop is closed in the velocities, so that no multiplier is left.
-    fn mass_matrix(&self, assembly: &PrrrpAssembly) -> Matrix2<f64> {
+    fn mass_matrix(&self, chain: &PrrrpChainState) -> Matrix2<f64> {
         let link = self.link_body();
-        let mut mass = self.tool_and_bar().joint_mass(&assembly.jacobian, &Vector2::zeros());
+        let mut mass = self.tool_and_bar().joint_mass(&chain.jacobian, &Vector2::zeros());
         for cart in 0..2 {
-            mass += link.joint_mass(&assembly.centre(cart), &assembly.link_rates[cart]);
+            mass += link.joint_mass(&chain.centre(cart), &chain.link_rates[cart]);
             mass[(cart, cart)] += self.cart_mass;
         }
         mass
     }
 
-    fn bias(&self, assembly: &PrrrpAssembly, velocity: &Joints<2>) -> Joints<2> {
-        let (tool, turning) = assembly.even_accelerations(velocity);
+    fn bias(&self, chain: &PrrrpChainState, velocity: &Joints<2>) -> Joints<2> {
+        let (tool, turning) = chain.even_accelerations(velocity);
         let still = Vector2::zeros();
         let link = self.link_body();
-        let mut effort = self.tool_and_bar().joint_effort(&assembly.jacobian, &still, tool, 0.0);
+        let mut effort = self.tool_and_bar().joint_effort(&chain.jacobian, &still, tool, 0.0);
         for (cart, turning) in turning.into_iter().enumerate() {
-            let rate = &assembly.link_rates[cart];
-            effort += link.joint_effort(&assembly.centre(cart), rate, tool / 2.0, turning);
+            let rate = &chain.link_rates[cart];
+            effort += link.joint_effort(&chain.centre(cart), rate, tool / 2.0, turning);
         }
         effort
     }
 
-    fn gravity(&self, _assembly: &PrrrpAssembly) -> Joints<2> {
+    fn gravity(&self, _chain: &PrrrpChainState) -> Joints<2> {
         Joints::zeros()
     }
 

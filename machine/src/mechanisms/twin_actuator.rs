@@ -17,12 +17,12 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
 use crate::kinematics::{
-    Branch, Freedom, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism,
-    Pose, ToolMotion, in_plane,
+    Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
+    TaskSpace, ToolMotion, in_plane,
 };
 use crate::taylor::Scalar;
 use crate::transmission::{self, Elasticity};
-use signals::math;
+use messages::math;
 
 /// The dimensions and masses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -211,23 +211,23 @@ impl TwinActuator {
 
 impl Mechanism<2> for TwinActuator {
     type Branch = TwinBranch;
-    type Assembly = TwinAssembly;
+    type ChainState = TwinAssembly;
 
     const NAME: &'static str = "twin_actuator";
 
-    fn freedom(&self) -> Freedom {
-        Freedom::Plane
+    fn task_space(&self) -> TaskSpace {
+        TaskSpace::Plane
     }
 
     fn branch(&self) -> TwinBranch {
         self.branch
     }
 
-    fn branch_of(&self, assembly: &TwinAssembly) -> TwinBranch {
-        TwinBranch { elbow: assembly.elbow }
+    fn branch_of(&self, chain: &TwinAssembly) -> TwinBranch {
+        TwinBranch { elbow: chain.elbow }
     }
 
-    fn assemble(
+    fn solve(
         &self,
         q: &Joints<2>,
         TwinBranch { elbow }: TwinBranch,
@@ -280,26 +280,26 @@ impl Mechanism<2> for TwinActuator {
         })
     }
 
-    fn pose(&self, assembly: &TwinAssembly) -> Pose {
-        Pose::at(Vector3::new(assembly.tool.x, assembly.tool.y, 0.0))
+    fn pose(&self, chain: &TwinAssembly) -> Pose {
+        Pose::at(Vector3::new(chain.tool.x, chain.tool.y, 0.0))
     }
 
-    fn jacobian(&self, assembly: &TwinAssembly) -> Jacobian<2> {
-        plane::jacobian(&assembly.jacobian)
+    fn jacobian(&self, chain: &TwinAssembly) -> Jacobian<2> {
+        plane::jacobian(&chain.jacobian)
     }
 
-    fn margins(&self, assembly: &TwinAssembly) -> Vec<Margin> {
+    fn margins(&self, chain: &TwinAssembly) -> Vec<Margin> {
         vec![
             Margin {
                 name: "baseline",
                 kind: MarginKind::Parallel,
-                value: assembly.baseline,
+                value: chain.baseline,
                 limit: self.baseline_limit,
             },
             Margin {
                 name: "near_a",
                 kind: MarginKind::Collision,
-                value: assembly.plate.x,
+                value: chain.plate.x,
                 limit: self.near_limit,
             },
         ]
@@ -326,35 +326,35 @@ impl Mechanism<2> for TwinActuator {
         Ok(JointMotion::of_series(&self.lengths(x, y, branch)?))
     }
 
-    fn mass_matrix(&self, assembly: &TwinAssembly) -> Matrix2<f64> {
-        let mut mass = self.tool_body().joint_mass(&assembly.jacobian, &Vector2::zeros());
+    fn mass_matrix(&self, chain: &TwinAssembly) -> Matrix2<f64> {
+        let mut mass = self.tool_body().joint_mass(&chain.jacobian, &Vector2::zeros());
         for (actuator, bodies) in self.bodies.iter().enumerate() {
-            let turning = assembly.turning[actuator];
-            let inertia = bodies.inertia(assembly.lengths[actuator]);
+            let turning = chain.turning[actuator];
+            let inertia = bodies.inertia(chain.lengths[actuator]);
             mass += turning * turning.transpose() * inertia;
             mass[(actuator, actuator)] += bodies.rod_mass;
         }
         mass
     }
 
-    fn bias(&self, assembly: &TwinAssembly, velocity: &Joints<2>) -> Joints<2> {
-        let (tool, turning) = assembly.even_accelerations(velocity);
+    fn bias(&self, chain: &TwinAssembly, velocity: &Joints<2>) -> Joints<2> {
+        let (tool, turning) = chain.even_accelerations(velocity);
         let still = Vector2::zeros();
-        let mut effort = self.tool_body().joint_effort(&assembly.jacobian, &still, tool, 0.0);
+        let mut effort = self.tool_body().joint_effort(&chain.jacobian, &still, tool, 0.0);
         for (actuator, bodies) in self.bodies.iter().enumerate() {
-            let rate = assembly.turning[actuator].dot(velocity);
-            let length = assembly.lengths[actuator];
+            let rate = chain.turning[actuator].dot(velocity);
+            let length = chain.lengths[actuator];
             let moment = bodies.rod_mass * (length - bodies.rod_center);
             // Centrifugal along the rod; Coriolis and the actuator's own turning about the pivot.
             effort[actuator] -= moment * rate * rate;
             let torque = bodies.inertia(length) * turning[actuator]
                 + 2.0 * moment * velocity[actuator] * rate;
-            effort += assembly.turning[actuator] * torque;
+            effort += chain.turning[actuator] * torque;
         }
         effort
     }
 
-    fn gravity(&self, _assembly: &TwinAssembly) -> Joints<2> {
+    fn gravity(&self, _chain: &TwinAssembly) -> Joints<2> {
         Joints::zeros()
     }
 

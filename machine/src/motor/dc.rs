@@ -21,15 +21,41 @@ pub struct DcMotor {
 }
 
 impl DcMotor {
+    /// The voltage that drives `current` [A], changing by `current_rate` [A/s], at `speed` of the shaft
+    /// [rad/s], in V: `R·i + L·i′ + k·ω`. Means over a time give the mean voltage over it.
+    #[inline]
+    pub fn voltage(&self, current: f64, current_rate: f64, speed: f64) -> f64 {
+        self.resistance * current + self.inductance * current_rate + self.torque_constant * speed
+    }
+
+    /// How fast `current` [A] changes under `voltage` [V] at `speed` of the shaft [rad/s], in A/s: the
+    /// inverse of [`Self::voltage`].
+    #[inline]
+    pub fn current_rate(&self, voltage: f64, current: f64, speed: f64) -> f64 {
+        (voltage - self.voltage(current, 0.0, speed)) / self.inductance
+    }
+
+    /// The current at which the winding settles under an even `voltage` [V] at an even `speed` of the
+    /// shaft [rad/s], in A.
+    #[inline]
+    pub fn settled_current(&self, voltage: f64, speed: f64) -> f64 {
+        (voltage - self.torque_constant * speed) / self.resistance
+    }
+
     /// Speed at which the back-EMF takes the whole supply [rad/s].
     pub fn no_load_speed(&self) -> f64 {
         self.voltage / self.torque_constant
     }
 
+    /// Torque at the power stage's largest current [N·m].
+    pub fn largest_torque(&self) -> f64 {
+        self.torque_constant * self.current
+    }
+
     /// Torque at standstill: what the power stage's current gives, or what the supply drives
     /// through the winding, whichever is less [N·m].
     pub fn stall_torque(&self) -> f64 {
-        self.torque_constant * self.current.min(self.voltage / self.resistance)
+        self.torque_constant * self.current.min(self.settled_current(self.voltage, 0.0))
     }
 
     /// Time over which the heating of a winding is averaged [s]; short against a real winding's.
@@ -65,12 +91,23 @@ mod tests {
     }
 
     #[test]
+    fn voltage_and_current_are_inverses() {
+        // 2.3 Ω·2 A + 2.3 mH·1000 A/s + 0.021 V·s/rad·100 rad/s.
+        let voltage = MOTOR.voltage(2.0, 1000.0, 100.0);
+        assert!((voltage - (4.6 + 2.3 + 2.1)).abs() < 1e-12, "{voltage}");
+        assert!((MOTOR.current_rate(voltage, 2.0, 100.0) - 1000.0).abs() < 1e-9);
+        let even = MOTOR.voltage(2.0, 0.0, 100.0);
+        assert!((MOTOR.settled_current(even, 100.0) - 2.0).abs() < 1e-12);
+        assert!(MOTOR.settled_current(12.0, MOTOR.no_load_speed()).abs() < 1e-12);
+    }
+
+    #[test]
     fn heating_tends_to_the_square_of_the_current() {
         let mut heat = 0.0;
         for _ in 0..5000 {
             heat = DcMotor::heated(heat, 2.0, 1e-3, 5.0);
         }
         // One time constant: 1 − (1 − T/τ)^5000.
-        assert!((heat / 4.0 - (1.0 - signals::math::exp(-1.0))).abs() < 1e-4, "{heat}");
+        assert!((heat / 4.0 - (1.0 - messages::math::exp(-1.0))).abs() < 1e-4, "{heat}");
     }
 }

@@ -17,7 +17,7 @@
 
 use core::f64::consts::{FRAC_PI_2, TAU};
 
-use signals::math;
+use messages::math;
 
 /// Full steps in one electrical period of two phases.
 const STEPS_PER_PERIOD: f64 = 4.0;

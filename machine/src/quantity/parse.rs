@@ -6,7 +6,7 @@ use core::ops::Range;
 use super::kind::{Kind, NAMES};
 use super::unit::{Dimension, find, nearest};
 
-/// Why a text is not the quantity that is due.
+/// Why a text is not the quantity that is needed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct QuantityError {
     /// What went wrong.
@@ -61,7 +61,7 @@ impl QuantityError {
         self.help.as_deref()
     }
 
-    /// Adds what is due where the text alone could not tell.
+    /// Adds what is needed where the text alone could not tell.
     pub(super) fn due<K: Kind>(mut self) -> Self {
         if self.help.is_none() {
             self.help = Some(format!("write {} such as \"{}\"", K::NAME, K::EXAMPLE));
@@ -74,13 +74,13 @@ impl QuantityError {
             Self::new(
                 QuantityErrorKind::NoUnit,
                 0..text.len(),
-                format!("`{}` has no unit, {} is due", text.trim(), K::NAME),
+                format!("`{}` has no unit, but {} is needed", text.trim(), K::NAME),
             )
         } else {
             Self::new(
                 QuantityErrorKind::WrongDimension,
                 0..text.len(),
-                format!("`{}` is {}, {} is due", text.trim(), name_of(dimension), K::NAME),
+                format!("`{}` is {}, but {} is needed", text.trim(), name_of(dimension), K::NAME),
             )
         };
         error.due::<K>()
@@ -90,7 +90,7 @@ impl QuantityError {
         Self::new(
             QuantityErrorKind::WrongDimension,
             0..text.len(),
-            format!("`{}` is {}, a share is due", text.trim(), name_of(dimension)),
+            format!("`{}` is {}, but a share is needed", text.trim(), name_of(dimension)),
         )
     }
 

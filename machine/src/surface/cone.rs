@@ -1,6 +1,6 @@
 //! Frustums of cones, and cylinders (source 002, projection onto the workpiece).
 
-use signals::math;
+use messages::math;
 
 use super::{EDGE_TOLERANCE, Spot, off_surface};
 use crate::kinematics::KinematicsError;

@@ -2,7 +2,7 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use machine::kinematics::{Freedom, Joints};
+use machine::kinematics::{Joints, TaskSpace};
 use machine::mechanisms::serial::{JointKind, Link, Serial};
 use machine::transmission::Elasticity;
 use machine::{Mechanism, Pose};
@@ -29,7 +29,7 @@ fn link(kind: JointKind, twist: f64, length: f64, offset: f64, limits: [f64; 2])
     }
 }
 
-fn chain<const N: usize>(freedom: Freedom, links: [Link; N]) -> Serial<N> {
+fn chain<const N: usize>(task_space: TaskSpace, links: [Link; N]) -> Serial<N> {
     Serial {
         base: Pose {
             position: Vector3::new(0.1, -0.2, 0.3),
@@ -40,7 +40,7 @@ fn chain<const N: usize>(freedom: Freedom, links: [Link; N]) -> Serial<N> {
             position: Vector3::new(0.03, 0.02, 0.11),
             rotation: Rotation3::from_euler_angles(0.3, 0.6, -0.2).into_inner(),
         },
-        freedom,
+        task_space,
         gravity: Vector3::new(0.0, 0.0, -9.806_65),
         elasticity: Some([GEAR; N]),
     }
@@ -55,8 +55,8 @@ fn easily<const N: usize>(
     move |random| {
         loop {
             let q = random.joints(ranges);
-            let assembly = arm.assemble(&q, (), None).unwrap();
-            if arm.margins(&assembly)[0].value > 0.03 {
+            let state = arm.solve(&q, (), None).unwrap();
+            if arm.margins(&state)[0].value > 0.03 {
                 return q;
             }
         }
@@ -71,7 +71,7 @@ use JointKind::{Prismatic, Revolute};
 #[test]
 fn a_planar_arm_conforms() {
     let mut arm = chain(
-        Freedom::Plane,
+        TaskSpace::Plane,
         [link(Revolute, 0.0, 0.0, 0.0, TURN), link(Revolute, 0.0, 0.3, 0.0, TURN)],
     );
     arm.base = Pose::at(Vector3::new(0.1, -0.2, 0.0));
@@ -82,7 +82,7 @@ fn a_planar_arm_conforms() {
 #[test]
 fn a_chain_with_a_slide_conforms() {
     let arm = chain(
-        Freedom::Space,
+        TaskSpace::Space,
         [
             link(Revolute, 0.0, 0.0, 0.2, TURN),
             link(Revolute, -FRAC_PI_2, 0.05, 0.1, TURN),
@@ -95,7 +95,7 @@ fn a_chain_with_a_slide_conforms() {
 #[test]
 fn a_redundant_chain_conforms() {
     let arm = chain(
-        Freedom::Space,
+        TaskSpace::Space,
         [
             link(Revolute, 0.0, 0.0, 0.2, TURN),
             link(Revolute, -FRAC_PI_2, 0.05, 0.0, TURN),
@@ -109,7 +109,7 @@ fn a_redundant_chain_conforms() {
 #[test]
 fn a_chain_that_directs_its_beam_conforms() {
     let arm = chain(
-        Freedom::Axis,
+        TaskSpace::Axis,
         [
             link(Prismatic, 0.0, 0.0, 0.2, SLIDE),
             link(Prismatic, -FRAC_PI_2, 0.05, 0.0, SLIDE),
@@ -128,7 +128,7 @@ fn a_chain_that_directs_its_beam_conforms() {
 #[test]
 fn a_six_axis_arm_conforms() {
     let arm = chain(
-        Freedom::Pose,
+        TaskSpace::Pose,
         [
             link(Revolute, 0.0, 0.0, 0.0, TURN),
             link(Revolute, -FRAC_PI_2, 0.0, 0.15, TURN),

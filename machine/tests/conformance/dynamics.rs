@@ -16,8 +16,8 @@ pub(crate) fn efforts<const N: usize, M: Mechanism<N>>(
 ) {
     let (branch, still) = (mechanism.branch(), Joints::<N>::zeros());
     let JointMotion { position: q, velocity, acceleration, .. } = *motion;
-    let assembly = mechanism.assemble(&q, branch, None).unwrap();
-    let mass = mechanism.mass_matrix(&assembly);
+    let chain = mechanism.solve(&q, branch, None).unwrap();
+    let mass = mechanism.mass_matrix(&chain);
     let heaviest = mass.amax();
     near((mass - mass.transpose()).amax(), 0.0, 1e-14, heaviest, context);
     let Some(factors) = mass.cholesky() else {
@@ -25,30 +25,29 @@ pub(crate) fn efforts<const N: usize, M: Mechanism<N>>(
     };
 
     // Column by column: inverse dynamics of a unit acceleration at rest, without gravity.
-    let held = mechanism.inverse_dynamics(&assembly, &still, &still);
-    let gravity = mechanism.gravity(&assembly);
+    let held = mechanism.inverse_dynamics(&chain, &still, &still);
+    let gravity = mechanism.gravity(&chain);
     near((held - gravity).amax(), 0.0, 1e-12, gravity.amax(), context);
     for column in 0..N {
         let mut unit = still;
         unit[column] = 1.0;
-        let effort = mechanism.inverse_dynamics(&assembly, &still, &unit) - held;
+        let effort = mechanism.inverse_dynamics(&chain, &still, &unit) - held;
         let scale = heaviest.max(gravity.amax());
         near((effort - mass.column(column)).amax(), 0.0, 1e-12, scale, context);
     }
 
     // Forward dynamics of the inverse's efforts.
-    let effort = mechanism.inverse_dynamics(&assembly, &velocity, &acceleration);
-    let back = factors.solve(&(effort - mechanism.bias(&assembly, &velocity)));
+    let effort = mechanism.inverse_dynamics(&chain, &velocity, &acceleration);
+    let back = factors.solve(&(effort - mechanism.bias(&chain, &velocity)));
     near((back - acceleration).amax(), 0.0, 1e-9, acceleration.amax(), context);
 
     // What moving adds to the bias goes with the square of the speed.
-    let moving = mechanism.bias(&assembly, &velocity) - gravity;
-    let faster = mechanism.bias(&assembly, &(velocity * -2.0)) - gravity;
+    let moving = mechanism.bias(&chain, &velocity) - gravity;
+    let faster = mechanism.bias(&chain, &(velocity * -2.0)) - gravity;
     near((faster - moving * 4.0).amax(), 0.0, 1e-10, moving.amax() + gravity.amax(), context);
 
     // Gravity has a potential: the derivatives of its efforts are symmetric.
-    let at =
-        |q: Joints<N>| mechanism.gravity(&mechanism.assemble(&q, branch, Some(&assembly)).unwrap());
+    let at = |q: Joints<N>| mechanism.gravity(&mechanism.solve(&q, branch, Some(&chain)).unwrap());
     let across = |joint: usize| {
         slope(STEP, |step| {
             let mut moved = q;
@@ -72,16 +71,16 @@ pub(crate) fn power<const N: usize, M: Mechanism<N>>(
     context: &str,
 ) {
     let branch = mechanism.branch();
-    let assembly = mechanism.assemble(&motion.position, branch, None).unwrap();
+    let chain = mechanism.solve(&motion.position, branch, None).unwrap();
     let energy = |t: f64| {
         let q = motion.position + motion.velocity * t + motion.acceleration * (t * t / 2.0);
         let velocity = motion.velocity + motion.acceleration * t;
-        let there = mechanism.assemble(&q, branch, Some(&assembly)).unwrap();
+        let there = mechanism.solve(&q, branch, Some(&chain)).unwrap();
         SVector::from([velocity.dot(&(mechanism.mass_matrix(&there) * velocity)) / 2.0])
     };
     let change = slope(STEP, energy)[0];
-    let effort = mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
-    let lifting = mechanism.gravity(&assembly).dot(&motion.velocity);
+    let effort = mechanism.inverse_dynamics(&chain, &motion.velocity, &motion.acceleration);
+    let lifting = mechanism.gravity(&chain).dot(&motion.velocity);
     let scale = effort.abs().dot(&motion.velocity.abs());
     near(effort.dot(&motion.velocity), change + lifting, 1e-7, scale, context);
 }
@@ -95,17 +94,17 @@ pub(crate) fn free_motion<const N: usize, M: Mechanism<N>>(
     // A lively fall needs so short a step: the error of the integration goes with its fourth power.
     const STEP: f64 = 5e-4;
     let branch = mechanism.branch();
-    let mut assembly = mechanism.assemble(&motion.position, branch, None).unwrap();
+    let mut chain = mechanism.solve(&motion.position, branch, None).unwrap();
     let (mut q, mut velocity, mut work) = (motion.position, motion.velocity, 0.0);
-    let kinetic = |assembly: &M::Assembly, velocity: &Joints<N>| {
-        velocity.dot(&(mechanism.mass_matrix(assembly) * velocity)) / 2.0
+    let kinetic = |chain: &M::ChainState, velocity: &Joints<N>| {
+        velocity.dot(&(mechanism.mass_matrix(chain) * velocity)) / 2.0
     };
-    let start = kinetic(&assembly, &velocity);
+    let start = kinetic(&chain, &velocity);
     let mut largest = start;
     for _ in 0..20_000 {
         // Rates of joints, velocity, and work against gravity.
         let rates = |q: Joints<N>, velocity: Joints<N>| {
-            let there = mechanism.assemble(&q, branch, Some(&assembly)).ok()?;
+            let there = mechanism.solve(&q, branch, Some(&chain)).ok()?;
             if !clear(mechanism, &there, 1.5) {
                 return None;
             }
@@ -124,9 +123,9 @@ pub(crate) fn free_motion<const N: usize, M: Mechanism<N>>(
         q += (first.0 + (second.0 + third.0) * 2.0 + fourth.0) * (STEP / 6.0);
         velocity += (first.1 + (second.1 + third.1) * 2.0 + fourth.1) * (STEP / 6.0);
         work += (first.2 + (second.2 + third.2) * 2.0 + fourth.2) * (STEP / 6.0);
-        let Ok(there) = mechanism.assemble(&q, branch, Some(&assembly)) else { break };
-        assembly = there;
-        let energy = kinetic(&assembly, &velocity);
+        let Ok(there) = mechanism.solve(&q, branch, Some(&chain)) else { break };
+        chain = there;
+        let energy = kinetic(&chain, &velocity);
         largest = largest.max(energy);
         let gained = energy + work - start;
         assert!(gained.abs() <= 1e-6 * largest, "gained {gained:e} of {largest:e}, {context}");

@@ -46,14 +46,14 @@ fn five_bar(working_mode: [i32; 2], assembly_mode: i32) -> FiveBar {
 
 #[test]
 fn the_five_bar_conforms_in_every_working_mode() {
-    for (mode, assembly, height, half) in [
+    for (mode, chain, height, half) in [
         ([1, -1], 1, 0.3, 0.05),
         ([-1, 1], -1, -0.3, 0.05),
         ([-1, 1], -1, 0.3, 0.05),
         ([1, 1], 1, 0.3, 0.02),
         ([-1, -1], 1, 0.3, 0.02),
     ] {
-        let mechanism = five_bar(mode, assembly);
+        let mechanism = five_bar(mode, chain);
         conforms(&mechanism, &[mechanism.branch], over(mechanism, [0.01, height], half));
     }
 }
@@ -112,7 +112,7 @@ fn the_five_bars_angles_are_continuous_round_a_motor() {
     let mut first = None;
     for step in 0..=2000 {
         let turn = f64::from(step) / 1000.0 * core::f64::consts::TAU;
-        let (sine, cosine) = signals::math::sin_cos(turn);
+        let (sine, cosine) = messages::math::sin_cos(turn);
         let pose = Pose::at(Vector3::new(cosine, sine, 0.0) * 0.3);
         let q = mechanism.inverse(&pose, mechanism.branch, &previous).unwrap();
         if let Some(start) = first {

@@ -1,9 +1,9 @@
 //! Repeatable states and motions, and the differences that check derivatives.
 
-use machine::kinematics::{Attitude, Freedom, Joints, ToolMotion};
+use machine::kinematics::{Attitude, Joints, TaskSpace, ToolMotion};
 use machine::{Mechanism, Pose};
+use messages::random::SplitMix64;
 use nalgebra::{SVector, Vector3};
-use signals::random::SplitMix64;
 
 /// Repeatable numbers from -1 to 1.
 pub(crate) struct Random(SplitMix64);
@@ -30,14 +30,14 @@ impl Random {
     }
 
     /// A lively motion through `pose`, as far as `freedom` lets the tool move.
-    pub(crate) fn motion(&mut self, pose: &Pose, freedom: Freedom) -> ToolMotion {
-        let flat = |vector: Vector3<f64>| match freedom {
-            Freedom::Plane => Vector3::new(vector.x, vector.y, 0.0),
+    pub(crate) fn motion(&mut self, pose: &Pose, task_space: TaskSpace) -> ToolMotion {
+        let flat = |vector: Vector3<f64>| match task_space {
+            TaskSpace::Plane => Vector3::new(vector.x, vector.y, 0.0),
             _ => vector,
         };
-        let turning = match freedom {
-            Freedom::Plane | Freedom::Space => 0.0,
-            Freedom::Axis | Freedom::Pose => 1.0,
+        let turning = match task_space {
+            TaskSpace::Plane | TaskSpace::Space => 0.0,
+            TaskSpace::Axis | TaskSpace::Pose => 1.0,
         };
         ToolMotion {
             position: pose.position,
@@ -93,43 +93,43 @@ pub(crate) fn slope<const D: usize>(
 }
 
 /// The part of a vector that turns the tool as `freedom` counts it.
-pub(crate) fn counted(freedom: Freedom, pose: &Pose, turning: &Vector3<f64>) -> Vector3<f64> {
+pub(crate) fn counted(task_space: TaskSpace, pose: &Pose, turning: &Vector3<f64>) -> Vector3<f64> {
     let axis = pose.rotation.column(2).into_owned();
-    match freedom {
-        Freedom::Plane | Freedom::Space => Vector3::zeros(),
-        Freedom::Axis => turning - axis * axis.dot(turning),
-        Freedom::Pose => *turning,
+    match task_space {
+        TaskSpace::Plane | TaskSpace::Space => Vector3::zeros(),
+        TaskSpace::Axis => turning - axis * axis.dot(turning),
+        TaskSpace::Pose => *turning,
     }
 }
 
 /// How far `found` is from `wanted` in what the freedom counts [m or rad].
-pub(crate) fn distance(freedom: Freedom, found: &Pose, wanted: &Pose) -> f64 {
+pub(crate) fn distance(task_space: TaskSpace, found: &Pose, wanted: &Pose) -> f64 {
     let turned = found.rotation - wanted.rotation;
-    let turned = match freedom {
-        Freedom::Plane | Freedom::Space => 0.0,
-        Freedom::Axis => turned.column(2).amax(),
-        Freedom::Pose => turned.amax(),
+    let turned = match task_space {
+        TaskSpace::Plane | TaskSpace::Space => 0.0,
+        TaskSpace::Axis => turned.column(2).amax(),
+        TaskSpace::Pose => turned.amax(),
     };
     (found.position - wanted.position).norm().max(turned)
 }
 
 /// The numbers of a pose that a mechanism can choose.
-pub(crate) fn rows(freedom: Freedom) -> usize {
-    match freedom {
-        Freedom::Plane => 2,
-        Freedom::Space => 3,
-        Freedom::Axis => 5,
-        Freedom::Pose => 6,
+pub(crate) fn rows(task_space: TaskSpace) -> usize {
+    match task_space {
+        TaskSpace::Plane => 2,
+        TaskSpace::Space => 3,
+        TaskSpace::Axis => 5,
+        TaskSpace::Pose => 6,
     }
 }
 
-/// Whether every margin at `assembly` is at least `times` what it must keep.
+/// Whether every margin of the solved chain is at least `times` what it must keep.
 pub(crate) fn clear<const N: usize, M: Mechanism<N>>(
     mechanism: &M,
-    assembly: &M::Assembly,
+    chain: &M::ChainState,
     times: f64,
 ) -> bool {
-    mechanism.margins(assembly).iter().all(|margin| margin.value > times * margin.limit)
+    mechanism.margins(chain).iter().all(|margin| margin.value > times * margin.limit)
 }
 
 /// `found` against `expected`, as a share of the larger of `scale` and 1.

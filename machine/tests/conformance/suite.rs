@@ -1,6 +1,6 @@
 //! What every mechanism must do, whatever it is: independent routes to the same numbers.
 
-use machine::kinematics::{Freedom, JointMotion, Joints, ToolMotion};
+use machine::kinematics::{JointMotion, Joints, TaskSpace, ToolMotion};
 use machine::{Mechanism, Pose};
 use nalgebra::{SVector, Vector3};
 
@@ -33,11 +33,11 @@ pub(crate) fn conforms<const N: usize, M: Mechanism<N>>(
         tries += 1;
         assert!(tries <= 20 * CASES, "{}: hardly a state of the sampler is of use", M::NAME);
         let q = joints(&mut random);
-        let Ok(assembly) = mechanism.assemble(&q, mechanism.branch(), None) else { continue };
-        if !clear(mechanism, &assembly, 1.2) {
+        let Ok(state) = mechanism.solve(&q, mechanism.branch(), None) else { continue };
+        if !clear(mechanism, &state, 1.2) {
             continue;
         }
-        let tool = random.motion(&mechanism.pose(&assembly), mechanism.freedom());
+        let tool = random.motion(&mechanism.pose(&state), mechanism.task_space());
         let context = format!("{} case {cases}: {q:?} {tool:?}", M::NAME);
         positions(mechanism, &q, &tool.pose(), &context);
         for (branch, taken) in branches.iter().zip(&mut taken) {
@@ -70,19 +70,19 @@ fn positions<const N: usize, M: Mechanism<N>>(
     let beside = q.map(|joint| joint + 1e-3);
     let found = mechanism.inverse(pose, branch, &beside).unwrap();
     let back = mechanism.forward(&found, branch).unwrap();
-    near(distance(mechanism.freedom(), &back, pose), 0.0, 2e-12, 1.0, context);
+    near(distance(mechanism.task_space(), &back, pose), 0.0, 2e-12, 1.0, context);
     // A redundant chain may take other joints to the same place.
-    if N <= rows(mechanism.freedom()) {
+    if N <= rows(mechanism.task_space()) {
         near((found - q).amax(), 0.0, 1e-10, 1.0, context);
     }
     // The short ways lead to the same: to the bit, and to where an iteration ends.
-    let solved = mechanism.assemble(&found, branch, None).unwrap();
+    let solved = mechanism.solve(&found, branch, None).unwrap();
     assert_eq!(back, mechanism.pose(&solved), "{context}");
     let along = mechanism.locate(&beside, branch, Some(&solved));
-    let assembled = mechanism.assemble(&beside, branch, Some(&solved));
-    assert_eq!(along, assembled.map(|chain| mechanism.pose(&chain)), "{context}");
-    let known = mechanism.assemble_at(pose, &found, branch, None).unwrap();
-    near(distance(Freedom::Pose, &mechanism.pose(&known), &back), 0.0, 2e-12, 1.0, context);
+    let found_beside = mechanism.solve(&beside, branch, Some(&solved));
+    assert_eq!(along, found_beside.map(|chain| mechanism.pose(&chain)), "{context}");
+    let known = mechanism.solve_at(pose, &found, branch, None).unwrap();
+    near(distance(TaskSpace::Pose, &mechanism.pose(&known), &back), 0.0, 2e-12, 1.0, context);
     let again = mechanism.inverse(&back, branch, &found).unwrap();
     near((again - found).amax(), 0.0, 1e-10, 1.0, context);
 }
@@ -98,7 +98,7 @@ fn solves<const N: usize, M: Mechanism<N>>(
     match mechanism.inverse(pose, branch, q) {
         Ok(found) => {
             let back = mechanism.forward(&found, branch).unwrap();
-            near(distance(mechanism.freedom(), &back, pose), 0.0, 2e-12, 1.0, context);
+            near(distance(mechanism.task_space(), &back, pose), 0.0, 2e-12, 1.0, context);
             true
         }
         Err(error) => {
@@ -111,14 +111,14 @@ fn solves<const N: usize, M: Mechanism<N>>(
 /// The Jacobian against differences of the forward kinematics, linear and angular.
 fn jacobian<const N: usize, M: Mechanism<N>>(mechanism: &M, q: &Joints<N>, context: &str) {
     let branch = mechanism.branch();
-    let assembly = mechanism.assemble(q, branch, None).unwrap();
-    let jacobian = mechanism.jacobian(&assembly);
-    let rotation = mechanism.pose(&assembly).rotation;
+    let state = mechanism.solve(q, branch, None).unwrap();
+    let jacobian = mechanism.jacobian(&state);
+    let rotation = mechanism.pose(&state).rotation;
     for column in 0..N {
         let difference: SVector<f64, 6> = slope(STEP, |step| {
             let mut moved = *q;
             moved[column] += step;
-            let moved = mechanism.assemble(&moved, branch, Some(&assembly)).unwrap();
+            let moved = mechanism.solve(&moved, branch, Some(&state)).unwrap();
             let pose = mechanism.pose(&moved);
             // R(q + δ)·Rᵀ is 1 + φ× to first order, and its odd part is sin φ.
             let turn = pose.rotation * rotation.transpose();
@@ -144,9 +144,9 @@ fn motion<const N: usize, M: Mechanism<N>>(
     tool: &ToolMotion,
     context: &str,
 ) -> JointMotion<N> {
-    let (branch, freedom) = (mechanism.branch(), mechanism.freedom());
+    let (branch, task_space) = (mechanism.branch(), mechanism.task_space());
     let motion = mechanism.joint_motion(tool, branch, q).unwrap();
-    if N <= rows(freedom) {
+    if N <= rows(task_space) {
         near((motion.position - q).amax(), 0.0, 1e-10, 1.0, context);
     }
 
@@ -162,16 +162,16 @@ fn motion<const N: usize, M: Mechanism<N>>(
     check(&motion.jerk, slope(instant, |t| at(t).acceleration), "jerk");
 
     // The tool's velocity is J·q̇, and its acceleration J·q̈ + J̇·q̇.
-    let assembly = mechanism.assemble(&motion.position, branch, None).unwrap();
-    let pose = mechanism.pose(&assembly);
-    let jacobian = mechanism.jacobian(&assembly);
+    let state = mechanism.solve(&motion.position, branch, None).unwrap();
+    let pose = mechanism.pose(&state);
+    let jacobian = mechanism.jacobian(&state);
     let tool_rate = |t: f64| {
         let moved = motion.position
             + motion.velocity * t
             + motion.acceleration * (t * t / 2.0)
             + motion.jerk * (t * t * t / 6.0);
         let rate = motion.velocity + motion.acceleration * t + motion.jerk * (t * t / 2.0);
-        let moved = mechanism.assemble(&moved, branch, Some(&assembly)).unwrap();
+        let moved = mechanism.solve(&moved, branch, Some(&state)).unwrap();
         mechanism.jacobian(&moved) * rate
     };
     let split = |rates: SVector<f64, 6>| {
@@ -179,7 +179,7 @@ fn motion<const N: usize, M: Mechanism<N>>(
     };
     let (linear, angular) = split(jacobian * motion.velocity);
     let turned = |wanted: &Vector3<f64>, found: &Vector3<f64>| {
-        counted(freedom, &pose, &(wanted - found)).amax()
+        counted(task_space, &pose, &(wanted - found)).amax()
     };
     near((linear - tool.velocity).amax(), 0.0, 1e-10, 1.0, context);
     near(turned(&tool.attitude.velocity, &angular), 0.0, 1e-10, 1.0, context);
@@ -191,7 +191,7 @@ fn motion<const N: usize, M: Mechanism<N>>(
     let axis = pose.rotation.column(2).into_owned();
     let bend = |spin: &Vector3<f64>, rate: &Vector3<f64>| {
         let swing = axis.cross(&spin.cross(&spin.cross(&axis)));
-        counted(freedom, &pose, rate) + counted(freedom, &pose, &swing)
+        counted(task_space, &pose, rate) + counted(task_space, &pose, &swing)
     };
     let wanted = bend(&tool.attitude.velocity, &tool.attitude.acceleration);
     near((wanted - bend(&angular, &angular_rate)).amax(), 0.0, 1e-6, scale, context);
@@ -205,15 +205,15 @@ fn refusals<const N: usize, M: Mechanism<N>>(
     tool: &ToolMotion,
     context: &str,
 ) {
-    let (branch, freedom) = (mechanism.branch(), mechanism.freedom());
-    let lengths = rows(freedom).min(3);
+    let (branch, task_space) = (mechanism.branch(), mechanism.task_space());
+    let lengths = rows(task_space).min(3);
     for row in 0..lengths {
         let mut far = *tool;
         far.position[row] += 1e3;
         match mechanism.inverse(&far.pose(), branch, q) {
             Ok(found) => {
                 let there = mechanism.forward(&found, branch).unwrap();
-                near(distance(freedom, &there, &far.pose()), 0.0, 1e-11, 1e3, context);
+                near(distance(task_space, &there, &far.pose()), 0.0, 1e-11, 1e3, context);
             }
             Err(error) => {
                 assert!(error.value.is_finite() && error.limit.is_finite(), "{error:?} {context}");
@@ -226,7 +226,7 @@ fn refusals<const N: usize, M: Mechanism<N>>(
         assert!(mechanism.inverse(&nowhere.pose(), branch, q).is_err(), "{context}");
         assert!(mechanism.joint_motion(&nowhere, branch, q).is_err(), "{context}");
     }
-    if rows(freedom) > 3 {
+    if rows(task_space) > 3 {
         let mut nowhere = *tool;
         nowhere.attitude.rotation[(0, 2)] = f64::NAN;
         assert!(mechanism.inverse(&nowhere.pose(), branch, q).is_err(), "{context}");

@@ -3,8 +3,8 @@
 use machine::Mechanism;
 use machine::kinematics::Joints;
 use machine::mechanisms::{FiveBar, FiveBarBranch};
+use messages::math;
 use nalgebra::{Matrix2, Vector2};
-use signals::math;
 
 use super::{only_corrected, slope};
 
@@ -66,14 +66,14 @@ fn the_jacobian_is_that_of_two_circles() {
         + y * (c1 - c2)
         + PROXIMAL * math::sin(angles[0] - angles[1]);
     let machine = machine();
-    let assembly = machine.assemble(&Joints::from(angles), machine.branch, None).unwrap();
+    let chain = machine.solve(&Joints::from(angles), machine.branch, None).unwrap();
     for axis in 0..2 {
         for arm in 0..2 {
             let truth = column(arm, axis);
             only_corrected("5.3", truth, right[(axis, arm)], printed[(axis, arm)], 1e-8);
             let printed = out(1.0, BASE)[(axis, arm)] * -determinant / sigma;
             only_corrected("5.6", truth, out(PROXIMAL, -BASE)[(axis, arm)], printed, 1e-8);
-            assert!((machine.jacobian(&assembly)[(axis, arm)] - truth).abs() < 1e-9);
+            assert!((machine.jacobian(&chain)[(axis, arm)] - truth).abs() < 1e-9);
         }
     }
 }
@@ -83,8 +83,7 @@ fn the_jacobian_is_that_of_two_circles() {
 fn forearms_in_line_are_singular() {
     let machine = FiveBar { half_base: 0.07, ..machine() };
     let first = 2.9;
-    let at =
-        |second: f64| machine.assemble(&Joints::from([first, second]), machine.branch, None).ok();
+    let at = |second: f64| machine.solve(&Joints::from([first, second]), machine.branch, None).ok();
     // Halving for the angle at which the elbows are two forearms apart: nothing is symmetric there.
     let (mut low, mut high) = (0.3, 1.2);
     for _ in 0..50 {
@@ -92,11 +91,11 @@ fn forearms_in_line_are_singular() {
         if at(middle).is_some() { high = middle } else { low = middle }
     }
     assert!((first + high - core::f64::consts::PI).abs() > 0.1);
-    let look = |away: f64| {
-        let assembly = at(high + away).unwrap();
-        (machine.margins(&assembly)[1].value, machine.jacobian(&assembly).amax())
+    let measure = |away: f64| {
+        let chain = at(high + away).unwrap();
+        (machine.margins(&chain)[1].value, machine.jacobian(&chain).amax())
     };
-    let [(near, fast), (far, slow)] = [look(1e-6), look(1e-2)];
+    let [(near, fast), (far, slow)] = [measure(1e-6), measure(1e-2)];
     assert!(near < 0.01 && far > 0.1, "{near} {far}");
     // The tool's speed per turn grows as the margin falls.
     assert!((fast * near / (slow * far) - 1.0).abs() < 0.2, "{fast} {slow}");

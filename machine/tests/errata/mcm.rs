@@ -1,7 +1,7 @@
-//! Source 002; its eq. 10 and 14 are in `machine/tests/mcm.rs` and `machine/tests/surfaces.rs`.
+//! Source 002; its eq. 10 and 14 are in `machine/tests/mcm.rs` and `machine/tests/surfaces/main.rs`.
 
 use machine::surface::{Cone, Placement, Projection, Shape, Surface};
-use signals::math;
+use messages::math;
 
 use super::only_corrected;
 

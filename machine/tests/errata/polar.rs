@@ -3,8 +3,8 @@
 use machine::kinematics::Joints;
 use machine::mechanisms::polar::{PolarBranch, PolarLoad};
 use machine::{Mechanism, Polar};
+use messages::math;
 use nalgebra::{Rotation3, Vector2, Vector3};
-use signals::math;
 
 use super::{only_corrected, slope};
 

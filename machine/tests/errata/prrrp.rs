@@ -64,8 +64,8 @@ fn the_mechanism_is_isotropic_at_the_link_over_root_2() {
     // Halving for the place where both singular values are the same.
     let uneven = |x: f64| {
         let half = (LINK * LINK - x * x).sqrt();
-        let assembly = machine.assemble(&Joints::from([-half, half]), machine.branch, None);
-        let jacobian = machine.jacobian(&assembly.unwrap());
+        let chain = machine.solve(&Joints::from([-half, half]), machine.branch, None);
+        let jacobian = machine.jacobian(&chain.unwrap());
         jacobian[(0, 0)].abs() - jacobian[(1, 0)].abs()
     };
     let (mut low, mut high) = (0.1 * LINK, 0.9 * LINK);

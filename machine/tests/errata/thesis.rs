@@ -6,8 +6,8 @@ use machine::Mechanism;
 use machine::kinematics::Joints;
 use machine::mechanisms::CoreXy;
 use machine::transmission::{in_series, screw};
+use messages::math;
 use nalgebra::Vector2;
-use signals::math;
 
 use super::only_corrected;
 
@@ -166,9 +166,9 @@ fn a_diagonal_takes_half_of_what_is_printed() {
     let (mass, acceleration) = ([0.33, 1.06], [10.0, 10.0]);
     let machine = CoreXy { mass, elasticity: None };
     let q = Joints::from([0.1, 0.0]);
-    let assembly = machine.assemble(&q, (), None).unwrap();
+    let chain = machine.solve(&q, (), None).unwrap();
     // Joints are the belts' travels: along x = y the second one stands.
-    let efforts = machine.inverse_dynamics(&assembly, &Joints::zeros(), &Joints::from([20.0, 0.0]));
+    let efforts = machine.inverse_dynamics(&chain, &Joints::zeros(), &Joints::from([20.0, 0.0]));
     let speed = 0.2;
     let power = (mass[0] * acceleration[0] + mass[1] * acceleration[1]) * speed;
     // The motor turns by the belt's travel, twice that of x.

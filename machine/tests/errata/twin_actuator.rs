@@ -3,8 +3,8 @@
 use core::f64::consts::PI;
 
 use machine::pulses::{PulseScale, nearest};
+use messages::math;
 use nalgebra::Vector2;
-use signals::math;
 
 use super::only_corrected;
 

@@ -7,9 +7,9 @@ pub mod loads;
 
 use machine::kinematics::{Attitude, Joints, KinematicsError, ToolMotion};
 use machine::{Mechanism, Pose};
+use messages::random::SplitMix64;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
-use signals::random::SplitMix64;
 
 pub fn golden(name: &str) -> Value {
     let path = format!("{}/../tests/golden/{name}.json", env!("CARGO_MANIFEST_DIR"));
@@ -128,9 +128,9 @@ fn jacobian<const N: usize, M: Mechanism<N>>(
     q: &Joints<N>,
     context: &str,
 ) {
-    let assembly = mechanism.assemble(q, branch, None).unwrap();
-    let jacobian = mechanism.jacobian(&assembly);
-    let pose = mechanism.pose(&assembly);
+    let chain = mechanism.solve(q, branch, None).unwrap();
+    let jacobian = mechanism.jacobian(&chain);
+    let pose = mechanism.pose(&chain);
     let step = 1e-6;
     for column in 0..N {
         let at = |sign: f64| -> Pose {
@@ -157,9 +157,9 @@ fn dynamics<const N: usize, M: Mechanism<N>>(
     [q, velocity, acceleration]: [Joints<N>; 3],
     context: &str,
 ) {
-    let at = |q: Joints<N>| mechanism.assemble(&q, branch, None).unwrap();
-    let assembly = at(q);
-    let mass = mechanism.mass_matrix(&assembly);
+    let at = |q: Joints<N>| mechanism.solve(&q, branch, None).unwrap();
+    let chain = at(q);
+    let mass = mechanism.mass_matrix(&chain);
     assert_eq!((mass - mass.transpose()).amax(), 0.0);
     assert!(mass.cholesky().is_some(), "the mass matrix is not positive: {context}");
 
@@ -172,8 +172,8 @@ fn dynamics<const N: usize, M: Mechanism<N>>(
         moving.dot(&(mechanism.mass_matrix(&there) * moving)) / 2.0
     };
     let change = (energy(h) - energy(-h)) / (2.0 * h);
-    let effort = mechanism.inverse_dynamics(&assembly, &velocity, &acceleration);
-    let lifting = mechanism.gravity(&assembly).dot(&velocity);
+    let effort = mechanism.inverse_dynamics(&chain, &velocity, &acceleration);
+    let lifting = mechanism.gravity(&chain).dot(&velocity);
     let power = effort.dot(&velocity);
     near(power, change + lifting, 1e-7 * (1.0 + power.abs() + energy(0.0)), context);
 
@@ -190,7 +190,7 @@ fn dynamics<const N: usize, M: Mechanism<N>>(
             velocity.dot(&(mechanism.mass_matrix(&at(there)) * velocity)) / 2.0
         };
         let slope = (kinetic(1.0) - kinetic(-1.0)) / (2.0 * h);
-        let expected = rate[axis] - slope + mechanism.gravity(&assembly)[axis];
+        let expected = rate[axis] - slope + mechanism.gravity(&chain)[axis];
         let scale = 1.0 + effort.amax() + energy(0.0) + rate.amax();
         near(effort[axis], expected, 1e-7 * scale, context);
     }

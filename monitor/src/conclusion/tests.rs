@@ -1,14 +1,14 @@
-//! Summaries from made-up endings and recordings, with numbers worked out by hand.
+//! Summaries from made-up outcomes and recordings, with numbers worked out by hand.
 #![allow(clippy::unwrap_used)]
 
 use super::*;
 use crate::recording::CycleRecord;
 use crate::recording::file::RecordingWriter;
-use signals::artwork::Stroke;
-use signals::feedback::status;
-use signals::plan::Note;
-use signals::report::refused;
-use signals::{
+use messages::artwork::Stroke;
+use messages::feedback::status;
+use messages::plan::Note;
+use messages::report::refused;
+use messages::{
     Command, ControllerState, Cycle, Fault, FaultCode, Feedback, LaserCycle, Nanoseconds,
 };
 
@@ -57,11 +57,11 @@ fn record(cycle: u64) -> CycleRecord {
     }
 }
 
-fn examined(cycles: impl Iterator<Item = u64>) -> Findings {
+fn examined(cycles: impl Iterator<Item = u64>) -> RunResults {
     let artwork = artwork();
-    let mut examination = Examination::new(&artwork, Clock::Virtual).with_fastest(0.25);
-    cycles.for_each(|cycle| examination.push(&record(cycle)));
-    examination.finish(StreamEnd::Reported(&report()))
+    let mut analysis = RunAnalysis::new(&artwork, Clock::Virtual).with_fastest(0.25);
+    cycles.for_each(|cycle| analysis.push(&record(cycle)));
+    analysis.finish(StreamEnd::Reported(&report()))
 }
 
 fn report() -> ControllerReport {
@@ -91,12 +91,12 @@ fn plan() -> PlanFacts {
     }
 }
 
-fn ended(controller: ControllerReport) -> Ending {
-    Ending { controller: Some(controller), ..Ending::default() }
+fn ended(controller: ControllerReport) -> RunOutcome {
+    RunOutcome { controller: Some(controller), ..RunOutcome::default() }
 }
 
-fn summary_of(ending: &Ending, findings: Option<&Findings>) -> Summary {
-    summarise(&Machine::builtin(), &plan(), ending, findings, Clock::Virtual)
+fn summary_of(run_outcome: &RunOutcome, results: Option<&RunResults>) -> Summary {
+    summarise(&Machine::builtin(), &plan(), run_outcome, results, Clock::Virtual)
 }
 
 fn fault() -> Fault {
@@ -110,7 +110,7 @@ fn what_happens_after_a_completed_job_is_none_of_its_faults() {
     let message = "the supervisor died".to_owned();
     let error = Some(ErrorSummary { file: None, line: None, column: None, message });
     let outcome = Some(Outcome::Aborted);
-    let late = Ending { drives, outcome, error: error.clone(), ..ended(report()) };
+    let late = RunOutcome { drives, outcome, error: error.clone(), ..ended(report()) };
     let summary = summary_of(&late, None);
     assert_eq!(
         (summary.outcome, &summary.fault, &summary.error),
@@ -120,11 +120,11 @@ fn what_happens_after_a_completed_job_is_none_of_its_faults() {
     assert!(told[0].starts_with("after the job: following_error of axis"), "{told:?}");
     assert_eq!(told[1], "after the job: the supervisor died");
 
-    let early = Ending { drives, outcome, error, ..Ending::default() };
+    let early = RunOutcome { drives, outcome, error, ..RunOutcome::default() };
     let summary = summary_of(&early, None);
     assert_eq!(summary.outcome, Outcome::Faulted);
     assert!(summary.fault.is_some() && summary.error.is_some());
-    let latched = Ending { latched: fault(), ..Ending::default() };
+    let latched = RunOutcome { latched: fault(), ..RunOutcome::default() };
     assert!(summary_of(&latched, None).fault.is_some());
 }
 
@@ -164,8 +164,8 @@ const STEP: f64 = 2.5e-4;
 fn what_was_not_recorded_is_told_and_the_rest_is_judged() {
     let end = LAST + LIGHT_LAG;
     let check = |cycles: &dyn Fn(u64) -> bool, unrecorded: f64, warning: Option<&str>| {
-        let findings = examined((FIRST..=end).filter(|cycle| cycles(*cycle)));
-        let summary = summary_of(&ended(report()), Some(&findings));
+        let results = examined((FIRST..=end).filter(|cycle| cycles(*cycle)));
+        let summary = summary_of(&ended(report()), Some(&results));
         let marks = summary.marks.unwrap();
         assert!((marks.length + unrecorded - LENGTH).abs() < 1e-12, "{marks:?}");
         assert!((marks.unrecorded - unrecorded).abs() < 1e-12, "{marks:?}");
@@ -194,18 +194,21 @@ fn what_was_not_recorded_is_told_and_the_rest_is_judged() {
 
 #[test]
 fn nothing_recorded_or_an_end_that_nobody_knows_is_said() {
-    let summary = |ending: &Ending, cycles: std::ops::Range<u64>| {
+    let summary = |run_outcome: &RunOutcome, cycles: std::ops::Range<u64>| {
         let artwork = artwork();
-        let mut examination = Examination::new(&artwork, Clock::Virtual);
-        cycles.for_each(|cycle| examination.push(&record(cycle)));
-        summary_of(ending, Some(&examination.finish(StreamEnd::of(ending.controller.as_ref()))))
+        let mut analysis = RunAnalysis::new(&artwork, Clock::Virtual);
+        cycles.for_each(|cycle| analysis.push(&record(cycle)));
+        summary_of(
+            run_outcome,
+            Some(&analysis.finish(StreamEnd::of(run_outcome.controller.as_ref()))),
+        )
     };
     let nothing = summary(&ended(report()), 0..0);
     assert_eq!(nothing.marks, None);
     assert_eq!(nothing.warnings[2], "the marks are not judged: nothing of the job was recorded");
     assert_eq!(nothing.recording.unwrap().missing, LAST + LIGHT_LAG - FIRST + 1);
     // The controller did not say where the job ends, and the last record is lit.
-    let open = summary(&Ending::default(), FIRST..FIRST + 41);
+    let open = summary(&RunOutcome::default(), FIRST..FIRST + 41);
     let marks = open.marks.unwrap();
     assert!((marks.unrecorded - 41.0 * STEP).abs() < 1e-12, "{marks:?}");
     assert!(open.warnings[2].contains("10.250 mm of stroke 1"), "{:?}", open.warnings);
@@ -216,7 +219,8 @@ fn nothing_recorded_or_an_end_that_nobody_knows_is_said() {
 fn overruns_are_those_of_the_run() {
     let overruns = |before: u64| {
         let drives = Some(DrivesReport { overruns: 12, ..DrivesReport::default() });
-        summary_of(&Ending { drives, overruns_before: before, ..ended(report()) }, None).overruns
+        summary_of(&RunOutcome { drives, overruns_before: before, ..ended(report()) }, None)
+            .overruns
     };
     // Drives that were restarted count from 0 again.
     assert_eq!([overruns(0), overruns(5), overruns(20)], [12, 7, 0]);
@@ -227,15 +231,15 @@ fn real_time_is_claimed_and_missed_only_as_reported() {
     let machine = Machine::builtin();
     let silent = RealtimeFacts::default();
     let of = |controller: Option<RealtimeFacts>, drives: Option<RealtimeFacts>| {
-        let ending = Ending {
+        let run_outcome = RunOutcome {
             controller: controller.map(|realtime| ControllerReport { realtime, ..report() }),
             drives: drives.map(|realtime| {
                 let cycle = Cycle(if realtime == silent { 0 } else { LAST });
                 DrivesReport { realtime, cycle, ..DrivesReport::default() }
             }),
-            ..Ending::default()
+            ..RunOutcome::default()
         };
-        summarise(&machine, &plan(), &ending, None, Clock::Real).realtime
+        summarise(&machine, &plan(), &run_outcome, None, Clock::Real).realtime
     };
     let none = RealtimeFacts { core: -1, asked_priority: 80, ..RealtimeFacts::default() };
     let good = RealtimeFacts { fifo: 1, priority: 80, core: 1, locked: 1, ..none };
@@ -292,8 +296,8 @@ fn records() -> Vec<CycleRecord> {
     (FIRST..=LAST + LIGHT_LAG).map(record).collect()
 }
 
-fn concluded(folder: &RunFolder, ending: &Ending) -> Summary {
-    conclude(folder, &Machine::builtin(), ending, Instant::now())
+fn concluded(folder: &RunFolder, run_outcome: &RunOutcome) -> Summary {
+    conclude(folder, &Machine::builtin(), run_outcome, Instant::now())
 }
 
 #[test]
@@ -351,8 +355,8 @@ fn a_recording_that_was_broken_off_is_said_to_be() {
     let below = tempfile::tempdir().unwrap();
     let folder = folder(&below, &records()[..50]);
     let message = "samples.bin: No space left on device".to_owned();
-    let note = WatchNote { message: message.clone(), ..WatchNote::default() };
-    note.write(&folder).unwrap();
+    let info = RecordingInfo { message: message.clone(), ..RecordingInfo::default() };
+    info.write(&folder).unwrap();
     let summary = concluded(&folder, &ended(report()));
     assert_eq!(summary.warnings[0], format!("the recording was broken off: {message}"));
     let marks = summary.marks.unwrap();
@@ -383,15 +387,16 @@ fn a_job_that_was_never_planned_has_no_marks_and_no_warnings() {
     let below = tempfile::tempdir().unwrap();
     let empty = RunFolder::create_at(below.path()).unwrap();
     let stopped = Outcome::Stopped;
-    let ending = Ending { outcome: Some(stopped), job: "mine".into(), ..Ending::default() };
-    let summary = concluded(&empty, &ending);
+    let run_outcome =
+        RunOutcome { outcome: Some(stopped), job: "mine".into(), ..RunOutcome::default() };
+    let summary = concluded(&empty, &run_outcome);
     assert_eq!((summary.job.name.as_str(), summary.marks), ("mine", None));
     assert!(summary.warnings.is_empty(), "{:?}", summary.warnings);
 
     // A refused job finds what an earlier one left in its folder.
     let folder = folder(&below, &records());
-    let ending = Ending { outcome: Some(Outcome::Refused), ..ending };
-    let summary = concluded(&folder, &ending);
+    let run_outcome = RunOutcome { outcome: Some(Outcome::Refused), ..run_outcome };
+    let summary = concluded(&folder, &run_outcome);
     assert_eq!((summary.job.name.as_str(), summary.job.length), ("mine", 0.0));
     assert_eq!((summary.marks, summary.warnings.len()), (None, 0));
     assert!(!folder.file(run_folder::REPORT).exists());

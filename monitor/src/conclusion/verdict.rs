@@ -1,7 +1,7 @@
 //! How a job ended: what happened on the machine, from what controller, drives and supervisor say.
 
 use crate::summary::Outcome;
-use signals::{ControllerReport, Fault, FaultCode};
+use messages::{ControllerReport, Fault, FaultCode};
 
 /// What is known at the end of a job.
 #[derive(Debug, Clone, Copy, Default)]

@@ -5,7 +5,7 @@
 //! whatever the machine did meanwhile: went on, was held, went back and resumed.
 
 use super::tool_path::{Interval, Moment};
-use signals::artwork::Artwork;
+use messages::artwork::Artwork;
 use std::cmp::Ordering;
 
 /// A place in a job.
@@ -157,7 +157,7 @@ pub(super) fn is_idle(moment: &Moment) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use signals::artwork::Stroke;
+    use messages::artwork::Stroke;
 
     #[test]
     fn a_length_is_marked_across_strokes_and_dots() {

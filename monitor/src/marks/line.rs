@@ -1,7 +1,7 @@
 //! The line of one stroke, by arc length: where along it a marked point belongs.
 
+use messages::artwork::Stroke;
 use nalgebra::Vector3;
-use signals::artwork::Stroke;
 
 /// The foot of a perpendicular on a stroke's line.
 #[derive(Debug, Clone, Copy, PartialEq)]

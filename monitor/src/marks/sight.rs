@@ -1,12 +1,12 @@
-//! The judge over stretches of time that nobody recorded: what passed in them, and where in the job
+//! The evaluator over stretches of time that nobody recorded: what passed in them, and where in the job
 //! the light is found again.
 
 use super::frontier::{FirstLight, Place, Unseen, is_idle};
 use super::line::{Foot, Passage};
 use super::tool_path::{Interval, Moment};
-use super::{FIRST_REACH, Followed, Judge, REACH, StreamEnd};
+use super::{FIRST_REACH, Followed, MarkEvaluator, REACH, StreamEnd};
 use crate::conclusion::LIGHT_LAG;
-use signals::time::CYCLE_TIME;
+use messages::time::CYCLE_TIME;
 
 /// How far from the line of a stroke a point that the plan has on it may be found, after a gap [m].
 const ON_PLAN: f64 = 5e-6;
@@ -21,7 +21,7 @@ const BELIEVED: f64 = 4.0;
 /// The fastest that a stream is played, against its plan.
 const FASTEST_RATE: f64 = 2.0;
 
-impl Judge<'_> {
+impl MarkEvaluator<'_> {
     /// Nobody recorded between the moment `before`, if there was one, and the moment `after`.
     pub(super) fn lose_sight(
         &mut self,

@@ -4,26 +4,26 @@
 mod gaps;
 
 use super::*;
-use signals::artwork::Stroke;
-use signals::feedback::status;
-use signals::{Command, ControllerState, Cycle, Feedback, GateEdge, LaserCycle, Nanoseconds};
+use messages::artwork::Stroke;
+use messages::feedback::status;
+use messages::{Command, ControllerState, Cycle, Feedback, GateEdge, LaserCycle, Nanoseconds};
 
 type Point = [f64; 3];
 
-/// Judges the marks of a recording of a job that was completed.
-fn judgement(artwork: &Artwork, records: &[CycleRecord]) -> Result<Judgement, Unjudged> {
-    let mut judge = Judge::new(artwork);
-    records.iter().for_each(|record| judge.push(record));
+/// Evaluates the marks of a recording of a job that was completed.
+fn evaluation(artwork: &Artwork, records: &[CycleRecord]) -> Result<MarkEvaluation, Unevaluated> {
+    let mut evaluator = MarkEvaluator::new(artwork);
+    records.iter().for_each(|record| evaluator.push(record));
     let last_cycle = Cycle(FIRST);
     let completed = ControllerReport { completed: 1, last_cycle, ..ControllerReport::default() };
-    judge.finish(StreamEnd::Reported(&completed))
+    evaluator.finish(StreamEnd::Reported(&completed))
 }
 
 /// The marks of a recording of which nothing is missing.
-fn judge(artwork: &Artwork, records: &[CycleRecord]) -> Result<Marks, Unjudged> {
-    let judgement = judgement(artwork, records)?;
-    assert_eq!((judgement.marks.unrecorded, judgement.unrecorded_strokes), (0.0, None));
-    Ok(judgement.marks)
+fn evaluate(artwork: &Artwork, records: &[CycleRecord]) -> Result<Marks, Unevaluated> {
+    let evaluation = evaluation(artwork, records)?;
+    assert_eq!((evaluation.marks.unrecorded, evaluation.unrecorded_strokes), (0.0, None));
+    Ok(evaluation.marks)
 }
 
 const SPEED: f64 = 0.25;
@@ -150,7 +150,7 @@ const ROUNDING: f64 = 1e-9;
 
 #[test]
 fn a_perfect_mark_has_no_error() {
-    let marks = judge(&one_line(), &play(&one_plan(), |_, tool| tool, |_, _| 0.0)).unwrap();
+    let marks = evaluate(&one_line(), &play(&one_plan(), |_, tool| tool, |_, _| 0.0)).unwrap();
     near(marks.length, SPEED * STROKE_TIME, ROUNDING, "length");
     for (value, what) in [
         (marks.missing, "missing"),
@@ -171,7 +171,7 @@ fn a_perfect_mark_has_no_error() {
 #[test]
 fn an_offset_is_split_into_contour_and_tracking() {
     let truth = |_, [x, y, z]: Point| [x - 4e-6, y + 3e-6, z];
-    let marks = judge(&one_line(), &play(&one_plan(), truth, |_, _| 0.0)).unwrap();
+    let marks = evaluate(&one_line(), &play(&one_plan(), truth, |_, _| 0.0)).unwrap();
     near(marks.error_max, 3e-6, 1e-12, "error_max");
     near(marks.error_rms, 3e-6, 1e-12, "error_rms");
     near(marks.tracking_max, 5e-6, 1e-12, "tracking_max");
@@ -183,7 +183,7 @@ fn an_offset_is_split_into_contour_and_tracking() {
 
 #[test]
 fn a_gate_0_2_ms_late_costs_50_um_at_each_end() {
-    let marks = judge(&one_line(), &play(&one_plan(), |_, tool| tool, |_, _| 2e-4)).unwrap();
+    let marks = evaluate(&one_line(), &play(&one_plan(), |_, tool| tool, |_, _| 2e-4)).unwrap();
     near(marks.missing_end_max, 5e-5, ROUNDING, "missing_end_max");
     near(marks.double_end_max, 5e-5, ROUNDING, "double_end_max");
     near(marks.missing, 5e-5, ROUNDING, "missing");
@@ -195,7 +195,8 @@ fn a_gate_0_2_ms_late_costs_50_um_at_each_end() {
 fn a_gate_cycles_early_or_late_is_measured_all_the_same() {
     for cycles in [-2.0_f64, 3.0] {
         let delay = cycles * CYCLE_TIME;
-        let marks = judge(&one_line(), &play(&one_plan(), |_, tool| tool, |_, _| delay)).unwrap();
+        let marks =
+            evaluate(&one_line(), &play(&one_plan(), |_, tool| tool, |_, _| delay)).unwrap();
         let expected = SPEED * delay.abs();
         near(marks.missing, expected, ROUNDING, "missing");
         near(marks.double_end_max, expected, ROUNDING, "double_end_max");
@@ -217,7 +218,7 @@ fn a_hold_and_resume_merge_into_one_stroke() {
         let on = 0.064 + (relit - 0.008) / SPEED;
         let end = 0.064 + (SPEED * STROKE_TIME - 0.008) / SPEED;
         let plan = Plan { tool: &tool, light: &[(1, 0.0, 0.04), (1, on, end)], duration: 0.2 };
-        let marks = judge(&one_line(), &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+        let marks = evaluate(&one_line(), &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
         near(marks.missing, missing, ROUNDING, "missing");
         near(marks.double, double, ROUNDING, "double");
         near(marks.missing_end_max, 0.0, ROUNDING, "missing_end_max");
@@ -238,13 +239,13 @@ fn strokes_that_touch_do_not_hide_each_other() {
         |time: f64| [if time < 0.05 { SPEED * time } else { SPEED * (0.1 - time) }, 0.0, 0.0];
     let light = [(1, 0.0, 0.04), (2, 0.06, 0.1)];
     let plan = Plan { tool: &tool, light: &light, duration: 0.15 };
-    let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+    let marks = evaluate(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
     near(marks.missing, 0.0, ROUNDING, "missing");
     near(marks.double, 0.0, ROUNDING, "double");
 
     // The second one late by 1 ms: hidden in a picture, not here.
     let late = |index: usize, _| if index == 1 { 1e-3 } else { 0.0 };
-    let marks = judge(&art, &play(&plan, |_, tool| tool, late)).unwrap();
+    let marks = evaluate(&art, &play(&plan, |_, tool| tool, late)).unwrap();
     near(marks.missing_end_max, 2.5e-4, ROUNDING, "missing_end_max");
     near(marks.double_end_max, 2.5e-4, ROUNDING, "double_end_max");
 }
@@ -258,7 +259,7 @@ fn a_lost_stroke_is_missing_whole() {
     ]);
     let light = [(1, 0.0, 0.04)];
     let plan = Plan { tool: &along_x, light: &light, duration: 0.16 };
-    let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+    let marks = evaluate(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
     near(marks.missing, length, ROUNDING, "missing");
     near(marks.missing_end_max, length, ROUNDING, "missing_end_max");
     assert_eq!(marks.strokes_lost, 1);
@@ -269,7 +270,7 @@ fn a_closed_circle_starts_and_ends_in_one_place() {
     let radius = 0.005;
     let turn = std::f64::consts::TAU * radius / SPEED;
     let on_circle = |angle: f64| {
-        let (sine, cosine) = signals::math::sin_cos(angle);
+        let (sine, cosine) = messages::math::sin_cos(angle);
         [radius * cosine, radius * sine, 0.0]
     };
     let sides = 1000;
@@ -282,7 +283,7 @@ fn a_closed_circle_starts_and_ends_in_one_place() {
     let plan = Plan { tool: &tool, light: &light, duration: turn + 0.08 };
 
     // The chord error of 1000 sides is r(1 − cos(π/1000)) = 25 nm; the cubic's is below 1 nm.
-    let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+    let marks = evaluate(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
     near(marks.error_max, 0.0, 2.6e-8, "error_max");
     near(marks.missing, 0.0, 2.6e-8, "missing");
     near(marks.double, 0.0, 2.6e-8, "double");
@@ -291,11 +292,11 @@ fn a_closed_circle_starts_and_ends_in_one_place() {
     near(marks.speed_max, SPEED, 1e-6, "speed_max");
 
     // Late: misses 50 µm of the start and marks them at the end, which is the same place.
-    let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| 2e-4)).unwrap();
+    let marks = evaluate(&art, &play(&plan, |_, tool| tool, |_, _| 2e-4)).unwrap();
     near(marks.missing_end_max, 5e-5, 2e-8, "missing_end_max");
     near(marks.double_end_max, 5e-5, 2e-8, "double_end_max");
     // Early: the other way round.
-    let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| -2e-4)).unwrap();
+    let marks = evaluate(&art, &play(&plan, |_, tool| tool, |_, _| -2e-4)).unwrap();
     near(marks.missing_end_max, 5e-5, 2e-8, "missing_end_max");
     near(marks.double_end_max, 5e-5, 2e-8, "double_end_max");
 }
@@ -309,7 +310,7 @@ fn a_dot_is_judged_by_distance() {
     let tool = |_: f64| [0.01, 0.0, 0.0];
     let plan = Plan { tool: &tool, light: &[(1, 0.01, 0.0213)], duration: 0.1 };
     let truth = |_, [x, y, z]: Point| [x + 3e-6, y - 4e-6, z];
-    let marks = judge(&art, &play(&plan, truth, |_, _| 0.0)).unwrap();
+    let marks = evaluate(&art, &play(&plan, truth, |_, _| 0.0)).unwrap();
     near(marks.error_max, 5e-6, 1e-15, "error_max");
     near(marks.error_rms, 5e-6, 1e-15, "error_rms");
     assert_eq!((marks.missing, marks.double, marks.double_end_max), (0.0, 0.0, 0.0));
@@ -328,7 +329,7 @@ fn a_change_of_stroke_without_a_dark_gap_splits_the_light() {
         ]);
         let light = [(1, 0.0, change), (2, change, STROKE_TIME)];
         let plan = Plan { tool: &along_x, light: &light, duration: 0.15 };
-        let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+        let marks = evaluate(&art, &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
         near(marks.length, whole, ROUNDING, "length");
         near(marks.missing, 0.0, ROUNDING, "missing");
         near(marks.double, 0.0, ROUNDING, "double");
@@ -339,7 +340,7 @@ fn a_change_of_stroke_without_a_dark_gap_splits_the_light() {
 
         // The change 0.2 ms late: the light is unbroken, yet 50 µm of it are on the wrong stroke.
         let late = |_, at: f64| if at == change { 2e-4 } else { 0.0 };
-        let marks = judge(&art, &play(&plan, |_, tool| tool, late)).unwrap();
+        let marks = evaluate(&art, &play(&plan, |_, tool| tool, late)).unwrap();
         near(marks.length, whole, ROUNDING, "length");
         near(marks.missing_end_max, 5e-5, ROUNDING, "missing_end_max");
         near(marks.double_end_max, 5e-5, ROUNDING, "double_end_max");
@@ -353,7 +354,7 @@ fn the_light_tells_its_stroke_whatever_the_command_says() {
     for commanded in [0, 2] {
         let mut records = play(&one_plan(), |_, tool| tool, |_, _| 0.0);
         records.iter_mut().for_each(|record| record.command.stroke = commanded);
-        let marks = judge(&one_line(), &records).unwrap();
+        let marks = evaluate(&one_line(), &records).unwrap();
         near(marks.length, SPEED * STROKE_TIME, ROUNDING, "length");
         near(marks.missing, 0.0, ROUNDING, "missing");
         near(marks.double, 0.0, ROUNDING, "double");
@@ -366,7 +367,7 @@ fn light_for_a_stroke_beyond_the_artwork_is_stray() {
     let whole = SPEED * STROKE_TIME;
     let light = [(2, 0.0, STROKE_TIME)];
     let plan = Plan { light: &light, ..one_plan() };
-    let marks = judge(&one_line(), &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+    let marks = evaluate(&one_line(), &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
     near(marks.length, whole, ROUNDING, "length");
     near(marks.stray, whole, ROUNDING, "stray");
     near(marks.double, whole, ROUNDING, "double");
@@ -377,7 +378,7 @@ fn light_for_a_stroke_beyond_the_artwork_is_stray() {
     let change = 0.0401234;
     let light = [(1, 0.0, change), (u64::from(u32::MAX), change, STROKE_TIME)];
     let plan = Plan { light: &light, ..one_plan() };
-    let marks = judge(&one_line(), &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
+    let marks = evaluate(&one_line(), &play(&plan, |_, tool| tool, |_, _| 0.0)).unwrap();
     let rest = whole - SPEED * change;
     near(marks.length, whole, ROUNDING, "length");
     near(marks.stray, rest, ROUNDING, "stray");
@@ -401,7 +402,7 @@ fn light_that_comes_late_is_found_where_it_falls() {
     for part in [0.1, 0.25, 0.5, 0.75] {
         let dark = part * end;
         let late = |_, at: f64| if at == 0.0 { dark } else { 0.0 };
-        let marks = judge(&art, &play(&plan, |_, tool| tool, late)).unwrap();
+        let marks = evaluate(&art, &play(&plan, |_, tool| tool, late)).unwrap();
         // As in the test of holds: the cubic's error in the tightest bend.
         near(marks.missing_end_max, SPEED * dark, 1.1e-7, "missing_end_max");
         near(marks.missing, SPEED * dark, 1.1e-7, "missing");
@@ -412,12 +413,12 @@ fn light_that_comes_late_is_found_where_it_falls() {
 #[test]
 fn where_nothing_was_recorded_nothing_is_judged() {
     let art = one_line();
-    assert_eq!(judge(&art, &[]), Err(Unjudged::Unrecorded));
+    assert_eq!(evaluate(&art, &[]), Err(Unevaluated::Unrecorded));
     let mut records = play(&one_plan(), |_, tool| tool, |_, _| 0.0);
     // The cycles before the stream are none of the job's.
-    assert_eq!(judge(&art, &records[..10]), Err(Unjudged::Unrecorded));
+    assert_eq!(evaluate(&art, &records[..10]), Err(Unevaluated::Unrecorded));
     records.iter_mut().for_each(|record| record.feedback.status = 0);
-    assert_eq!(judge(&art, &records), Err(Unjudged::ToolUnknown));
+    assert_eq!(evaluate(&art, &records), Err(Unevaluated::ToolUnknown));
 }
 
 /// A closed figure of eight: it crosses itself, and ends where it starts.
@@ -432,13 +433,13 @@ impl Eight {
         let points: Vec<Point> = (0..=count)
             .map(|index| {
                 let angle = std::f64::consts::TAU * f64::from(index) / f64::from(count);
-                let (sine, cosine) = signals::math::sin_cos(angle);
+                let (sine, cosine) = messages::math::sin_cos(angle);
                 [0.01 * cosine, 0.01 * sine * cosine, 0.0]
             })
             .collect();
         let mut along = vec![0.0];
         for pair in points.windows(2) {
-            along.push(along.last().unwrap() + signals::artwork::distance(&pair[0], &pair[1]));
+            along.push(along.last().unwrap() + messages::artwork::distance(&pair[0], &pair[1]));
         }
         Self { points, along }
     }
@@ -464,12 +465,8 @@ fn holds_on_a_stroke_that_crosses_itself_are_measured_anywhere() {
     let eight = Eight::new();
     let length = eight.length();
     let art = artwork(vec![Stroke { points: eight.points.clone(), line: 0 }]);
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut random = |low: f64, high: f64| {
-        state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
+    let mut numbers = messages::random::SplitMix64::new(1);
+    let mut random = |low: f64, high: f64| numbers.between(low, high);
     for case in 0..200 {
         let held = random(0.15, 0.85) * length;
         let overlap = random(-1e-3, 1e-3);
@@ -487,7 +484,7 @@ fn holds_on_a_stroke_that_crosses_itself_are_measured_anywhere() {
         let end = back + (length - held + 3e-3) / SPEED;
         let light = [(1, 0.0, held / SPEED), (1, relit, end)];
         let plan = Plan { tool: &tool, light: &light, duration: end + 0.04 };
-        let marks = judge(&art, &play(&plan, |_, tool| tool, |_, _| late)).unwrap();
+        let marks = evaluate(&art, &play(&plan, |_, tool| tool, |_, _| late)).unwrap();
 
         let place = format!("case {case}: held {held}, overlap {overlap}, late {late}");
         let shift = SPEED * late;

@@ -7,14 +7,14 @@
 
 use crate::recording::CycleRecord;
 use crate::recording::continuity::{Stamp, Succession};
+use messages::feedback::status;
+use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use messages::{ControllerState, LaserCycle, MAX_EDGES};
 use nalgebra::Vector3;
-use signals::feedback::status;
-use signals::time::{CYCLE_PERIOD, CYCLE_TIME};
-use signals::{ControllerState, LaserCycle, MAX_EDGES};
 
 /// Bits of a feedback's status that say: the cycle which begins with it is dark, whatever the
 /// command in force says.
-const KEPT_DARK: u32 = status::COMMAND_MISSED | status::STOPPED_ALONE | status::GATE_INHIBITED;
+const KEPT_DARK: u32 = status::COMMAND_MISSED | status::WATCHDOG_TRIPPED | status::GATE_INHIBITED;
 
 /// What one record tells about its deadline `t[k]` and the cycle before.
 #[derive(Debug, Clone, Copy)]
@@ -359,7 +359,7 @@ fn hermite(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use signals::{Cycle, Feedback, GateEdge};
+    use messages::{Cycle, Feedback, GateEdge};
 
     fn moment(cycle: u64, tool: Vector3<f64>) -> Moment {
         let feedback = Feedback { cycle: Cycle(cycle), ..Feedback::default() };

@@ -3,10 +3,10 @@
 //! Everybody who walks along a recording asks [`Succession::between`] whether two records follow
 //! each other: what counts as a gap is said here alone.
 
+use messages::time::CYCLE_PERIOD;
+use messages::{Feedback, Nanoseconds};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use signals::time::CYCLE_PERIOD;
-use signals::{Feedback, Nanoseconds};
 
 /// Gaps that are told one by one; more are only counted.
 const LISTED: usize = 100;
@@ -137,7 +137,7 @@ pub struct RecordingSummary {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use signals::Cycle;
+    use messages::Cycle;
 
     fn stamp(epoch: u64, cycle: u64) -> Stamp {
         Stamp::of(&Feedback { epoch, cycle: Cycle(cycle), ..Feedback::default() })

@@ -1,7 +1,7 @@
 //! `samples.bin`: the records as they stand in memory, behind a header that says what they are.
 
 use super::CycleRecord;
-use signals::{Command, Feedback, Sample, sample};
+use messages::{Command, Feedback, Sample, sample};
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -269,7 +269,7 @@ impl<R: Read> Iterator for RecordingReader<R> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use signals::Cycle;
+    use messages::Cycle;
 
     fn written(count: u64) -> Vec<u8> {
         let mut writer = RecordingWriter::new(Vec::new()).unwrap();

@@ -3,8 +3,8 @@
 
 use super::CycleRecord;
 use crate::trace::lit_share;
-use signals::MAX_AXES;
-use signals::feedback::status;
+use messages::MAX_AXES;
+use messages::feedback::status;
 use std::io::{self, Write};
 
 /// Writes one line a record under a line of column names.
@@ -87,7 +87,7 @@ impl<W: Write> TableWriter<W> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use signals::{Command, Cycle};
+    use messages::{Command, Cycle};
     use zerocopy::FromZeros;
 
     fn table(records: &[CycleRecord]) -> Vec<Vec<String>> {

@@ -101,7 +101,7 @@ impl Chart<'_> {
         let seen = span(points().map(|point| point.1).filter(|value| *value > 0.0));
         let (low, high) = seen.unwrap_or((1.0, 10.0));
         let share = |nines: &f64| {
-            let part = 100.0 * (1.0 - signals::math::pow(10.0, -nines));
+            let part = 100.0 * (1.0 - messages::math::pow(10.0, -nines));
             let digits = (nines.round() as usize).saturating_sub(1).saturating_sub(1);
             format!("{part:.digits$} %")
         };

@@ -5,9 +5,9 @@ use super::{PictureError, Report};
 use crate::latency::HopLatency;
 use crate::summary::text::{latency, rows};
 use crate::trace::envelope::Envelope;
+use messages::hop::Hop;
+use messages::{AxisArray, math};
 use plotters::style::RGBColor;
-use signals::hop::Hop;
-use signals::{AxisArray, math};
 use std::fmt::Write;
 
 /// Height of a chart, in page units.
@@ -88,13 +88,13 @@ impl Report<'_> {
     fn axis_charts(&self) -> Result<String, PictureError> {
         let trace = self.trace;
         let gains = |values: &[f64]| -> AxisArray {
-            let mut array = [1e3; signals::MAX_AXES];
+            let mut array = [1e3; messages::MAX_AXES];
             array.iter_mut().zip(values).for_each(|(to, from)| *to = 1e3 * from);
             array
         };
         let following = self.per_axis(&trace.following_error, &gains(&[]));
         let torque = self.per_axis(&trace.current, &gains(self.torque_constants));
-        let voltage = self.per_axis(&trace.voltage, &[1.0; signals::MAX_AXES]);
+        let voltage = self.per_axis(&trace.voltage, &[1.0; messages::MAX_AXES]);
         Ok([
             ("following error [mrad]", following, "Reference minus feedback, at the motor."),
             (

@@ -6,9 +6,9 @@ use super::chart::{
 };
 use super::{PictureError, Report};
 use crate::trace::outline::OutlinePoint;
+use messages::artwork::Artwork;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-use signals::artwork::Artwork;
 
 /// Metres to millimetres, the unit of the picture.
 pub(super) const MILLIMETRES: f64 = 1e3;

@@ -2,15 +2,15 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
-use crate::examination::{Clock, Examination};
 use crate::latency::IntervalLog;
 use crate::marks::StreamEnd;
+use crate::run_analysis::{Clock, RunAnalysis};
 use crate::stage::{Inputs, MonitorStage, Outputs};
 use crate::summary::{JobSummary, MachineSummary, Outcome};
-use signals::artwork::Stroke;
-use signals::feedback::status;
-use signals::time::CYCLE_TIME;
-use signals::{Command, Cycle, Feedback, LaserCycle, Nanoseconds, math};
+use messages::artwork::Stroke;
+use messages::feedback::status;
+use messages::time::CYCLE_TIME;
+use messages::{Command, Cycle, Feedback, LaserCycle, Nanoseconds, math};
 use std::time::{Duration, SystemTime};
 
 const SPEED: f64 = 0.1;
@@ -95,17 +95,17 @@ fn the_page_shows_the_run_and_needs_no_network() {
     let mut stage = MonitorStage::new();
     let mut outputs = Outputs::default();
     let artwork = artwork();
-    let mut examination = Examination::new(&artwork, Clock::Real);
+    let mut analysis = RunAnalysis::new(&artwork, Clock::Real);
     let mut count = 0;
     for (feedbacks, commands) in feedbacks.chunks(100).zip(commands.chunks(100)) {
         stage.step(&Inputs { feedbacks, commands }, &mut outputs);
         count += outputs.records.len();
-        outputs.records.iter().for_each(|record| examination.push(record));
+        outputs.records.iter().for_each(|record| analysis.push(record));
     }
     stage.finish(&mut outputs);
     assert_eq!((count, outputs.records.len(), stage.continuity().missing), (1000, 0, 0));
 
-    let findings = examination.finish(StreamEnd::Unknown);
+    let results = analysis.finish(StreamEnd::Unknown);
     let machine = MachineSummary {
         name: "sample <machine>".into(),
         mechanism: "corexy".into(),
@@ -113,16 +113,16 @@ fn the_page_shows_the_run_and_needs_no_network() {
     };
     let job = JobSummary { name: "circle & cross".into(), strokes: 2, length: artwork.length() };
     let mut summary = Summary::new(Outcome::Completed, job, machine);
-    summary.marks = Some(findings.marks.unwrap().marks);
-    summary.latency = findings.histograms.summary();
+    summary.marks = Some(results.marks.unwrap().marks);
+    summary.latency = results.histograms.summary();
     assert_eq!(stage.histograms().summary(), summary.latency);
     summary.warnings.push("memory is not locked".into());
     let report = Report {
         summary: &summary,
         artwork: &artwork,
-        trace: &findings.trace,
+        trace: &results.trace,
         torque_constants: &[0.0136, 0.0136],
-        histograms: &findings.histograms,
+        histograms: &results.histograms,
     };
     // To look at the files: GRAVER_KEEP_REPORT=folder cargo test -p monitor
     let temporary = tempfile::tempdir().unwrap();
@@ -157,13 +157,13 @@ fn the_page_shows_the_run_and_needs_no_network() {
 fn a_run_without_marks_has_a_report_too() {
     let summary = Summary::new(Outcome::Aborted, JobSummary::default(), MachineSummary::default());
     let artwork = Artwork::default();
-    let findings = Examination::new(&artwork, Clock::Virtual).finish(StreamEnd::Unknown);
+    let results = RunAnalysis::new(&artwork, Clock::Virtual).finish(StreamEnd::Unknown);
     let report = Report {
         summary: &summary,
         artwork: &artwork,
-        trace: &findings.trace,
+        trace: &results.trace,
         torque_constants: &[],
-        histograms: &findings.histograms,
+        histograms: &results.histograms,
     };
     assert!(report.picture().unwrap().contains("nothing was marked"));
     assert!(report.page().unwrap().contains("aborted"));

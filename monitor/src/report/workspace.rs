@@ -3,9 +3,9 @@
 use super::PictureError;
 use super::chart::{CURVES, Canvas, FINE, Failure, INK, draw, frame, legend};
 use super::path::{MILLIMETRES, Sheet, curve, thinned};
+use messages::artwork::Artwork;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-use signals::artwork::Artwork;
 
 /// What a place is to a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,15 +1,15 @@
 //! What the monitor does when the supervisor is lost: it waits for the machine to rest, and writes
 //! the summary that nobody else will.
 
-use super::{Job, LOOK, Service};
-use crate::conclusion::{self, Ending};
+use super::{Job, POLL_INTERVAL, Service};
+use crate::conclusion::{self, RunOutcome};
 use crate::run_folder::RunFolder;
 use crate::summary::{ErrorSummary, Outcome};
 use machine::Machine;
+use messages::run_folder;
 use runtime::ServiceError;
 use runtime::message::tell;
 use serde::Deserialize;
-use signals::run_folder;
 use std::time::{Duration, Instant};
 
 /// How long the axes may take to rest after the supervisor was lost.
@@ -38,8 +38,8 @@ impl Service {
         // Whatever fails here, the summary is still to be written.
         let rested = self.await_rest(job.stream);
         let ended = self.end_recording();
-        let ending = self.ending(&job);
-        let summary = conclusion::conclude(&job.folder, machine, &ending, job.began);
+        let run_outcome = self.run_outcome(&job);
+        let summary = conclusion::conclude(&job.folder, machine, &run_outcome, job.began);
         if !told(&job) {
             // Nobody else is left to say it.
             summary.warnings.iter().for_each(|warning| tell(&format!("monitor: {warning}")));
@@ -50,8 +50,8 @@ impl Service {
     fn await_rest(&mut self, stream: u64) -> Result<(), ServiceError> {
         let lost = Instant::now();
         while !self.rests(stream) && lost.elapsed() < REST_PATIENCE {
-            self.look()?;
-            std::thread::sleep(LOOK);
+            self.poll()?;
+            std::thread::sleep(POLL_INTERVAL);
         }
         Ok(())
     }
@@ -67,28 +67,29 @@ impl Service {
 
     /// How a job ended whose supervisor is lost. A stream that the controller ended without a fault
     /// had ended before that.
-    fn ending(&self, job: &Job) -> Ending {
+    fn run_outcome(&self, job: &Job) -> RunOutcome {
         let is_final = self.controller.is_final == 1 && self.controller.stream == job.stream;
         let controller = is_final.then_some(self.controller);
-        let mut ending = Ending {
+        let mut run_outcome = RunOutcome {
             overruns_before: job.overruns_before,
             controller,
             latched: self.newest_command.fault,
             drives: self.drives,
-            ..Ending::default()
+            ..RunOutcome::default()
         };
         if let Some(refusal) = refusal(&job.folder) {
-            ending.outcome = Some(Outcome::Refused);
-            ending.error = Some(refusal);
-            ending.warnings.push("the supervisor died after the job was refused".to_owned());
+            run_outcome.outcome = Some(Outcome::Refused);
+            run_outcome.error = Some(refusal);
+            run_outcome.warnings.push("the supervisor died after the job was refused".to_owned());
         } else if controller.is_some_and(|report| !report.fault.is_some()) {
-            ending.warnings.push("the supervisor died after the job had ended".to_owned());
+            run_outcome.warnings.push("the supervisor died after the job had ended".to_owned());
         } else {
             let message = "the supervisor died: laser off, axes brought to rest".to_owned();
-            ending.outcome = Some(Outcome::Aborted);
-            ending.error = Some(ErrorSummary { file: None, line: None, column: None, message });
+            run_outcome.outcome = Some(Outcome::Aborted);
+            run_outcome.error =
+                Some(ErrorSummary { file: None, line: None, column: None, message });
         }
-        ending
+        run_outcome
     }
 }
 

@@ -5,10 +5,10 @@ use crate::latency::IntervalLog;
 use crate::recording::Recorder;
 use crate::recording::continuity::Continuity;
 use crate::recording::file::{RecordingError, RecordingWriter, Resumed};
-use crate::recording::note::{Progress, WatchNote};
+use crate::recording::info::{Progress, RecordingInfo};
 use crate::run_folder::{FileError, RunFolder};
 use crate::stage::{Inputs, MonitorStage, Outputs};
-use signals::{ControllerReport, run_folder};
+use messages::{ControllerReport, run_folder};
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::time::{Duration, Instant};
@@ -51,18 +51,24 @@ impl Recording {
         folder: RunFolder,
         overruns_before: u64,
     ) -> Result<Self, FileError> {
-        let left = WatchNote::of(&folder, stream).filter(|note| note.progress == Progress::Open);
+        let left =
+            RecordingInfo::of(&folder, stream).filter(|info| info.progress == Progress::Open);
         let samples = folder.file(run_folder::SAMPLES);
         match left {
-            Some(note) if samples.exists() => Self::resume(folder, note),
+            Some(info) if samples.exists() => Self::resume(folder, info),
             _ => Self::create(stream, folder, overruns_before),
         }
     }
 
     fn create(stream: u64, folder: RunFolder, overruns_before: u64) -> Result<Self, FileError> {
         // The note first: a recording without one is nobody's.
-        WatchNote { stream, progress: Progress::Open, overruns_before, ..WatchNote::default() }
-            .write(&folder)?;
+        RecordingInfo {
+            stream,
+            progress: Progress::Open,
+            overruns_before,
+            ..RecordingInfo::default()
+        }
+        .write(&folder)?;
         let samples = folder.file(run_folder::SAMPLES);
         let writer = RecordingWriter::create(&samples).map_err(FileError::at(&samples))?;
         let latency = folder.file(run_folder::LATENCY);
@@ -71,7 +77,7 @@ impl Recording {
         Ok(Self::new(stream, folder, stage, writer, (log, Duration::ZERO), overruns_before))
     }
 
-    fn resume(folder: RunFolder, note: WatchNote) -> Result<Self, FileError> {
+    fn resume(folder: RunFolder, info: RecordingInfo) -> Result<Self, FileError> {
         let samples = folder.file(run_folder::SAMPLES);
         let refused = |error: RecordingError| match error {
             RecordingError::Io(error) => error,
@@ -83,22 +89,22 @@ impl Recording {
         let log = IntervalLog::resume(&latency).map_err(FileError::at(&latency))?;
         let recorder = match &last {
             Some(last) => {
-                let missing = note.lost.saturating_sub(note.lost_commands);
-                let longest = note.gaps.iter().map(|gap| gap.cycles()).max().unwrap_or(0);
-                let (gaps, list) = (note.gap_count, note.gaps);
+                let missing = info.lost.saturating_sub(info.lost_commands);
+                let longest = info.gaps.iter().map(|gap| gap.cycles()).max().unwrap_or(0);
+                let (gaps, list) = (info.gap_count, info.gaps);
                 let continuity = Continuity { records, gaps, missing, longest, list };
-                Recorder::resume(last, continuity, note.lost_commands)
+                Recorder::resume(last, continuity, info.lost_commands)
             }
             None => Recorder::new(),
         };
         let stage = MonitorStage::with(recorder);
         let mut recording =
-            Self::new(note.stream, folder, stage, writer, log, note.overruns_before);
+            Self::new(info.stream, folder, stage, writer, log, info.overruns_before);
         if let Some(last) = last {
             recording.newest = last.feedback.cycle.0;
-            recording.played = last.command.stream == note.stream;
+            recording.played = last.command.stream == info.stream;
         }
-        recording.gaps_noted = note.gap_count;
+        recording.gaps_noted = info.gap_count;
         Ok(recording)
     }
 
@@ -171,9 +177,9 @@ impl Recording {
         FileError { path: self.folder.file(name), source }
     }
 
-    fn note(&self, progress: Progress, message: &str) -> WatchNote {
+    fn note(&self, progress: Progress, message: &str) -> RecordingInfo {
         let (continuity, lost_commands) = (self.stage.continuity(), self.stage.lost_commands());
-        WatchNote {
+        RecordingInfo {
             stream: self.stream,
             progress,
             records: continuity.records,
@@ -224,14 +230,14 @@ pub(super) fn give_up(
     stream: u64,
     reason: &FileError,
 ) -> Result<(), FileError> {
-    let note = WatchNote {
+    let info = RecordingInfo {
         stream,
         progress: Progress::Failed,
         message: reason.to_string(),
-        ..WatchNote::default()
+        ..RecordingInfo::default()
     };
-    let written = note.write(folder).or_else(|_| note.overwrite(folder));
-    written.or_else(|error| match WatchNote::of(folder, stream) {
+    let written = info.write(folder).or_else(|_| info.overwrite(folder));
+    written.or_else(|error| match RecordingInfo::of(folder, stream) {
         Some(left) if left.progress == Progress::Open => Err(error),
         _ => Ok(()),
     })

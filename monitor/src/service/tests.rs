@@ -3,10 +3,10 @@
 
 use super::*;
 use crate::recording::file::RecordingReader;
-use crate::recording::note::WatchNote;
+use crate::recording::info::RecordingInfo;
 use crate::summary::{Outcome, Summary};
+use messages::{Cycle, Fault, FaultCode, Nanoseconds};
 use runtime::{Instance, Publisher};
-use signals::{Cycle, Fault, FaultCode, Nanoseconds};
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -102,9 +102,9 @@ impl Bench {
         let mut service = self.service();
         self.offer();
         self.play(5, 0);
-        service.look().unwrap();
+        service.poll().unwrap();
         self.play(40, STREAM);
-        service.look().unwrap();
+        service.poll().unwrap();
         service
     }
 
@@ -125,17 +125,17 @@ fn a_monitor_started_in_the_middle_of_a_job_goes_on_with_its_recording() {
     let mut second = bench.service();
     bench.offers.greet().unwrap();
     bench.play(10, STREAM);
-    second.look().unwrap();
+    second.poll().unwrap();
     assert_eq!(bench.state(), RecordingState::Open);
     bench.end(1, Fault::default());
-    second.look().unwrap();
-    let RecordingState::Complete(note) = bench.state() else { panic!("{:?}", bench.state()) };
+    second.poll().unwrap();
+    let RecordingState::Complete(info) = bench.state() else { panic!("{:?}", bench.state()) };
     let cycles = bench.cycles();
-    assert_eq!((note.records, note.gap_count), (cycles.len() as u64, 1));
+    assert_eq!((info.records, info.gap_count), (cycles.len() as u64, 1));
     assert_eq!((cycles[0], *cycles.last().unwrap()), (100, bench.cycle - 1));
     let whole = bench.cycle - 100;
-    assert!(note.lost > 50 && whole - note.records > 50, "{note:?} of {whole}");
-    assert!(note.records > first);
+    assert!(info.lost > 50 && whole - info.records > 50, "{info:?} of {whole}");
+    assert!(info.records > first);
 }
 
 #[test]
@@ -146,13 +146,13 @@ fn a_monitor_started_soon_after_its_predecessor_lacks_no_cycle() {
     let mut second = bench.service();
     // It hears of the cycles before it hears of the job.
     bench.play(10, STREAM);
-    second.look().unwrap();
+    second.poll().unwrap();
     bench.offers.greet().unwrap();
-    second.look().unwrap();
+    second.poll().unwrap();
     bench.end(1, Fault::default());
-    second.look().unwrap();
-    let RecordingState::Complete(note) = bench.state() else { panic!("{:?}", bench.state()) };
-    assert_eq!((note.records, note.gap_count, note.lost), (bench.cycle - 100, 0, 0));
+    second.poll().unwrap();
+    let RecordingState::Complete(info) = bench.state() else { panic!("{:?}", bench.state()) };
+    assert_eq!((info.records, info.gap_count, info.lost), (bench.cycle - 100, 0, 0));
     assert_eq!(bench.cycles(), (100..bench.cycle).collect::<Vec<_>>());
 }
 
@@ -169,12 +169,12 @@ fn a_monitor_started_after_the_job_completes_the_recording_that_was_left_open() 
             bench.reports.greet().unwrap();
         }
         bench.play(3, 0);
-        second.look().unwrap();
+        second.poll().unwrap();
         if !heard {
             // The controller says it again every second.
             assert_eq!(bench.state(), RecordingState::Open);
             bench.reports.greet().unwrap();
-            second.look().unwrap();
+            second.poll().unwrap();
         }
         assert!(matches!(bench.state(), RecordingState::Complete(_)), "{:?}", bench.state());
     }
@@ -185,13 +185,13 @@ fn an_old_job_is_not_recorded_again() {
     // Concluded; over as the controller says; complete; broken off.
     for case in 0..4 {
         let mut bench = Bench::new();
-        let note = WatchNote { stream: STREAM, ..WatchNote::default() };
-        let failed = crate::recording::note::Progress::Failed;
+        let info = RecordingInfo { stream: STREAM, ..RecordingInfo::default() };
+        let failed = crate::recording::info::Progress::Failed;
         match case {
             0 => bench.folder().write(run_folder::SUMMARY, "{}").unwrap(),
             1 => bench.end(1, Fault::default()),
-            2 => note.write(&bench.folder()).unwrap(),
-            _ => WatchNote { progress: failed, ..note }.write(&bench.folder()).unwrap(),
+            2 => info.write(&bench.folder()).unwrap(),
+            _ => RecordingInfo { progress: failed, ..info }.write(&bench.folder()).unwrap(),
         }
         bench.offer();
         let before = fs::read_dir(bench.folder.path()).unwrap().count();
@@ -199,7 +199,7 @@ fn an_old_job_is_not_recorded_again() {
         bench.offers.greet().unwrap();
         bench.reports.greet().unwrap();
         bench.play(5, 0);
-        service.look().unwrap();
+        service.poll().unwrap();
         assert!(service.recording.is_none(), "{case}");
         assert_eq!(fs::read_dir(bench.folder.path()).unwrap().count(), before, "{case}");
     }
@@ -213,22 +213,22 @@ fn a_job_whose_folder_is_gone_costs_no_more_than_its_recording() {
     let offer = JobOffer::new(STREAM - 1, gone.to_str().unwrap()).unwrap();
     bench.offers.publish(&offer).unwrap();
     bench.play(5, STREAM - 1);
-    service.look().unwrap();
+    service.poll().unwrap();
     assert!(service.recording.is_none() && !gone.exists());
     // Gone while it is recorded.
     fs::create_dir(&gone).unwrap();
     let offer = JobOffer::new(STREAM - 2, gone.to_str().unwrap()).unwrap();
     bench.offers.publish(&offer).unwrap();
     bench.play(5, STREAM - 2);
-    service.look().unwrap();
+    service.poll().unwrap();
     assert!(service.recording.is_some());
     fs::remove_dir_all(&gone).unwrap();
     bench.offer();
-    service.look().unwrap();
+    service.poll().unwrap();
     assert!(!gone.exists());
     bench.play(5, STREAM);
     bench.end(1, Fault::default());
-    service.look().unwrap();
+    service.poll().unwrap();
     assert!(matches!(bench.state(), RecordingState::Complete(_)));
 }
 
@@ -237,10 +237,10 @@ fn a_withdrawn_job_that_was_never_played_is_complete_at_once() {
     let mut bench = Bench::new();
     let mut service = bench.service();
     bench.offer();
-    service.look().unwrap();
+    service.poll().unwrap();
     assert_eq!(bench.state(), RecordingState::Open);
     bench.withdraw();
-    service.look().unwrap();
+    service.poll().unwrap();
     assert!(matches!(bench.state(), RecordingState::Complete(_)));
 }
 
@@ -251,9 +251,9 @@ fn silence_ends_a_recording_that_waits_for_its_last_cycles() {
     let report = ControllerReport { stream: STREAM, is_final: 1, ..ControllerReport::default() };
     let last_cycle = Cycle(bench.cycle + 50);
     bench.reports.publish(&ControllerReport { last_cycle, ..report }).unwrap();
-    service.look().unwrap();
+    service.poll().unwrap();
     service.heard = [Instant::now().checked_sub(SILENCE).unwrap(); 2];
-    service.look().unwrap();
+    service.poll().unwrap();
     assert!(matches!(bench.state(), RecordingState::Complete(_)));
 }
 
@@ -274,7 +274,7 @@ fn a_supervisor_that_dies_leaves_no_job_without_a_summary() {
     let mut bench = Bench::new();
     let mut service = bench.playing();
     bench.end(1, Fault::default());
-    service.look().unwrap();
+    service.poll().unwrap();
     assert!(service.recording.is_none());
     let summary = bench.concluded(&mut service);
     assert_eq!((summary.outcome, summary.error), (Outcome::Completed, None));
@@ -292,7 +292,7 @@ fn a_supervisor_that_dies_leaves_no_job_without_a_summary() {
     let mut service = bench.service();
     bench.offer();
     bench.play(5, 0);
-    service.look().unwrap();
+    service.poll().unwrap();
     let summary = bench.concluded(&mut service);
     assert_eq!((summary.outcome, summary.marks), (Outcome::Aborted, None));
 
@@ -300,7 +300,7 @@ fn a_supervisor_that_dies_leaves_no_job_without_a_summary() {
     let mut bench = Bench::new();
     let mut service = bench.service();
     bench.offer();
-    service.look().unwrap();
+    service.poll().unwrap();
     let refusal = r#"{"file": "job.ngc", "line": 4, "column": 2, "message": "no", "text": "no"}"#;
     bench.folder().write(run_folder::REFUSAL, refusal).unwrap();
     let summary = bench.concluded(&mut service);
@@ -323,7 +323,7 @@ fn a_summary_that_the_supervisor_wrote_is_left_alone() {
     let mut bench = Bench::new();
     let mut service = bench.playing();
     bench.end(1, Fault::default());
-    service.look().unwrap();
+    service.poll().unwrap();
     bench.folder().write(run_folder::SUMMARY, "the supervisor's").unwrap();
     service.conclude_alone(&Machine::builtin()).unwrap();
     let text = fs::read_to_string(bench.folder().file(run_folder::SUMMARY)).unwrap();

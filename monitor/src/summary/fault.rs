@@ -2,11 +2,11 @@
 
 use super::StallSummary;
 use machine::{Axis, JointUnit};
+use messages::fault::FaultUnit;
+use messages::time::CYCLE_TIME;
+use messages::{Fault, FaultCode, FaultQuantity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use signals::fault::FaultUnit;
-use signals::time::CYCLE_TIME;
-use signals::{Fault, FaultCode, FaultQuantity};
 
 /// A fault as summaries tell it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -79,7 +79,7 @@ fn without_value(code: FaultCode) -> &'static str {
         FaultCode::ControllerLost => "the controller process died or left",
         FaultCode::DrivesLost => "the drives process died or left",
         FaultCode::SupervisorLost => "the supervisor died or left",
-        FaultCode::StaleCommand => "drives heard no fresh command and stopped the axes alone",
+        FaultCode::StaleCommand => "drives got no fresh command and stopped the axes by itself",
         FaultCode::DriveFault => "the drives or the motors refuse",
         _ => "no value was reported",
     }

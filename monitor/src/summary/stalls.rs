@@ -1,9 +1,9 @@
 //! The stalls of a run as summaries tell them.
 
+use messages::time::CYCLE_TIME;
+use messages::{ControllerReport, StallCause, Stalls};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use signals::time::CYCLE_TIME;
-use signals::{ControllerReport, StallCause, Stalls};
 use std::collections::BTreeMap;
 
 /// The name of what nothing explains.
@@ -80,7 +80,7 @@ impl StallSummary {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use signals::{Cycle, Nanoseconds};
+    use messages::{Cycle, Nanoseconds};
 
     fn stalls() -> Stalls {
         Stalls {

@@ -26,7 +26,7 @@ pub fn latency(nanoseconds: u64) -> String {
 /// same.
 pub fn rows(summary: &Summary) -> Vec<(String, String)> {
     let mut rows = Rows::default();
-    rows.ending(summary);
+    rows.run_outcome(summary);
     rows.job(summary);
     rows.times(summary);
     rows.marks(summary.marks.as_ref());
@@ -49,7 +49,7 @@ impl Rows {
         }
     }
 
-    fn ending(&mut self, summary: &Summary) {
+    fn run_outcome(&mut self, summary: &Summary) {
         self.add("outcome", summary.outcome.name());
         if let Some(fault) = &summary.fault {
             self.add("fault", fault.to_string());

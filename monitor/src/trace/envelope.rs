@@ -63,7 +63,7 @@ impl Envelope {
 
     /// The curve as lines without gaps: `(time [s], value × scale)`, one or two points a bucket.
     pub fn lines(&self, scale: f64) -> Vec<Vec<(f64, f64)>> {
-        let width = self.stride as f64 * signals::time::CYCLE_TIME;
+        let width = self.stride as f64 * messages::time::CYCLE_TIME;
         let mut lines = vec![Vec::new()];
         for (index, bucket) in self.buckets.iter().enumerate() {
             let time = index as f64 * width;

@@ -1,6 +1,6 @@
 //! Paths in the plane, thinned to a bounded number of points.
 
-use signals::math;
+use messages::math;
 
 /// A point of a path, seen from above.
 #[derive(Debug, Clone, Copy, PartialEq)]

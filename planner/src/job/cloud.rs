@@ -7,10 +7,10 @@
 use std::collections::BTreeMap;
 
 use machine::focus::{marginal_travel, paraxial_travel};
+use messages::math;
 use nalgebra::Vector3;
-use signals::math;
 
-use signals::random::SplitMix64;
+use messages::random::SplitMix64;
 
 use crate::drawing::{Action, Drawing, Note, Step};
 

@@ -4,12 +4,12 @@ use core::ops::RangeInclusive;
 use std::path::Path;
 
 use machine::document::{
-    Findings, Located, NonNegative, Number, Point, Positive, ProblemKind, Quantity, Range,
+    Diagnostics, NonNegative, Number, Point, Positive, ProblemKind, Quantity, Range, Spanned,
 };
 use machine::quantity::{Angle, AngularSpeed, Duration, Length};
 use machine::{DocumentError, Machine, table};
+use messages::math;
 use nalgebra::Vector3;
-use signals::math;
 
 use super::cloud::{self, Cloud};
 use crate::drawing::Drawing;
@@ -19,7 +19,7 @@ table! {
     pub struct CloudTable {
         /// File of lines x, y, z in metres, or in the unit that its first line names, relative to
         /// this file.
-        pub file: Option<Located<String>>,
+        pub file: Option<Spanned<String>>,
         /// A sample: points at random inside a sphere.
         pub sphere: Option<SphereTable>,
         /// Where the file's origin lies.
@@ -67,18 +67,18 @@ table! {
     }
 }
 
-/// The drawing of a cloud; what is wrong with the table goes to `findings`.
+/// The drawing of a cloud; what is wrong with the table goes to `diagnostics`.
 pub(super) fn draw(
     table: &CloudTable,
     folder: &Path,
     power: f64,
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
     machine: &Machine,
 ) -> Result<Drawing, DocumentError> {
-    let line = findings.position(table.place).map_or(0, |(line, _)| line as u64);
-    let points = points(table, folder, findings);
-    let dwell = dwell(table, findings);
-    let from = whole(&table.from, 0..=MOST_POINTS, "from", findings);
+    let line = diagnostics.position(table.span).map_or(0, |(line, _)| line as u64);
+    let points = points(table, folder, diagnostics);
+    let dwell = dwell(table, diagnostics);
+    let from = whole(&table.from, 0..=MOST_POINTS, "from", diagnostics);
     let from = from.unwrap_or(0) as usize;
     let cloud = Cloud {
         layer: table.layer.value,
@@ -94,7 +94,7 @@ pub(super) fn draw(
         dwell,
         from,
     };
-    let stem = Path::new(findings.file()).file_stem().and_then(|stem| stem.to_str());
+    let stem = Path::new(diagnostics.file()).file_stem().and_then(|stem| stem.to_str());
     let name = stem.unwrap_or("cloud").to_owned();
     Ok(cloud.draw(&name, &points, power, Vector3::from(machine.home), line))
 }
@@ -110,22 +110,22 @@ fn whole<R: Range>(
     number: &Number<R>,
     range: RangeInclusive<u64>,
     key: &str,
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) -> Option<u64> {
     let value = number.value;
     if value.fract() == 0.0 && (*range.start() as f64..=*range.end() as f64).contains(&value) {
         return Some(value as u64);
     }
-    findings.refuse(
+    diagnostics.refuse(
         ProblemKind::OutOfRange,
-        number.place,
+        number.span,
         format!("`{key}` cannot be {value}"),
         Some(format!("write a whole number from {} to {}", range.start(), range.end())),
     );
     None
 }
 
-fn points(table: &CloudTable, folder: &Path, findings: &mut Findings) -> Vec<Vector3<f64>> {
+fn points(table: &CloudTable, folder: &Path, diagnostics: &mut Diagnostics) -> Vec<Vector3<f64>> {
     let at = table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
     match (&table.file, &table.sphere) {
         (Some(file), None) => {
@@ -139,33 +139,33 @@ fn points(table: &CloudTable, folder: &Path, findings: &mut Findings) -> Vec<Vec
                 Err(cause) => {
                     let help = "give lines of x, y, z, and the unit in the first line";
                     let text = format!("{}: {cause}", path.display());
-                    findings.contradict(file.place, text, help);
+                    diagnostics.contradict(file.span, text, help);
                     Vec::new()
                 }
             }
         }
         (None, Some(sphere)) => {
-            let count = whole(&sphere.count, 1..=MOST_POINTS, "count", findings);
-            let seed = whole(&sphere.seed, 0..=LARGEST_SEED, "seed", findings);
+            let count = whole(&sphere.count, 1..=MOST_POINTS, "count", diagnostics);
+            let seed = whole(&sphere.seed, 0..=LARGEST_SEED, "seed", diagnostics);
             let (Some(count), Some(seed)) = (count, seed) else { return Vec::new() };
             let center = Vector3::from(sphere.center.value) + at;
             cloud::sphere(center, sphere.radius.value, count as usize, seed)
         }
         (Some(file), Some(_)) => {
             let help = "keep one of `file` and `sphere`";
-            findings.contradict(file.place, "a cloud has one source".to_owned(), help);
+            diagnostics.contradict(file.span, "a cloud has one source".to_owned(), help);
             Vec::new()
         }
         (None, None) => {
             let help = "add `file` or a table [cloud.sphere]";
-            findings.contradict(table.place, "there is no point to mark".to_owned(), help);
+            diagnostics.contradict(table.span, "there is no point to mark".to_owned(), help);
             Vec::new()
         }
     }
 }
 
 /// How long a point is lit [s].
-fn dwell(table: &CloudTable, findings: &mut Findings) -> f64 {
+fn dwell(table: &CloudTable, diagnostics: &mut Diagnostics) -> f64 {
     match (&table.dwell, &table.pulses, &table.pulse_rate) {
         (Some(dwell), None, _) => dwell.value,
         // A rate is told in turns, which are pulses here.
@@ -173,7 +173,7 @@ fn dwell(table: &CloudTable, findings: &mut Findings) -> f64 {
         _ => {
             let help = "write `dwell`, or `pulses` and `pulse_rate`";
             let text = "how long a point is lit is not clear".to_owned();
-            findings.contradict(table.place, text, help);
+            diagnostics.contradict(table.span, text, help);
             1.0
         }
     }

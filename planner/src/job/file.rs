@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use machine::document::{
-    Document, Either, Findings, Fraction, Keyword, Located, Point, Positive, Quantity, schema_text,
+    Diagnostics, Document, Either, Fraction, Keyword, Point, Positive, Quantity, Spanned,
+    schema_text,
 };
 use machine::quantity::{Duration, Length, Speed};
 use machine::{DocumentError, Machine, Override, table};
@@ -15,7 +16,8 @@ use super::letters::{self, Letter, Style};
 use super::path_table::{self, PathTable};
 use super::workpiece_table::{self, AttitudeTable, SurfaceTable};
 use super::{Job, JobError, Marking, MarkingSpeed, gcode, points};
-use crate::drawing::{Drawing, Power};
+
+use crate::drawing::{Drawing, Power, Turns};
 
 table! {
     /// What to mark, and how: exactly one of `letters`, `points`, `path`, `cloud` and `gcode`.
@@ -52,11 +54,11 @@ table! {
     /// Letters of the thesis, in a row around the machine's home.
     pub struct LettersTable {
         /// Any of N, A, S, O.
-        pub text: Located<String>,
+        pub text: Spanned<String>,
         /// Height of a letter.
         pub height: Quantity<Length, Positive> = "20 mm",
         /// curves: no stop on a curve; h1, h2: chord by chord, the thesis's conventions.
-        pub style: Located<Style> = "curves",
+        pub style: Spanned<Style> = "curves",
         /// Where the middle of the row lies as seen from the machine's home.
         pub at: Option<Point>,
     }
@@ -76,7 +78,7 @@ table! {
     /// A G-code program.
     pub struct GcodeTable {
         /// The file, relative to this one.
-        pub file: Located<String>,
+        pub file: Spanned<String>,
     }
 }
 
@@ -133,12 +135,19 @@ pub fn schema() -> String {
     schema_text::<JobTable>("Graver job file")
 }
 
-/// Reads a job file whose text is in `document`; `folder` is where its relative paths start.
-pub(super) fn job(document: Document, folder: &Path, machine: &Machine) -> Result<Job, JobError> {
-    let (table, mut findings) = document.decode::<JobTable>()?;
-    let JobTable { letters, points, path, cloud, gcode, surface, attitude, marking, place } = table;
+/// Reads a job file whose text is in `document`; `folder` is where its relative paths start. The steps
+/// of a program with more than `most` lines stay in its file.
+pub(super) fn job(
+    document: Document,
+    folder: &Path,
+    machine: &Machine,
+    most: u64,
+) -> Result<Job, JobError> {
+    let (table, mut diagnostics) = document.decode::<JobTable>()?;
+    let JobTable { letters, points, path, cloud, gcode, surface, attitude, marking, span: place } =
+        table;
     let home = Vector3::from(machine.home);
-    let surface = surface.and_then(|table| workpiece_table::surface(&table, &mut findings));
+    let surface = surface.and_then(|table| workpiece_table::surface(&table, &mut diagnostics));
     let on_surface;
     let machine = match surface {
         // The machine's home is no place of the flat drawing.
@@ -150,7 +159,8 @@ pub(super) fn job(document: Document, folder: &Path, machine: &Machine) -> Resul
         None => machine,
     };
     let kinds = Kinds { letters, points, path, cloud, gcode };
-    let job = of_tables(kinds, &marking, place, findings, folder, machine)?;
+    let files = Files { folder, most };
+    let job = of_tables(kinds, &marking, place, diagnostics, files, machine)?;
     Ok(workpiece_table::place(job, surface, attitude.as_ref(), home))
 }
 
@@ -163,86 +173,96 @@ struct Kinds {
     gcode: Option<GcodeTable>,
 }
 
+/// Where a job file's own files are, and what is read of them.
+struct Files<'a> {
+    /// Where their relative paths start.
+    folder: &'a Path,
+    /// The steps of a program with more lines stay in its file.
+    most: u64,
+}
+
 /// Reads the one kind that there is.
 fn of_tables(
     kinds: Kinds,
     marking: &MarkingTable,
-    place: machine::document::Place,
-    mut findings: Findings,
-    folder: &Path,
+    place: machine::document::Span,
+    mut diagnostics: Diagnostics,
+    Files { folder, most }: Files<'_>,
     machine: &Machine,
 ) -> Result<Job, JobError> {
     const HELP: &str = "keep one of the tables [letters], [points], [path], [cloud] and [gcode]";
     let Kinds { letters, points, path, cloud, gcode } = kinds;
     let places = [
-        letters.as_ref().map(|table| table.place),
-        points.as_ref().map(|table| table.place),
-        path.as_ref().map(|table| table.place),
-        cloud.as_ref().map(|table| table.place),
-        gcode.as_ref().map(|table| table.place),
+        letters.as_ref().map(|table| table.span),
+        points.as_ref().map(|table| table.span),
+        path.as_ref().map(|table| table.span),
+        cloud.as_ref().map(|table| table.span),
+        gcode.as_ref().map(|table| table.span),
     ];
     for place in places.into_iter().flatten().skip(1) {
-        findings.contradict(place, "a job marks one thing".to_owned(), HELP);
+        diagnostics.contradict(place, "a job marks one thing".to_owned(), HELP);
     }
     let power = power(marking);
     if places.iter().flatten().count() > 1 {
-        Ok(findings.fail()?)
+        Ok(diagnostics.fail()?)
     } else if let Some(letters) = letters {
-        Ok(of_letters(&letters, marking, findings, machine)?)
+        Ok(of_letters(&letters, marking, diagnostics, machine)?)
     } else if let Some(points) = points {
-        Ok(of_points(&points, marking, findings, machine)?)
+        Ok(of_points(&points, marking, diagnostics, machine)?)
     } else if let Some(path) = path {
-        let line = line(&findings, path.place);
-        let name = stem(&findings, "path");
+        let line = line(&diagnostics, path.span);
+        let name = stem(&diagnostics, "path");
         let home = Vector3::from(machine.home);
-        let drawing = path_table::draw(&path, &name, power, home, line, &mut findings);
-        Ok(findings.finish(job_of(drawing, marking))?)
+        let drawing = path_table::draw(&path, &name, power, home, line, &mut diagnostics);
+        Ok(diagnostics.finish(job_of(drawing, marking))?)
     } else if let Some(cloud) = cloud {
-        let drawing = cloud_table::draw(&cloud, folder, power, &mut findings, machine)?;
+        let drawing = cloud_table::draw(&cloud, folder, power, &mut diagnostics, machine)?;
         let files = cloud.file.iter().map(|file| folder.join(&file.value)).collect();
-        Ok(findings.finish(Job { files, ..job_of(drawing, marking) })?)
+        Ok(diagnostics.finish(Job { files, ..job_of(drawing, marking) })?)
     } else if let Some(program) = gcode {
         let path: PathBuf = folder.join(&program.file.value);
-        of_program(&path, marking, findings, machine)
+        of_program(&path, marking, diagnostics, machine, most)
     } else {
-        findings.contradict(
+        diagnostics.contradict(
             place,
             "nothing to mark".to_owned(),
             "add one of the tables [letters], [points], [path], [cloud] and [gcode]",
         );
-        Ok(findings.fail()?)
+        Ok(diagnostics.fail()?)
     }
 }
 
 /// The name of the job file without its extension; `other` where it has none.
-fn stem(findings: &Findings, other: &str) -> String {
-    let stem = Path::new(findings.file()).file_stem().and_then(|stem| stem.to_str());
+fn stem(diagnostics: &Diagnostics, other: &str) -> String {
+    let stem = Path::new(diagnostics.file()).file_stem().and_then(|stem| stem.to_str());
     stem.unwrap_or(other).to_owned()
 }
 
-/// Reads the G-code program at `path` as a job of its own, with `overrides` of `[marking]`.
+/// Reads the G-code program at `path` as a job of its own, with `overrides` of `[marking]`; the steps of
+/// one with more than `most` lines stay in the file.
 pub(super) fn program(
     path: &Path,
     overrides: &[Override],
     machine: &Machine,
+    most: u64,
 ) -> Result<Job, JobError> {
     let empty = Document::parse(&path.display().to_string(), "")?;
-    let (table, findings) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
-    of_program(path, &table.marking, findings, machine)
+    let (table, diagnostics) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
+    of_program(path, &table.marking, diagnostics, machine, most)
 }
 
 fn of_letters(
     table: &LettersTable,
     marking: &MarkingTable,
-    mut findings: Findings,
+    mut diagnostics: Diagnostics,
     machine: &Machine,
 ) -> Result<Job, DocumentError> {
     let mut text = Vec::new();
     for character in table.text.value.chars() {
         match Letter::from_character(character) {
             Some(letter) => text.push(letter),
-            None => findings.contradict(
-                table.text.place,
+            None => diagnostics.contradict(
+                table.text.span,
                 format!("there is no letter `{character}`"),
                 "write any of N, A, S, O",
             ),
@@ -250,9 +270,9 @@ fn of_letters(
     }
     if table.text.value.is_empty() {
         let help = "write any of N, A, S, O";
-        findings.contradict(table.text.place, "there is no letter to mark".to_owned(), help);
+        diagnostics.contradict(table.text.span, "there is no letter to mark".to_owned(), help);
     }
-    let line = line(&findings, table.text.place);
+    let line = line(&diagnostics, table.text.span);
     let (style, home) = (table.style.value, Vector3::from(machine.home));
     let power = Power { level: power(marking), follows_speed: false };
     let middle = home + table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
@@ -266,46 +286,63 @@ fn of_letters(
         Style::H1 => (Some(H1_RAPID), None),
         Style::H2 => (Some(f64::INFINITY), Some(REPLICA)),
     };
-    findings.finish(Job { rapid, ideal_only, ..job_of(drawing, marking) })
+    let mut job = job_of(drawing, marking);
+    // The printed times have a rest between two strokes; and a hold next to a letter is as accurate as
+    // at rest.
+    job.marking.turns = Turns::Stop;
+    diagnostics.finish(Job { rapid, ideal_only, ..job })
 }
 
 fn of_points(
     table: &PointsTable,
     marking: &MarkingTable,
-    mut findings: Findings,
+    mut diagnostics: Diagnostics,
     machine: &Machine,
 ) -> Result<Job, DocumentError> {
     if table.points.is_empty() {
         let help = "write points such as [[\"10 mm\", \"5 mm\"]]";
-        findings.contradict(table.place, "there is no point to mark".to_owned(), help);
+        diagnostics.contradict(table.span, "there is no point to mark".to_owned(), help);
     }
     let home = Vector3::from(machine.home);
     let places: Vec<Vector3<f64>> =
         table.points.iter().map(|point| home + Vector3::from(point.value)).collect();
-    let line = line(&findings, table.place);
-    let name = stem(&findings, "points");
+    let line = line(&diagnostics, table.span);
+    let name = stem(&diagnostics, "points");
     let drawing = points::draw(&name, &places, table.dwell.value, power(marking), home, line);
-    findings.finish(job_of(drawing, marking))
+    diagnostics.finish(job_of(drawing, marking))
 }
 
 fn of_program(
     path: &Path,
     marking: &MarkingTable,
-    mut findings: Findings,
+    mut diagnostics: Diagnostics,
     machine: &Machine,
+    most: u64,
 ) -> Result<Job, JobError> {
     if let Some(power) = &marking.power {
-        findings.contradict(
-            power.place,
+        diagnostics.contradict(
+            power.span,
             "the power of a G-code program is its S words'".to_owned(),
             "leave `power` out",
         );
     }
-    findings.finish(())?;
-    let text = super::read_program(path)?;
-    let program = gcode::read(&path.display().to_string(), &text, machine)?;
-    let files = vec![path.to_owned()];
-    Ok(Job { program: Some(program.facts), files, ..job_of(program.drawing, marking) })
+    diagnostics.finish(())?;
+    let (program, steps) = gcode::ProgramFile::open(path, machine, most)?;
+    let survey = program.survey.clone();
+    let rest = if steps.is_none() { Some(program) } else { None };
+    let drawing = Drawing {
+        name: gcode::name(&path.display().to_string()),
+        start: Vector3::from(machine.home),
+        steps: steps.unwrap_or_default(),
+        notes: survey.notes.clone(),
+    };
+    Ok(Job {
+        program: Some(survey.facts),
+        survey: Some(survey),
+        rest,
+        files: vec![path.to_owned()],
+        ..job_of(drawing, marking)
+    })
 }
 
 fn job_of(drawing: Drawing, marking: &MarkingTable) -> Job {
@@ -320,6 +357,7 @@ fn how(table: &MarkingTable) -> Marking {
         }),
         max_speed: table.max_speed.as_ref().map(|speed| speed.value),
         tolerance: table.tolerance.as_ref().map(|tolerance| tolerance.value),
+        turns: Turns::default(),
     }
 }
 
@@ -327,6 +365,6 @@ fn power(table: &MarkingTable) -> f64 {
     table.power.as_ref().map_or(1.0, |power| power.value)
 }
 
-fn line(findings: &Findings, place: machine::document::Place) -> u64 {
-    findings.position(place).map_or(0, |(line, _)| line as u64)
+fn line(diagnostics: &Diagnostics, place: machine::document::Span) -> u64 {
+    diagnostics.position(place).map_or(0, |(line, _)| line as u64)
 }

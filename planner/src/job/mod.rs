@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use machine::document::{Document, nearest};
 use machine::{DocumentError, Machine, Override};
 
-use crate::drawing::{Action, Drawing, Step};
+use crate::drawing::{Action, Drawing, Step, Turns};
 use gcode::GcodeError;
 use nalgebra::Vector3;
 
@@ -30,15 +30,20 @@ pub struct Job {
     pub rapid: Option<f64>,
     /// What a G-code program asks for; `None` for other jobs.
     pub program: Option<gcode::ProgramFacts>,
+    /// What the first reading of a G-code program found; `None` for other jobs.
+    pub survey: Option<gcode::Survey>,
+    /// A program too long to be held, whose steps follow those of the drawing; `None` where the drawing
+    /// has all of them, as after [`Job::read`].
+    pub rest: Option<gcode::ProgramFile>,
     /// Why this job can be planned but not run on a machine, if so.
     pub ideal_only: Option<&'static str>,
     /// How the joints stand before the job, load side [m or rad], on a machine that is planned by
     /// its joints; `None` where they are at home.
-    pub standing: Option<signals::AxisArray>,
+    pub standing: Option<messages::AxisArray>,
     /// The surface that the drawing is put on; `None` where it lies as it is drawn.
     pub surface: Option<machine::surface::Surface>,
     /// How the tool is turned.
-    pub attitude: crate::attitude::AttitudeLaw,
+    pub attitude: crate::geometry::attitude::AttitudeLaw,
     /// The files that it was read from.
     pub files: Vec<PathBuf>,
 }
@@ -51,10 +56,12 @@ impl Job {
             marking: Marking::default(),
             rapid: None,
             program: None,
+            survey: None,
+            rest: None,
             ideal_only: None,
             standing: None,
             surface: None,
-            attitude: crate::attitude::AttitudeLaw::Level,
+            attitude: crate::geometry::attitude::AttitudeLaw::Level,
             files: Vec::new(),
         }
     }
@@ -71,6 +78,8 @@ pub struct Marking {
     /// How far a smoothed join may lie from the drawn line, and the tool from its path between two
     /// setpoints [m].
     pub tolerance: Option<f64>,
+    /// How the tool gets from one line to the next.
+    pub turns: Turns,
 }
 
 /// The policy for the speed while the laser is on, constant along each stroke.
@@ -125,15 +134,47 @@ const JOB_FILE: &str = "toml";
 const BUILTIN: &str = include_str!("../../../jobs/letters.toml");
 
 impl Job {
+    /// Lines of a G-code program whose steps are held in memory, at most.
+    pub const HELD: u64 = 100_000;
+
     /// Reads the job at `path` for `machine`, with `overrides` of its keys laid over it.
     ///
     /// # Errors
     /// Where it cannot be read or is not sound, with the place.
     pub fn read(path: &Path, overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
+        Self::read_up_to(path, overrides, machine, u64::MAX)
+    }
+
+    /// Like [`Job::read`], but the steps of a G-code program with more than [`Job::HELD`] lines stay in
+    /// its file: [`Job::steps`] reads them as they are asked for.
+    ///
+    /// # Errors
+    /// As of [`Job::read`].
+    pub fn open(path: &Path, overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
+        Self::read_up_to(path, overrides, machine, Self::HELD)
+    }
+
+    /// The steps of its drawing, in order, from memory or from the program's file.
+    ///
+    /// # Errors
+    /// Where the file cannot be opened; and the steps end with an error where it cannot be read on or
+    /// was changed.
+    pub fn steps(&self) -> Result<impl Iterator<Item = Result<Step, JobError>> + '_, JobError> {
+        let rest = self.rest.as_ref().map(gcode::ProgramFile::steps).transpose()?;
+        let rest = rest.into_iter().flatten().map(|step| step.map_err(JobError::Gcode));
+        Ok(self.drawing.steps.iter().cloned().map(Ok).chain(rest))
+    }
+
+    fn read_up_to(
+        path: &Path,
+        overrides: &[Override],
+        machine: &Machine,
+        most: u64,
+    ) -> Result<Self, JobError> {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or("");
         let extension = extension.to_ascii_lowercase();
         if GCODE.contains(&extension.as_str()) {
-            return file::program(path, overrides, machine);
+            return file::program(path, overrides, machine, most);
         }
         if extension != JOB_FILE {
             let known = || GCODE.into_iter().chain([JOB_FILE]);
@@ -150,7 +191,7 @@ impl Job {
         let name = path.display().to_string();
         let document = Document::parse(&name, &text)?.override_with(overrides, "")?;
         let folder = path.parent().unwrap_or_else(|| Path::new(""));
-        let mut job = file::job(document, folder, machine)?;
+        let mut job = file::job(document, folder, machine, most)?;
         job.files.push(path.to_owned());
         Ok(job)
     }
@@ -161,7 +202,7 @@ impl Job {
     /// Where an override is not sound.
     pub fn builtin(overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
         let document = Document::parse("letters.toml", BUILTIN)?.override_with(overrides, "")?;
-        file::job(document, Path::new(""), machine)
+        file::job(document, Path::new(""), machine, u64::MAX)
     }
 }
 
@@ -202,14 +243,4 @@ impl JobError {
 fn read_text(path: &Path) -> Result<String, JobError> {
     std::fs::read_to_string(path)
         .map_err(|cause| JobError::Unreadable { path: path.to_owned(), cause })
-}
-
-/// The text of the program at `path`. Many editors of G-code write comments in Latin-1: what is not
-/// UTF-8 is taken for that, in which every byte is the character with its number, so that columns
-/// stay right.
-fn read_program(path: &Path) -> Result<String, JobError> {
-    let bytes = std::fs::read(path)
-        .map_err(|cause| JobError::Unreadable { path: path.to_owned(), cause })?;
-    Ok(String::from_utf8(bytes)
-        .unwrap_or_else(|error| error.as_bytes().iter().copied().map(char::from).collect()))
 }

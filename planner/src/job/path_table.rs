@@ -2,13 +2,13 @@
 
 use core::f64::consts::TAU;
 
-use machine::document::{Findings, Point, Positive, Quantity};
+use machine::document::{Diagnostics, Point, Positive, Quantity};
 use machine::quantity::{Angle, Length};
 use machine::table;
 use nalgebra::Vector3;
 
-use crate::attitude::turned;
 use crate::drawing::{Action, Curve, Drawing, Power, Step};
+use crate::geometry::attitude::turned;
 
 table! {
     /// A path in space, marked in one go: exactly one of `points` and `circle`.
@@ -35,14 +35,14 @@ table! {
 }
 
 /// The drawing of a path at `power`, reached from `home` [m], as asked for in `line` of the job
-/// `name`; what is wrong with the table goes to `findings`.
+/// `name`; what is wrong with the table goes to `diagnostics`.
 pub(super) fn draw(
     table: &PathTable,
     name: &str,
     power: f64,
     home: Vector3<f64>,
     line: u64,
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) -> Drawing {
     let at = table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
     let origin = home + at;
@@ -51,7 +51,7 @@ pub(super) fn draw(
             if points.len() < 2 {
                 let help = "write points such as [[\"0 mm\", \"0 mm\"], [\"10 mm\", \"5 mm\"]]";
                 let text = "a path has two points at least".to_owned();
-                findings.contradict(table.place, text, help);
+                diagnostics.contradict(table.span, text, help);
             }
             let corner = |point: &Point| origin + Vector3::from(point.value);
             let lines = points.windows(2);
@@ -70,7 +70,7 @@ pub(super) fn draw(
         }
         _ => {
             let help = "write one of `points` and a table [path.circle]";
-            findings.contradict(table.place, "which path is not clear".to_owned(), help);
+            diagnostics.contradict(table.span, "which path is not clear".to_owned(), help);
             Vec::new()
         }
     };

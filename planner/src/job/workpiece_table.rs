@@ -1,6 +1,6 @@
 //! The job file's tables of the surface that is marked and of how the tool is turned.
 
-use machine::document::{Findings, Keyword, Located, Point, Positive, Quantity};
+use machine::document::{Diagnostics, Keyword, Point, Positive, Quantity, Spanned};
 use machine::quantity::{Angle, Length};
 use machine::surface::{Cone, Placement, Projection, Shape, Surface};
 use machine::table;
@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use super::Job;
-use crate::attitude::{AttitudeLaw, turned};
+use crate::geometry::attitude::{AttitudeLaw, turned};
 
 table! {
     /// The surface that the flat drawing is put on; the beam is against its normal. Exactly one of
@@ -36,7 +36,7 @@ table! {
         pub height: Quantity<Length, Positive>,
         /// develop: unrolled, lengths stay; arc: x along the circle; central: seen from the axis;
         /// ortho: seen from above.
-        pub projection: Located<ProjectionWord> = "develop",
+        pub projection: Spanned<ProjectionWord> = "develop",
     }
 }
 
@@ -48,7 +48,7 @@ table! {
         /// Its length along its axis.
         pub height: Quantity<Length, Positive>,
         /// As for a cone.
-        pub projection: Located<ProjectionWord> = "develop",
+        pub projection: Spanned<ProjectionWord> = "develop",
     }
 }
 
@@ -108,8 +108,8 @@ impl JsonSchema for ProjectionWord {
     }
 }
 
-/// The surface of a table; what is wrong with it goes to `findings`.
-pub(super) fn surface(table: &SurfaceTable, findings: &mut Findings) -> Option<Surface> {
+/// The surface of a table; what is wrong with it goes to `diagnostics`.
+pub(super) fn surface(table: &SurfaceTable, diagnostics: &mut Diagnostics) -> Option<Surface> {
     let cone = match (&table.cone, &table.cylinder) {
         (Some(cone), None) => Cone {
             bottom: cone.bottom_radius.value,
@@ -125,7 +125,7 @@ pub(super) fn surface(table: &SurfaceTable, findings: &mut Findings) -> Option<S
         },
         _ => {
             let help = "write one table [surface.cone] or [surface.cylinder]";
-            findings.contradict(table.place, "which surface is not clear".to_owned(), help);
+            diagnostics.contradict(table.span, "which surface is not clear".to_owned(), help);
             return None;
         }
     };

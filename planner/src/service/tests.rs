@@ -5,12 +5,12 @@
 use super::{Service, Work};
 use crate::request::{JobRequest, Refusal};
 use machine::Machine;
-use runtime::{Domain, Instance, Publisher, Reading, Role, Subscriber};
-use signals::setpoint::flags;
-use signals::{
+use messages::setpoint::flags;
+use messages::{
     AxisArray, ControllerState, JobOffer, Nanoseconds, PlannerPhase, Progress, Setpoint,
     axis::axis_array, run_folder,
 };
+use runtime::{Domain, Instance, Publisher, Role, Samples, Subscriber};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
@@ -50,7 +50,7 @@ impl Bench {
             service,
             offers: holder.publisher().unwrap(),
             progress: holder.publisher().unwrap(),
-            setpoints: holder.subscriber(Reading::Every).unwrap(),
+            setpoints: holder.subscriber(Samples::All).unwrap(),
             folder: tempfile::tempdir().unwrap(),
             said: Progress {
                 published: Nanoseconds(1),

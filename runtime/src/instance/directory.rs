@@ -29,7 +29,7 @@ pub(crate) enum Place {
 }
 
 /// Looks at the place, following no link.
-pub(crate) fn look(path: &Path) -> io::Result<Place> {
+pub(crate) fn inspect(path: &Path) -> io::Result<Place> {
     let found = match fs::symlink_metadata(path) {
         Ok(found) => found,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Place::Free),
@@ -105,20 +105,20 @@ mod tests {
     fn only_a_true_directory_of_our_own_that_is_closed_counts_as_ours() {
         let scratch = Scratch::new("look");
         let at = |name: &str| scratch.0.join(name);
-        assert_eq!(look(&at("none")).unwrap(), Place::Free);
+        assert_eq!(inspect(&at("none")).unwrap(), Place::Free);
         create_private(&at("ours")).unwrap();
-        assert_eq!(look(&at("ours")).unwrap(), Place::Ours);
+        assert_eq!(inspect(&at("ours")).unwrap(), Place::Ours);
 
         let taken = |what: &str| Place::Taken(what.into());
         std::os::unix::fs::symlink(at("ours"), at("link")).unwrap();
         let link = format!("is a symbolic link, made by user {}", user());
-        assert_eq!(look(&at("link")).unwrap(), taken(&link));
+        assert_eq!(inspect(&at("link")).unwrap(), taken(&link));
         fs::write(at("file"), "").unwrap();
         let file = format!("is no directory, made by user {}", user());
-        assert_eq!(look(&at("file")).unwrap(), taken(&file));
+        assert_eq!(inspect(&at("file")).unwrap(), taken(&file));
         fs::set_permissions(at("ours"), Permissions::from_mode(0o750)).unwrap();
         let open = "is yours, but its mode is 750 instead of 700";
-        assert_eq!(look(&at("ours")).unwrap(), taken(open));
+        assert_eq!(inspect(&at("ours")).unwrap(), taken(open));
     }
 
     #[test]
@@ -126,7 +126,7 @@ mod tests {
         let scratch = Scratch::new("create");
         let deep = scratch.0.join("a/b");
         create_private(&deep).unwrap();
-        assert_eq!(look(&deep).unwrap(), Place::Ours);
+        assert_eq!(inspect(&deep).unwrap(), Place::Ours);
         fs::set_permissions(&deep, Permissions::from_mode(0o711)).unwrap();
         create_private(&deep).unwrap();
         assert_eq!(fs::metadata(&deep).unwrap().mode() & 0o777, 0o711);

@@ -6,12 +6,12 @@
 use std::mem::{align_of, size_of};
 
 use iceoryx2::service::header::publish_subscribe::Header;
-use signals::{
+use messages::{
     Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress, Setpoint,
 };
 
 use super::page;
-use crate::channel::{BORROWED, Channel, Quality, Serial, history};
+use crate::channel::{BORROWED, Channel, Qos, Serial, history};
 
 /// What a segment has beside its samples and queues: counters, pointers, alignment.
 const OVERHEAD: usize = 512;
@@ -103,8 +103,8 @@ fn whole<T: Channel>() -> u64 {
 }
 
 fn depth<T: Channel>() -> usize {
-    match T::QUALITY {
-        Quality::Newest { depth } | Quality::Complete { depth } => depth,
+    match T::QOS {
+        Qos::KeepLast { depth } | Qos::Reliable { depth } => depth,
     }
 }
 
@@ -120,14 +120,14 @@ mod tests {
     use crate::domain::Entry;
     use crate::operator::{OperatorLink, OperatorQueue};
     use crate::wake::Wake;
-    use crate::{Domain, Instance, Reading};
+    use crate::{Domain, Instance, Samples};
 
     /// A publisher and all its readers.
     fn open<T: Channel>(domain: &Domain, ports: &mut Vec<Box<dyn std::any::Any>>) {
         ports.push(Box::new(domain.publisher::<T>().unwrap()));
         for reader in 0..T::READERS {
             let deep = reader < T::DEEP_READERS;
-            let reading = if deep { Reading::Every } else { Reading::Newest };
+            let reading = if deep { Samples::All } else { Samples::Latest };
             ports.push(Box::new(domain.subscriber::<T>(reading).unwrap()));
         }
     }

@@ -2,8 +2,8 @@
 
 use std::io;
 
-use signals::RealtimeFacts;
-use signals::report::refused;
+use messages::RealtimeFacts;
+use messages::report::refused;
 
 /// What these threads, by name, were refused: one sentence for each kind of thing, with what it
 /// means and what to change. Empty when all of them got what they asked for; a thread that asked

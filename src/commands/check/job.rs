@@ -2,9 +2,9 @@
 
 use crate::exit::Failure;
 use machine::{Machine, Motor};
-use planner::margins::LeastMargin;
-use planner::plan::Uses;
+use planner::plan::LimitUtilization;
 use planner::request::JobRequest;
+use planner::verify::margins::LeastMargin;
 use planner::{Plan, PlanFacts};
 use serde::Serialize;
 
@@ -55,7 +55,7 @@ impl JobReport {
 
 /// The checker's uses by axis; for a stepper it keeps pull-out torque and pulse rate where a DC
 /// motor has current and voltage.
-fn motors(machine: &Machine, uses: &Uses) -> Vec<MotorUse> {
+fn motors(machine: &Machine, uses: &LimitUtilization) -> Vec<MotorUse> {
     let at = |list: &[f64], index: usize| list.get(index).copied().unwrap_or_default();
     let motor = |(index, axis): (usize, &machine::Axis)| {
         let second = at(&uses.voltage, index);

@@ -82,7 +82,7 @@ pub struct Surveyed {
 /// Looks over the area of `machine`.
 ///
 /// # Errors
-/// Where the mechanism cannot be assembled at home.
+/// Where the mechanism has no solution at home.
 pub fn survey(machine: &Machine) -> Result<Surveyed, KinematicsError> {
     machine.mechanism.visit(Survey { machine })
 }
@@ -162,13 +162,13 @@ impl<const N: usize, M: Mechanism<N>> Grid<'_, N, M> {
         for row in 0..GRID {
             for step in 0..GRID {
                 let column = if row % 2 == 0 { step } else { GRID - 1 - step };
-                ground[row * GRID + column] = self.look(column, row);
+                ground[row * GRID + column] = self.sample(column, row);
             }
         }
         ground
     }
 
-    fn look(&mut self, column: usize, row: usize) -> Ground {
+    fn sample(&mut self, column: usize, row: usize) -> Ground {
         let along = |axis: usize, index: usize| {
             let area = &self.machine.area;
             let share = index as f64 / (GRID - 1) as f64;
@@ -205,12 +205,12 @@ impl<const N: usize, M: Mechanism<N>> Grid<'_, N, M> {
                 return Err(Refused { code: "limit", axis: Some(axis), singular: false });
             }
         }
-        let assembly = self.mechanism.assemble(&joints, self.branch, None)?;
-        let margins = self.mechanism.margins(&assembly);
+        let chain = self.mechanism.solve(&joints, self.branch, None)?;
+        let margins = self.mechanism.margins(&chain);
         match margins.iter().find(|margin| margin.value < margin.limit) {
             Some(margin) => Err(Refused { code: margin.name, axis: None, singular: true }),
             None => {
-                let jacobian = self.mechanism.jacobian(&assembly);
+                let jacobian = self.mechanism.jacobian(&chain);
                 let count_error = quantisation_bound(&jacobian, &self.counts);
                 Ok(Reached { joints, margins, count_error })
             }

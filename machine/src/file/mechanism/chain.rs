@@ -6,13 +6,13 @@ use core::f64::consts::TAU;
 use nalgebra::Vector3;
 
 use crate::actuator::Friction;
-use crate::document::{Either, Findings, Number, Place, Positive, ProblemKind};
+use crate::document::{Diagnostics, Either, Number, Positive, ProblemKind, Span};
 use crate::file::axes::{Joint, JointUnit};
 use crate::file::tables::{AxisTable, MachineTable};
 use crate::kinematics::{Joints, KinematicsError, Mechanism, Pose};
 use crate::transmission::{Elasticity, link};
 
-use super::{Site, rest, springs};
+use super::{BuildContext, home, springs};
 
 /// The spring behind an axis [N/m or N·m/rad at the joint] and the damping ratio of its load.
 struct Spring<'a> {
@@ -29,7 +29,7 @@ struct Output<'a> {
     spring: Option<Spring<'a>>,
     /// What the joint must be measured in for this transmission.
     unit: JointUnit,
-    place: Place,
+    span: Span,
 }
 
 /// A joint of a mechanism as its table names it.
@@ -45,7 +45,7 @@ fn output(axis: &AxisTable) -> Vec<Output<'_>> {
             spring: springs::of_screw(screw.stiffness.as_ref(), screw.shaft.as_ref(), lead)
                 .map(|stiffness| Spring { stiffness, damping_ratio: &screw.damping_ratio }),
             unit: JointUnit::Length,
-            place: screw.place,
+            span: screw.span,
         }
     });
     let belt = table.belt.as_ref().map(|belt| Output {
@@ -54,7 +54,7 @@ fn output(axis: &AxisTable) -> Vec<Output<'_>> {
         spring: springs::of_belt(belt.stiffness.as_ref(), belt.section.as_ref())
             .map(|stiffness| Spring { stiffness, damping_ratio: &belt.damping_ratio }),
         unit: JointUnit::Length,
-        place: belt.place,
+        span: belt.span,
     });
     let direct = table.direct.as_ref().map(|direct| Output {
         travel: 1.0,
@@ -64,7 +64,7 @@ fn output(axis: &AxisTable) -> Vec<Output<'_>> {
             damping_ratio: &direct.damping_ratio,
         }),
         unit: JointUnit::Angle,
-        place: direct.place,
+        span: direct.span,
     });
     let link = table.link.as_ref().map(|table| Output {
         travel: 1.0,
@@ -78,14 +78,14 @@ fn output(axis: &AxisTable) -> Vec<Output<'_>> {
             damping_ratio: &table.damping_ratio,
         }),
         unit: JointUnit::Angle,
-        place: table.place,
+        span: table.span,
     });
     let planar = table.planar.as_ref().map(|planar| Output {
         travel: planar.pitch.value / TAU,
         inertia: 0.0,
         spring: None,
         unit: JointUnit::Length,
-        place: planar.place,
+        span: planar.span,
     });
     [screw, belt, direct, link, planar].into_iter().flatten().collect()
 }
@@ -102,20 +102,21 @@ type Standing<const N: usize> = (Vec<Joint>, Option<[Elasticity; N]>, [f64; 3]);
 pub(super) fn joints<const N: usize, M: Mechanism<N>>(
     mechanism: &M,
     names: [Named; N],
-    site: &Site<'_>,
-    findings: &mut Findings,
+    context: &BuildContext<'_>,
+    diagnostics: &mut Diagnostics,
 ) -> Option<Standing<N>> {
-    let Site { table, area, home } = *site;
-    let (standing, assembly) = standing(mechanism, &names, table, home, findings)?;
+    let BuildContext { table, area, home } = *context;
+    let (standing, chain) = standing(mechanism, &names, table, home, diagnostics)?;
     // In an area that is refused already, where to rest cannot be said.
-    if let Some(values) = table.home_axes.as_ref().filter(|_| findings.is_empty()) {
-        rest::check(mechanism, &assembly, values, area, findings);
+    if let Some(values) = table.home_axes.as_ref().filter(|_| diagnostics.is_empty()) {
+        home::check(mechanism, &chain, values, area, diagnostics);
     }
-    let mass = mechanism.mass_matrix(&assembly);
+    let mass = mechanism.mass_matrix(&chain);
     let mut joints = Vec::with_capacity(N);
     let mut springs = Vec::with_capacity(N);
     for (index, (name, unit)) in names.into_iter().enumerate() {
-        let output = axis(site, name).and_then(|axis| transmission(name, unit, axis, findings));
+        let output =
+            axis(context, name).and_then(|axis| transmission(name, unit, axis, diagnostics));
         let load = mass[(index, index)];
         let spring = output.as_ref().and_then(|output| output.spring.as_ref());
         springs.extend(
@@ -136,22 +137,22 @@ pub(super) fn joints<const N: usize, M: Mechanism<N>>(
         });
     }
     if !springs.is_empty() && springs.len() < N {
-        findings.contradict(
-            table.axis.place,
+        diagnostics.contradict(
+            table.axis.span,
             "some axes have an elastic transmission, others a rigid one".to_owned(),
             "give every axis a `stiffness`, or none",
         );
     }
-    let home = mechanism.pose(&assembly).position.into();
+    let home = mechanism.pose(&chain).position.into();
     Some((joints, springs.try_into().ok(), home))
 }
 
 /// A number that must be 1 or −1.
-pub(super) fn sign(number: &Number, findings: &mut Findings) -> i32 {
+pub(super) fn sign(number: &Number, diagnostics: &mut Diagnostics) -> i32 {
     if number.value != 1.0 && number.value != -1.0 {
-        findings.refuse(
+        diagnostics.refuse(
             ProblemKind::OutOfRange,
-            number.place,
+            number.span,
             format!("`{}` is no side", number.value),
             Some("write 1 or -1".to_owned()),
         );
@@ -159,21 +160,21 @@ pub(super) fn sign(number: &Number, findings: &mut Findings) -> i32 {
     if number.value < 0.0 { -1 } else { 1 }
 }
 
-fn axis<'a>(site: &Site<'a>, name: &str) -> Option<&'a AxisTable> {
-    site.table.axis.entries.iter().find(|(found, _)| found.value == name).map(|(_, axis)| axis)
+fn axis<'a>(context: &BuildContext<'a>, name: &str) -> Option<&'a AxisTable> {
+    context.table.axis.entries.iter().find(|(found, _)| found.value == name).map(|(_, axis)| axis)
 }
 
 /// The range [m or rad] that the file gives to the axis `name`, infinite where it is unlimited.
-pub(super) fn range(site: &Site<'_>, name: &str) -> Option<[f64; 2]> {
-    match axis(site, name)?.limits.position.as_ref()? {
+pub(super) fn range(context: &BuildContext<'_>, name: &str) -> Option<[f64; 2]> {
+    match axis(context, name)?.limits.position.as_ref()? {
         Either::Word(_) => Some([f64::NEG_INFINITY, f64::INFINITY]),
         Either::Value([lower, upper]) => Some([lower.value, upper.value]),
     }
 }
 
 /// The friction of the axis `name`, seen at its joint: coulomb [N or N·m], viscous per joint speed.
-pub(super) fn friction(site: &Site<'_>, name: &str) -> Friction {
-    let Some(axis) = axis(site, name) else { return Friction { coulomb: 0.0, viscous: 0.0 } };
+pub(super) fn friction(context: &BuildContext<'_>, name: &str) -> Friction {
+    let Some(axis) = axis(context, name) else { return Friction { coulomb: 0.0, viscous: 0.0 } };
     let travel = output(axis).first().map_or(1.0, |output| output.travel);
     let ratio = travel / axis.gear.value;
     Friction {
@@ -188,18 +189,18 @@ fn standing<const N: usize, M: Mechanism<N>>(
     names: &[Named; N],
     table: &MachineTable,
     home: [f64; 3],
-    findings: &mut Findings,
-) -> Option<(Joints<N>, M::Assembly)> {
+    diagnostics: &mut Diagnostics,
+) -> Option<(Joints<N>, M::ChainState)> {
     let branch = mechanism.branch();
     let solved = match &table.home_axes {
         None => mechanism.inverse(&Pose::at(Vector3::from(home)), branch, &Joints::zeros()),
         Some(values) if values.len() == N => {
             for (value, (name, unit)) in values.iter().zip(names) {
-                unit.expect(value, name, findings);
+                unit.expect(value, name, diagnostics);
             }
             if let Some(point) = &table.home {
-                findings.contradict(
-                    point.place,
+                diagnostics.contradict(
+                    point.span,
                     "the rest is given twice, by `home` and by `home_axes`".to_owned(),
                     "keep one of them",
                 );
@@ -207,28 +208,28 @@ fn standing<const N: usize, M: Mechanism<N>>(
             Ok(Joints::from_fn(|row, _| values[row].value))
         }
         Some(values) => {
-            let place = values.first().map_or(table.place, |value| value.place);
-            findings.contradict(
-                place,
+            let span = values.first().map_or(table.span, |value| value.span);
+            diagnostics.contradict(
+                span,
                 format!("`home_axes` has {} values, the mechanism {N} axes", values.len()),
                 &format!("write one for each of {}", names.map(|(name, _)| name).join(", ")),
             );
             return None;
         }
     };
-    let found = solved.and_then(|q| Ok((q, mechanism.assemble(&q, branch, None)?)));
-    found.map_err(|error| refuse_home(&error, table, findings)).ok()
+    let found = solved.and_then(|q| Ok((q, mechanism.solve(&q, branch, None)?)));
+    found.map_err(|error| refuse_home(&error, table, diagnostics)).ok()
 }
 
-fn refuse_home(error: &KinematicsError, table: &MachineTable, findings: &mut Findings) {
-    let place = table
+fn refuse_home(error: &KinematicsError, table: &MachineTable, diagnostics: &mut Diagnostics) {
+    let span = table
         .home
-        .map(|point| point.place)
-        .or(table.home_axes.as_ref().and_then(|values| Some(values.first()?.place)))
-        .unwrap_or(table.place);
-    findings.refuse(
+        .map(|point| point.span)
+        .or(table.home_axes.as_ref().and_then(|values| Some(values.first()?.span)))
+        .unwrap_or(table.span);
+    diagnostics.refuse(
         ProblemKind::Contradiction,
-        place,
+        span,
         format!("the mechanism cannot rest here: {error}"),
         Some("give a `home` that it can reach, or `home_axes`".to_owned()),
     );
@@ -239,20 +240,20 @@ fn transmission<'a>(
     name: &str,
     unit: JointUnit,
     axis: &'a AxisTable,
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) -> Option<Output<'a>> {
     let found = output(axis);
     if let [_, second, ..] = found.as_slice() {
-        findings.contradict(
-            second.place,
+        diagnostics.contradict(
+            second.span,
             format!("axis `{name}` has two transmissions"),
             "keep one",
         );
     }
     let only = found.into_iter().next();
     match (&only, unit) {
-        (Some(output), _) if output.unit != unit => findings.contradict(
-            output.place,
+        (Some(output), _) if output.unit != unit => diagnostics.contradict(
+            output.span,
             format!(
                 "axis `{name}` cannot have this transmission: it is measured in {}",
                 unit.name()
@@ -262,9 +263,9 @@ fn transmission<'a>(
                 JointUnit::Angle => "use `direct` or `link`",
             },
         ),
-        (None, JointUnit::Length) => findings.refuse(
+        (None, JointUnit::Length) => diagnostics.refuse(
             ProblemKind::MissingKey,
-            axis.transmission.place,
+            axis.transmission.span,
             format!("axis `{name}` moves along a line, and nothing says how far in a turn"),
             Some(format!("add [axis.{name}.transmission.screw], `.belt` or `.planar`")),
         ),

@@ -1,8 +1,8 @@
 //! The table of a five-bar.
 
 use super::chain::{self, sign};
-use super::{Built, Site};
-use crate::document::{Findings, NonNegative, Number, Positive, Quantity};
+use super::{BuildContext, Built};
+use crate::document::{Diagnostics, NonNegative, Number, Positive, Quantity};
 use crate::file::axes::JointUnit;
 use crate::mechanisms::MechanismKind;
 use crate::mechanisms::five_bar::{FiveBar, FiveBarBranch};
@@ -46,15 +46,15 @@ table! {
 
 pub(super) fn build(
     table: &FiveBarTable,
-    site: &Site<'_>,
-    findings: &mut Findings,
+    context: &BuildContext<'_>,
+    diagnostics: &mut Diagnostics,
 ) -> Option<Built> {
     let branch = FiveBarBranch {
         working_mode: [
-            sign(&table.working_mode[0], findings),
-            sign(&table.working_mode[1], findings),
+            sign(&table.working_mode[0], diagnostics),
+            sign(&table.working_mode[1], diagnostics),
         ],
-        assembly_mode: sign(&table.assembly_mode, findings),
+        assembly_mode: sign(&table.assembly_mode, diagnostics),
     };
     let mut mechanism = FiveBar {
         half_base: table.half_base.value,
@@ -72,7 +72,7 @@ pub(super) fn build(
         elasticity: None,
     };
     let names = [("th1", JointUnit::Angle), ("th2", JointUnit::Angle)];
-    let (joints, elasticity, home) = chain::joints(&mechanism, names, site, findings)?;
+    let (joints, elasticity, home) = chain::joints(&mechanism, names, context, diagnostics)?;
     mechanism.elasticity = elasticity;
     Some(Built { mechanism: MechanismKind::FiveBar(mechanism), joints, home })
 }

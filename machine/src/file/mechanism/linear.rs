@@ -1,7 +1,7 @@
 //! Cartesian and CoreXY: joints that follow from the area.
 
 use super::{Built, springs};
-use crate::document::Findings;
+use crate::document::Diagnostics;
 use crate::file::axes::{Joint, JointUnit};
 use crate::file::tables::{CartesianTable, CoreXyTable, ScrewTable};
 use crate::limits::WorkArea;
@@ -12,7 +12,7 @@ pub(super) fn cartesian(
     table: &CartesianTable,
     area: &WorkArea,
     home: [f64; 3],
-    findings: &mut Findings,
+    diagnostics: &mut Diagnostics,
 ) -> Option<Built> {
     let screws: Vec<&ScrewTable> = [&table.x, &table.y].into_iter().chain(&table.z).collect();
     let joints: Vec<Joint> = ["x", "y", "z"]
@@ -40,8 +40,8 @@ pub(super) fn cartesian(
         .collect();
     if !springs.is_empty() && springs.len() < screws.len() {
         let rigid = screws.iter().find(|screw| screw.stiffness.is_none() && screw.shaft.is_none());
-        findings.contradict(
-            rigid.map_or(table.place, |screw| screw.place),
+        diagnostics.contradict(
+            rigid.map_or(table.span, |screw| screw.span),
             "this screw is rigid, another one is not".to_owned(),
             "give every screw its `stiffness` or `shaft`, or none",
         );
@@ -84,7 +84,7 @@ pub(super) fn corexy(table: &CoreXyTable, area: &WorkArea, home: [f64; 3]) -> Bu
         // A direction of the tool has a span of either belt on either side.
         let both = |belt: f64| 2.0 * belt;
         let built = springs::of_belt(None, belt.section.as_ref()).map(both);
-        let stiffness = belt.stiffness.map(|given| given.value).or(built)?;
+        let stiffness = belt.stiffness.map(|declared| declared.value).or(built)?;
         Some(mass.map(|mass| Elasticity::damped(stiffness, mass, belt.damping_ratio.value)))
     });
     Built { mechanism: MechanismKind::CoreXy(CoreXy { mass, elasticity }), joints, home }

@@ -1,8 +1,8 @@
 //! The table of an MCM.
 
 use super::chain;
-use super::{Built, Site};
-use crate::document::{Findings, NonNegative, Positive, Quantity};
+use super::{BuildContext, Built};
+use crate::document::{Diagnostics, NonNegative, Positive, Quantity};
 use crate::file::axes::JointUnit;
 use crate::kinematics::STANDARD_GRAVITY;
 use crate::mechanisms::MechanismKind;
@@ -45,12 +45,16 @@ table! {
     }
 }
 
-pub(super) fn build(table: &McmTable, site: &Site<'_>, findings: &mut Findings) -> Option<Built> {
+pub(super) fn build(
+    table: &McmTable,
+    context: &BuildContext<'_>,
+    diagnostics: &mut Diagnostics,
+) -> Option<Built> {
     let mut mechanism = Mcm {
         tool: table.tool.value,
         offset: table.offset.value,
         height: table.height.value,
-        reach: chain::range(site, "X").unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+        reach: chain::range(context, "X").unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
         singular_distance: table.singular_distance.value,
         branch: McmBranch { side: None, lean: None },
         load: McmLoad {
@@ -73,7 +77,7 @@ pub(super) fn build(table: &McmTable, site: &Site<'_>, findings: &mut Findings) 
         ("a", JointUnit::Angle),
         ("r", JointUnit::Angle),
     ];
-    let (joints, elasticity, home) = chain::joints(&mechanism, names, site, findings)?;
+    let (joints, elasticity, home) = chain::joints(&mechanism, names, context, diagnostics)?;
     mechanism.elasticity = elasticity;
     Some(Built { mechanism: MechanismKind::Mcm(mechanism), joints, home })
 }

@@ -1,8 +1,8 @@
 //! The table of a polar machine.
 
 use super::chain;
-use super::{Built, Site};
-use crate::document::{Findings, NonNegative, Positive, Quantity};
+use super::{BuildContext, Built};
+use crate::document::{Diagnostics, NonNegative, Positive, Quantity};
 use crate::file::axes::JointUnit;
 use crate::kinematics::STANDARD_GRAVITY;
 use crate::mechanisms::MechanismKind;
@@ -51,15 +51,19 @@ table! {
     }
 }
 
-pub(super) fn build(table: &PolarTable, site: &Site<'_>, findings: &mut Findings) -> Option<Built> {
+pub(super) fn build(
+    table: &PolarTable,
+    context: &BuildContext<'_>,
+    diagnostics: &mut Diagnostics,
+) -> Option<Built> {
     let names = [("th1", JointUnit::Angle), ("th2", JointUnit::Angle), ("d", JointUnit::Length)];
-    let friction = names.map(|(name, _)| chain::friction(site, name));
+    let friction = names.map(|(name, _)| chain::friction(context, name));
     let mut mechanism = Polar {
         arm: table.arm.value,
         center_distance: table.center_distance.value,
         height: table.height.value,
         singular_radius: table.singular_radius.value,
-        endless: chain::range(site, "th2").is_some_and(|[lower, _]| lower.is_infinite()),
+        endless: chain::range(context, "th2").is_some_and(|[lower, _]| lower.is_infinite()),
         branch: PolarBranch { side: None, table_turn: None },
         load: PolarLoad {
             arm_mass: table.arm_mass.value,
@@ -79,7 +83,7 @@ pub(super) fn build(table: &PolarTable, site: &Site<'_>, findings: &mut Findings
         },
         elasticity: None,
     };
-    let (joints, elasticity, home) = chain::joints(&mechanism, names, site, findings)?;
+    let (joints, elasticity, home) = chain::joints(&mechanism, names, context, diagnostics)?;
     mechanism.elasticity = elasticity;
     Some(Built { mechanism: MechanismKind::Polar(mechanism), joints, home })
 }

@@ -1,8 +1,8 @@
 //! The table of a PRRRP.
 
 use super::chain::{self, sign};
-use super::{Built, Site};
-use crate::document::{Findings, NonNegative, Number, Positive, Quantity};
+use super::{BuildContext, Built};
+use crate::document::{Diagnostics, NonNegative, Number, Positive, Quantity};
 use crate::file::axes::JointUnit;
 use crate::mechanisms::MechanismKind;
 use crate::mechanisms::prrrp::{Prrrp, PrrrpBranch};
@@ -36,7 +36,11 @@ table! {
     }
 }
 
-pub(super) fn build(table: &PrrrpTable, site: &Site<'_>, findings: &mut Findings) -> Option<Built> {
+pub(super) fn build(
+    table: &PrrrpTable,
+    context: &BuildContext<'_>,
+    diagnostics: &mut Diagnostics,
+) -> Option<Built> {
     let mut mechanism = Prrrp {
         link: table.link.value,
         link_mass: table.link_mass.value,
@@ -46,11 +50,11 @@ pub(super) fn build(table: &PrrrpTable, site: &Site<'_>, findings: &mut Findings
         bar_mass: table.bar_mass.value,
         type_1_limit: table.type_1_margin.value,
         type_2_limit: table.type_2_margin.value,
-        branch: PrrrpBranch { side: sign(&table.side, findings) },
+        branch: PrrrpBranch { side: sign(&table.side, diagnostics) },
         elasticity: None,
     };
     let names = [("p1", JointUnit::Length), ("p2", JointUnit::Length)];
-    let (joints, elasticity, home) = chain::joints(&mechanism, names, site, findings)?;
+    let (joints, elasticity, home) = chain::joints(&mechanism, names, context, diagnostics)?;
     mechanism.elasticity = elasticity;
     Some(Built { mechanism: MechanismKind::Prrrp(mechanism), joints, home })
 }

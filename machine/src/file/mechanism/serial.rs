@@ -4,10 +4,10 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use super::chain;
-use super::{Built, Site};
-use crate::document::{Findings, Keyword, Located, NonNegative, Point, Positive, Quantity};
+use super::{BuildContext, Built};
+use crate::document::{Diagnostics, Keyword, NonNegative, Point, Positive, Quantity, Spanned};
 use crate::file::axes::{Joint, JointUnit};
-use crate::kinematics::{Freedom, Mechanism, Pose, STANDARD_GRAVITY};
+use crate::kinematics::{Mechanism, Pose, STANDARD_GRAVITY, TaskSpace};
 use crate::mechanisms::MechanismKind;
 use crate::mechanisms::serial::{JointKind, Link, Serial};
 use crate::quantity as unit;
@@ -28,7 +28,7 @@ table! {
         pub tool: FrameTable,
         /// What of a pose the joints must meet: `plane` (x and y), `space` (x, y and z), `axis` (also
         /// the beam's direction) or `pose` (the whole orientation).
-        pub freedom: Located<Freedom>,
+        pub freedom: Spanned<TaskSpace>,
     }
 }
 
@@ -36,7 +36,7 @@ table! {
     /// One link and the joint before it.
     pub struct SerialLinkTable {
         /// `revolute` or `prismatic`.
-        pub joint: Located<JointKind>,
+        pub joint: Spanned<JointKind>,
         /// Angle from the joint axis before to this one, about the x before (α).
         pub twist: Signed<unit::Angle> = "0 deg",
         /// Distance from the joint axis before to this one, along the x before (a).
@@ -73,18 +73,18 @@ const NAMES: [&str; 6] = ["j1", "j2", "j3", "j4", "j5", "j6"];
 
 pub(super) fn build(
     table: &SerialTable,
-    site: &Site<'_>,
-    findings: &mut Findings,
+    context: &BuildContext<'_>,
+    diagnostics: &mut Diagnostics,
 ) -> Option<Built> {
     match table.link.len() {
-        2 => arm::<2>(table, site, findings, |arm| MechanismKind::Serial2(Box::new(arm))),
-        3 => arm::<3>(table, site, findings, |arm| MechanismKind::Serial3(Box::new(arm))),
-        4 => arm::<4>(table, site, findings, |arm| MechanismKind::Serial4(Box::new(arm))),
-        5 => arm::<5>(table, site, findings, |arm| MechanismKind::Serial5(Box::new(arm))),
-        6 => arm::<6>(table, site, findings, |arm| MechanismKind::Serial6(Box::new(arm))),
+        2 => arm::<2>(table, context, diagnostics, |arm| MechanismKind::Serial2(Box::new(arm))),
+        3 => arm::<3>(table, context, diagnostics, |arm| MechanismKind::Serial3(Box::new(arm))),
+        4 => arm::<4>(table, context, diagnostics, |arm| MechanismKind::Serial4(Box::new(arm))),
+        5 => arm::<5>(table, context, diagnostics, |arm| MechanismKind::Serial5(Box::new(arm))),
+        6 => arm::<6>(table, context, diagnostics, |arm| MechanismKind::Serial6(Box::new(arm))),
         count => {
-            findings.contradict(
-                table.place,
+            diagnostics.contradict(
+                table.span,
                 format!("an arm of {count} links cannot be driven"),
                 "give two to six tables [[mechanism.serial.link]]",
             );
@@ -95,26 +95,26 @@ pub(super) fn build(
 
 fn arm<const N: usize>(
     table: &SerialTable,
-    site: &Site<'_>,
-    findings: &mut Findings,
+    context: &BuildContext<'_>,
+    diagnostics: &mut Diagnostics,
     kind: impl Fn(Serial<N>) -> MechanismKind,
 ) -> Option<Built>
 where
     Serial<N>: Mechanism<N>,
 {
     let links: [Link; N] =
-        core::array::from_fn(|index| link(&table.link[index], site, NAMES[index]));
+        core::array::from_fn(|index| link(&table.link[index], context, NAMES[index]));
     let mut mechanism = Serial {
         base: frame(&table.base),
         links,
         tool: frame(&table.tool),
-        freedom: table.freedom.value,
+        task_space: table.freedom.value,
         gravity: Vector3::new(0.0, 0.0, -STANDARD_GRAVITY),
         elasticity: None,
     };
     let names = core::array::from_fn(|index| (NAMES[index], unit_of(links[index].kind)));
     let (joints, elasticity, home): (Vec<Joint>, Option<[Elasticity; N]>, _) =
-        chain::joints(&mechanism, names, site, findings)?;
+        chain::joints(&mechanism, names, context, diagnostics)?;
     mechanism.elasticity = elasticity;
     Some(Built { mechanism: kind(mechanism), joints, home })
 }
@@ -126,8 +126,8 @@ fn unit_of(kind: JointKind) -> JointUnit {
     }
 }
 
-fn link(table: &SerialLinkTable, site: &Site<'_>, name: &str) -> Link {
-    let [lower, upper] = chain::range(site, name).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+fn link(table: &SerialLinkTable, context: &BuildContext<'_>, name: &str) -> Link {
+    let [lower, upper] = chain::range(context, name).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
     let moments = table.inertia.map(|inertia| inertia.value);
     Link {
         twist: table.twist.value,
@@ -175,7 +175,7 @@ impl JsonSchema for JointKind {
     }
 }
 
-impl Keyword for Freedom {
+impl Keyword for TaskSpace {
     const NAME: &'static str = "a freedom of the tool";
     const WORDS: &'static [(&'static str, Self)] = &[
         ("plane", Self::Plane),
@@ -185,13 +185,13 @@ impl Keyword for Freedom {
     ];
 }
 
-impl JsonSchema for Freedom {
+impl JsonSchema for TaskSpace {
     fn inline_schema() -> bool {
         true
     }
 
     fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Freedom".into()
+        "TaskSpace".into()
     }
 
     fn json_schema(_generator: &mut SchemaGenerator) -> Schema {

@@ -1,6 +1,6 @@
 //! The stiffness of a transmission, given or from what it is made of.
 
-use crate::document::{Findings, Place, ProblemKind};
+use crate::document::{Diagnostics, ProblemKind, Span};
 use crate::file::tables::{
     AxisTable, BeltTable, MachineTable, ScrewTable, SectionTable, ShaftTable,
 };
@@ -12,12 +12,12 @@ type Above<K> = crate::document::Quantity<K, crate::document::Positive>;
 
 /// Of a screw of `lead` [m/rad], seen at the nut [N/m]; `None` where it is rigid.
 pub(super) fn of_screw(
-    given: Option<&Above<unit::TorsionalStiffness>>,
+    declared: Option<&Above<unit::TorsionalStiffness>>,
     shaft: Option<&ShaftTable>,
     lead: f64,
 ) -> Option<f64> {
-    let torsional = match (given, shaft) {
-        (Some(given), _) => given.value,
+    let torsional = match (declared, shaft) {
+        (Some(declared), _) => declared.value,
         (None, Some(shaft)) => shaft_of(shaft).stiffness(lead),
         (None, None) => return None,
     };
@@ -26,14 +26,14 @@ pub(super) fn of_screw(
 
 /// Of a belt, both spans [N/m]; `None` where it is rigid.
 pub(super) fn of_belt(
-    given: Option<&Above<unit::Stiffness>>,
+    declared: Option<&Above<unit::Stiffness>>,
     section: Option<&SectionTable>,
 ) -> Option<f64> {
     let built = section.map(|section| {
         let belt = Belt { modulus: section.modulus.value, section: section.area.value };
         belt.stiffness(section.spans.map(|span| span.value))
     });
-    given.map(|given| given.value).or(built)
+    declared.map(|declared| declared.value).or(built)
 }
 
 fn shaft_of(table: &ShaftTable) -> ScrewShaft {
@@ -49,22 +49,22 @@ fn shaft_of(table: &ShaftTable) -> ScrewShaft {
 }
 
 /// Refuses stiffnesses that are said twice, or not at all, and shafts without material.
-pub(super) fn check(table: &MachineTable, findings: &mut Findings) {
+pub(super) fn check(table: &MachineTable, diagnostics: &mut Diagnostics) {
     let mechanism = &table.mechanism;
     if let Some(cartesian) = &mechanism.cartesian {
         for screw in [&cartesian.x, &cartesian.y].into_iter().chain(&cartesian.z) {
             let ScrewTable { stiffness, shaft, .. } = screw;
-            check_shaft(stiffness.is_some(), shaft.as_ref(), findings);
+            check_shaft(stiffness.is_some(), shaft.as_ref(), diagnostics);
         }
     }
     if let Some(belt) = mechanism.corexy.as_ref().and_then(|corexy| corexy.belt.as_ref()) {
-        let BeltTable { stiffness, section, place, .. } = belt;
-        let built = section.as_ref().map(|section| section.place);
-        once(stiffness.is_some(), built, "section", findings);
+        let BeltTable { stiffness, section, span, .. } = belt;
+        let built = section.as_ref().map(|section| section.span);
+        once(stiffness.is_some(), built, "section", diagnostics);
         if stiffness.is_none() && built.is_none() {
-            findings.refuse(
+            diagnostics.refuse(
                 ProblemKind::MissingKey,
-                *place,
+                *span,
                 "nothing says how stiff the belts are".to_owned(),
                 Some(
                     "add `stiffness`, or a `section`; leave `belt` out to make them rigid"
@@ -75,32 +75,32 @@ pub(super) fn check(table: &MachineTable, findings: &mut Findings) {
     }
     for (_, AxisTable { transmission, .. }) in &table.axis.entries {
         if let Some(screw) = &transmission.screw {
-            check_shaft(screw.stiffness.is_some(), screw.shaft.as_ref(), findings);
+            check_shaft(screw.stiffness.is_some(), screw.shaft.as_ref(), diagnostics);
         }
         if let Some(belt) = &transmission.belt {
-            let built = belt.section.as_ref().map(|section| section.place);
-            once(belt.stiffness.is_some(), built, "section", findings);
+            let built = belt.section.as_ref().map(|section| section.span);
+            once(belt.stiffness.is_some(), built, "section", diagnostics);
         }
     }
 }
 
-fn check_shaft(given: bool, shaft: Option<&ShaftTable>, findings: &mut Findings) {
+fn check_shaft(declared: bool, shaft: Option<&ShaftTable>, diagnostics: &mut Diagnostics) {
     let Some(shaft) = shaft else { return };
-    once(given, Some(shaft.place), "shaft", findings);
+    once(declared, Some(shaft.span), "shaft", diagnostics);
     let ShaftTable { bore, core_diameter, .. } = shaft;
     if bore.value >= core_diameter.value {
-        findings.contradict(
-            bore.place,
+        diagnostics.contradict(
+            bore.span,
             format!("a bore of {} m leaves nothing of {} m", bore.value, core_diameter.value),
             "make the bore smaller than the core",
         );
     }
 }
 
-fn once(given: bool, built: Option<Place>, name: &str, findings: &mut Findings) {
-    if let (true, Some(place)) = (given, built) {
-        findings.contradict(
-            place,
+fn once(declared: bool, built: Option<Span>, name: &str, diagnostics: &mut Diagnostics) {
+    if let (true, Some(span)) = (declared, built) {
+        diagnostics.contradict(
+            span,
             format!("the stiffness is given twice, by `stiffness` and by `{name}`"),
             "keep one of them",
         );

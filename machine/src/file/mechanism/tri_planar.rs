@@ -1,8 +1,8 @@
 //! The table of a tri-planar platform.
 
 use super::chain::{self, sign};
-use super::{Built, Site};
-use crate::document::{Findings, NonNegative, Number, Positive, Quantity};
+use super::{BuildContext, Built};
+use crate::document::{Diagnostics, NonNegative, Number, Positive, Quantity};
 use crate::file::axes::JointUnit;
 use crate::mechanisms::MechanismKind;
 use crate::mechanisms::tri_planar::{Fold, Legs, TriPlanar};
@@ -47,10 +47,10 @@ table! {
 
 pub(super) fn build(
     table: &TriPlanarTable,
-    site: &Site<'_>,
-    findings: &mut Findings,
+    context: &BuildContext<'_>,
+    diagnostics: &mut Diagnostics,
 ) -> Option<Built> {
-    let mut fold = |number: &Number| match sign(number, findings) {
+    let mut fold = |number: &Number| match sign(number, diagnostics) {
         1 => Fold::Outward,
         _ => Fold::Inward,
     };
@@ -75,7 +75,7 @@ pub(super) fn build(
         elasticity: None,
     };
     let names = ["xD", "yD", "xE", "yE", "xF", "yF"].map(|name| (name, JointUnit::Length));
-    let (mut joints, elasticity, home) = chain::joints(&mechanism, names, site, findings)?;
+    let (mut joints, elasticity, home) = chain::joints(&mechanism, names, context, diagnostics)?;
     let half = mechanism.inductor / 2.0;
     for (index, joint) in joints.iter_mut().enumerate() {
         let [lower, upper] = mechanism.stator[index % 2];

@@ -3,8 +3,8 @@
 use nalgebra::Vector2;
 
 use super::chain::{self, sign};
-use super::{Built, Site};
-use crate::document::{Findings, NonNegative, Number, Positive, Quantity};
+use super::{BuildContext, Built};
+use crate::document::{Diagnostics, NonNegative, Number, Positive, Quantity};
 use crate::file::axes::JointUnit;
 use crate::mechanisms::MechanismKind;
 use crate::mechanisms::twin_actuator::{ActuatorBodies, TwinActuator, TwinBranch};
@@ -65,14 +65,14 @@ fn bodies(table: &ActuatorTable) -> ActuatorBodies {
 
 pub(super) fn build(
     table: &TwinActuatorTable,
-    site: &Site<'_>,
-    findings: &mut Findings,
+    context: &BuildContext<'_>,
+    diagnostics: &mut Diagnostics,
 ) -> Option<Built> {
     let base = |point: &[Quantity<unit::Length>; 2]| Vector2::new(point[0].value, point[1].value);
     let bases = [base(&table.base_a), base(&table.base_b)];
     if bases[0] == bases[1] {
-        findings.contradict(
-            table.base_b[0].place,
+        diagnostics.contradict(
+            table.base_b[0].span,
             "both actuators turn about the same point".to_owned(),
             "give them two bases",
         );
@@ -86,11 +86,11 @@ pub(super) fn build(
         tool_mass: table.tool_mass.value,
         baseline_limit: table.baseline_margin.value,
         near_limit: table.near_margin.value,
-        branch: TwinBranch { elbow: sign(&table.elbow, findings) },
+        branch: TwinBranch { elbow: sign(&table.elbow, diagnostics) },
         elasticity: None,
     };
     let names = [("la", JointUnit::Length), ("lb", JointUnit::Length)];
-    let (joints, elasticity, home) = chain::joints(&mechanism, names, site, findings)?;
+    let (joints, elasticity, home) = chain::joints(&mechanism, names, context, diagnostics)?;
     mechanism.elasticity = elasticity;
     Some(Built { mechanism: MechanismKind::TwinActuator(mechanism), joints, home })
 }

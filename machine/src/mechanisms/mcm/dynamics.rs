@@ -10,8 +10,8 @@
 //! tilting axis, which meets the turning axis. The table turns by itself, so it shares no inertia
 //! with the rest.
 
+use messages::math;
 use nalgebra::SMatrix;
-use signals::math;
 
 use crate::kinematics::Joints;
 

@@ -6,8 +6,8 @@
 //! `atan2(y, x)` are rounding divided by ρ, so ψ is taken from where the path is going, not from
 //! where it is.
 
+use messages::math;
 use nalgebra::Vector2;
-use signals::math;
 
 use super::CENTER_TOLERANCE;
 use crate::kinematics::ToolMotion;

@@ -21,7 +21,7 @@ pub(super) struct Placed {
 
 /// An open chain at one joint position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SerialAssembly<const N: usize> {
+pub struct SerialChainState<const N: usize> {
     pub(super) links: [Placed; N],
     pub(super) tool: Pose,
     pub(super) joints: Joints<N>,

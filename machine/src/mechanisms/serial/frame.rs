@@ -1,7 +1,7 @@
 //! Frames in space over any [`Scalar`], and the step from one link's frame to the next.
 
+use messages::math;
 use nalgebra::{Matrix3, Vector3};
-use signals::math;
 
 use super::{JointKind, Link};
 use crate::kinematics::Pose;

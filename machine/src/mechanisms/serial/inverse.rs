@@ -3,11 +3,13 @@
 //! The damping follows the square of what is missing (Fan and Yuan, Computing 74, 2005), so that the
 //! steps are Newton's in the end and short where the chain is far away or nearly singular.
 
-use signals::math;
+use messages::math;
 
 use super::task::ROWS;
 use super::{JointKind, Serial};
-use crate::kinematics::{Freedom, JointMotion, Joints, KinematicsError, Pose, ToolMotion, finite};
+use crate::kinematics::{
+    JointMotion, Joints, KinematicsError, Pose, TaskSpace, ToolMotion, finite,
+};
 use crate::taylor::Taylor;
 
 /// How near the tool must come to its target, position [m] and direction [rad].
@@ -134,7 +136,7 @@ impl<const N: usize> Serial<N> {
         if distance > limit || distance.is_nan() {
             return Err(Miss::Far { distance: distance * reach, limit: limit * reach });
         }
-        if self.freedom == Freedom::Plane {
+        if self.task_space == TaskSpace::Plane {
             let joints: [f64; N] = q.into();
             let off = pose.position.z - self.chain(&joints).tool.origin[2];
             if off.abs() > PLANE_TOLERANCE {
@@ -209,13 +211,13 @@ impl<const N: usize> Serial<N> {
     /// Damped least squares from `start`, to the last digit or to where nothing more is gained.
     fn descend(&self, pose: &Pose, start: &Joints<N>, reach: f64) -> Descent<N> {
         let tolerance = dimensionless_tolerance(reach);
-        let look = |q: &Joints<N>| {
+        let measure = |q: &Joints<N>| {
             let chain = self.chain(&(*q).into());
             let missing = self.missing(&chain, reach, pose);
             (chain, norm(&missing), missing)
         };
         let mut q = *start;
-        let (mut chain, mut distance, mut missing) = look(&q);
+        let (mut chain, mut distance, mut missing) = measure(&q);
         let mut weight = 0.1;
         for _ in 0..STEPS {
             if distance == 0.0 {
@@ -233,7 +235,7 @@ impl<const N: usize> Serial<N> {
             let ahead = Joints::from_fn(|joint, _| {
                 q[joint] + share * step[joint] * self.unit(joint, reach)
             });
-            let (next_chain, next_distance, next_missing) = look(&ahead);
+            let (next_chain, next_distance, next_missing) = measure(&ahead);
             let done = distance <= tolerance && next_distance >= distance / 2.0;
             if next_distance < distance {
                 (q, chain, distance, missing) = (ahead, next_chain, next_distance, next_missing);

@@ -3,12 +3,12 @@
 //! Lengths are divided by the chain's reach, of rows and of sliding joints alike, so that metres and
 //! radians can stand in one norm.
 
+use messages::math;
 use nalgebra::{Matrix3, Matrix6, Vector3};
-use signals::math;
 
 use super::frame::{Frame, Vector, cross, difference, dot};
 use super::{JointKind, Serial};
-use crate::kinematics::{Freedom, Pose};
+use crate::kinematics::{Pose, TaskSpace};
 use crate::mechanisms::spectrum::smallest_eigenvalue;
 use crate::taylor::Scalar;
 
@@ -29,12 +29,12 @@ pub(super) struct Rows<S, const N: usize> {
 }
 
 /// The rows that a freedom has: of position, and of rotation about the tool's own axes.
-pub(super) fn rows_of(freedom: Freedom) -> (usize, usize) {
-    match freedom {
-        Freedom::Plane => (2, 0),
-        Freedom::Space => (3, 0),
-        Freedom::Axis => (3, 2),
-        Freedom::Pose => (3, 3),
+pub(super) fn rows_of(task_space: TaskSpace) -> (usize, usize) {
+    match task_space {
+        TaskSpace::Plane => (2, 0),
+        TaskSpace::Space => (3, 0),
+        TaskSpace::Axis => (3, 2),
+        TaskSpace::Pose => (3, 3),
     }
 }
 
@@ -69,7 +69,7 @@ impl<const N: usize> Serial<N> {
 
     /// The rows of the task at `chain`.
     pub(super) fn rows<S: Scalar>(&self, chain: &Chain<S, N>, reach: f64) -> Rows<S, N> {
-        let (linear, angular) = rows_of(self.freedom);
+        let (linear, angular) = rows_of(self.task_space);
         let mut entries = [[S::from(0.0); N]; ROWS];
         for (joint, (link, frame)) in self.links.iter().zip(&chain.links).enumerate() {
             let axis = &frame.axes[2];
@@ -102,7 +102,7 @@ impl<const N: usize> Serial<N> {
         linear: &Vector<S>,
         angular: &Vector<S>,
     ) -> [S; ROWS] {
-        let (positions, _) = rows_of(self.freedom);
+        let (positions, _) = rows_of(self.task_space);
         core::array::from_fn(|row| {
             if row < positions {
                 linear[row] / reach
@@ -115,17 +115,17 @@ impl<const N: usize> Serial<N> {
     /// What is missing from the tool of `chain` to `target`, as the rows of the task; rows beyond
     /// the task's are 0.
     pub(super) fn missing(&self, chain: &Chain<f64, N>, reach: f64, target: &Pose) -> [f64; ROWS] {
-        let (positions, _) = rows_of(self.freedom);
+        let (positions, _) = rows_of(self.task_space);
         let mut missing = [0.0; ROWS];
         let away = target.position - Vector3::from(chain.tool.origin);
         for (value, part) in missing.iter_mut().zip(away.iter()).take(positions) {
             *value = part / reach;
         }
         let turn = chain.tool.rotation().transpose() * target.rotation;
-        let rotation = match self.freedom {
-            Freedom::Plane | Freedom::Space => return missing,
-            Freedom::Axis => swing_to(&turn.column(2).into_owned()),
-            Freedom::Pose => rotation_vector(&turn),
+        let rotation = match self.task_space {
+            TaskSpace::Plane | TaskSpace::Space => return missing,
+            TaskSpace::Axis => swing_to(&turn.column(2).into_owned()),
+            TaskSpace::Pose => rotation_vector(&turn),
         };
         for (row, value) in rotation.iter().enumerate() {
             missing[positions + row] = *value;

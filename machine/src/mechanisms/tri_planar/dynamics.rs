@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::{TriPlanar, TriPlanarAssembly};
+use super::{TriPlanar, TriPlanarChainState};
 use crate::kinematics::{Joints, STANDARD_GRAVITY};
 
 type Twist = SVector<f64, 6>;
@@ -40,11 +40,11 @@ fn add_product(matrix: &mut SMatrix<f64, 6, 6>, a: &Twist, b: &Twist) {
 /// Mass matrix, in joint coordinates [kg].
 pub(super) fn mass_matrix(
     mechanism: &TriPlanar,
-    assembly: &TriPlanarAssembly,
+    chain: &TriPlanarChainState,
 ) -> SMatrix<f64, 6, 6> {
     let third = mechanism.height() / 3.0;
     let plate = mechanism.leg_inertia();
-    let rotation = &assembly.rotation;
+    let rotation = &chain.rotation;
 
     let total = mechanism.platform_mass + 3.0 * mechanism.leg_mass;
     // Sums over the legs of m·d and, as a matrix, of m·(d·d − d·dᵀ): what moves with the platform.
@@ -53,7 +53,7 @@ pub(super) fn mass_matrix(
     let mut angular =
         rotation * Matrix3::from_diagonal(&Vector3::new(x, y, z)) * rotation.transpose();
     let mut mass = SMatrix::<f64, 6, 6>::zeros();
-    for leg in &assembly.legs {
+    for leg in &chain.legs {
         let center = leg.middle + leg.shank * third;
         let lever = center * mechanism.leg_mass;
         moment += lever;
@@ -83,7 +83,7 @@ pub(super) fn mass_matrix(
     }
     mass.fill_upper_triangle_with_lower_triangle();
 
-    let mut seen = seen_from_feet(&mass, &assembly.jacobian);
+    let mut seen = seen_from_feet(&mass, &chain.jacobian);
     for column in 0..6 {
         seen[(column, column)] += mechanism.inductor_mass;
     }
@@ -128,18 +128,18 @@ struct Carried {
 /// bodies' own inertia and weight ask for while the feet do not accelerate.
 pub(super) fn bias(
     mechanism: &TriPlanar,
-    assembly: &TriPlanarAssembly,
+    chain: &TriPlanarChainState,
     velocity: &Joints<6>,
 ) -> Joints<6> {
     let third = mechanism.height() / 3.0;
     let plate = mechanism.leg_inertia();
-    let platform = assembly.jacobian * velocity;
+    let platform = chain.jacobian * velocity;
     let spin = platform.fixed_rows::<3>(3).into_owned();
 
     // With the platform's twist as it is, the feet would accelerate by the drift.
     let mut drift = Joints::zeros();
     let mut carry = |index: usize| {
-        let leg = &assembly.legs[index];
+        let leg = &chain.legs[index];
         let rate = leg.turn.dot(&platform);
         let turning = spin + leg.hinge * rate;
         let carried = spin.cross(&leg.hinge) * rate;
@@ -153,16 +153,16 @@ pub(super) fn bias(
         Carried { turning, carried, middle, shank, turn }
     };
     let carried = [carry(0), carry(1), carry(2)];
-    let platform = assembly.jacobian * -drift;
+    let platform = chain.jacobian * -drift;
     let linear = platform.fixed_rows::<3>(0) + Vector3::new(0.0, 0.0, STANDARD_GRAVITY);
     let angular = platform.fixed_rows::<3>(3).into_owned();
 
     let inertia = Vector3::from(mechanism.platform_inertia);
-    let local = assembly.rotation.tr_mul(&spin);
-    let torque = assembly.rotation.tr_mul(&angular).component_mul(&inertia)
+    let local = chain.rotation.tr_mul(&spin);
+    let torque = chain.rotation.tr_mul(&angular).component_mul(&inertia)
         + local.cross(&local.component_mul(&inertia));
-    let mut effort = twist(&(linear * mechanism.platform_mass), &(assembly.rotation * torque));
-    for (leg, own) in assembly.legs.iter().zip(&carried) {
+    let mut effort = twist(&(linear * mechanism.platform_mass), &(chain.rotation * torque));
+    for (leg, own) in chain.legs.iter().zip(&carried) {
         let turn = own.turn + leg.turn.dot(&platform);
         let center = leg.middle + leg.shank * third;
         let acceleration = linear
@@ -180,5 +180,5 @@ pub(super) fn bias(
             + twist(&Vector3::zeros(), &torque)
             + leg.turn * (third * leg.normal.dot(&force) + leg.hinge.dot(&torque));
     }
-    assembly.jacobian.tr_mul(&effort)
+    chain.jacobian.tr_mul(&effort)
 }

@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVD, Vector3};
 
 use super::struts::struts;
-use super::{TriPlanar, TriPlanarAssembly};
+use super::{TriPlanar, TriPlanarChainState};
 use crate::kinematics::{Joints, KinematicsError, Margin, MarginKind, Pose};
 use crate::mechanisms::spectrum::largest_eigenvalue;
 
@@ -129,21 +129,21 @@ pub(super) fn check(
     })
 }
 
-pub(super) fn margins(mechanism: &TriPlanar, assembly: &TriPlanarAssembly) -> Vec<Margin> {
-    let arms = mechanism.arms(&assembly.rotation);
-    let feet = &assembly.feet;
+pub(super) fn margins(mechanism: &TriPlanar, chain: &TriPlanarChainState) -> Vec<Margin> {
+    let arms = mechanism.arms(&chain.rotation);
+    let feet = &chain.feet;
     use MarginKind::{Collision, Parallel, Serial};
     let mut margins = Vec::with_capacity(11);
     let mut add = |name, kind, value, limit| margins.push(Margin { name, kind, value, limit });
-    for (name, leg) in ["type_1_D", "type_1_E", "type_1_F"].into_iter().zip(&assembly.legs) {
+    for (name, leg) in ["type_1_D", "type_1_E", "type_1_F"].into_iter().zip(&chain.legs) {
         add(name, Serial, leg.normal.z.abs(), mechanism.type_1_limit);
     }
     // The smallest singular value is one over the largest of the inverse, whose square loses
     // nothing where the value is small.
-    let square = assembly.loosened * assembly.loosened.transpose();
+    let square = chain.loosened * chain.loosened.transpose();
     let type_2 = 1.0 / largest_eigenvalue(square).sqrt();
     add("type_2", Parallel, type_2, mechanism.type_2_limit);
-    add("clearance", Collision, lowest(&arms, &assembly.position), mechanism.clearance);
+    add("clearance", Collision, lowest(&arms, &chain.position), mechanism.clearance);
     for (leg, name) in ["stator_D", "stator_E", "stator_F"].into_iter().enumerate() {
         add(name, Collision, inside(mechanism, feet, leg).1, 0.0);
     }

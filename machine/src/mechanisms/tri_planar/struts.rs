@@ -1,7 +1,7 @@
 //! The six struts of equal length between feet and corners, closed by Newton's method.
 
+use messages::math;
 use nalgebra::{Matrix3, Quaternion, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
-use signals::math;
 
 use super::{CORNERS, HINGES, Legs, OUTWARD, TriPlanar};
 use crate::kinematics::Joints;
@@ -108,7 +108,7 @@ impl Struts<'_> {
         }
     }
 
-    /// With the matrix of an assembly near by, which saves solving anew: the error falls by the
+    /// With the matrix of a solution near by, which saves solving anew: the error falls by the
     /// distance, in sides, with every step.
     pub(super) fn follow(&self, mut state: State, loosened: &SMatrix<f64, 6, 6>) -> Option<State> {
         let mut before = f64::INFINITY;

@@ -22,17 +22,17 @@ fn clean(plan: &Plan<'_>) -> Vec<CycleRecord> {
     play(plan, |_, tool| tool, |_, _| 0.0)
 }
 
-/// Judges what is left of the records of a completed job.
+/// Evaluates what is left of the records of a completed job.
 fn judged(
     art: &Artwork,
     records: &[CycleRecord],
     gaps: &[std::ops::Range<i64>],
-) -> Result<Judgement, Unjudged> {
-    let mut judge = Judge::new(art).with_fastest(SPEED);
-    cut(records, gaps).iter().for_each(|record| judge.push(record));
+) -> Result<MarkEvaluation, Unevaluated> {
+    let mut evaluator = MarkEvaluator::new(art).with_fastest(SPEED);
+    cut(records, gaps).iter().for_each(|record| evaluator.push(record));
     let last_cycle = Cycle(records.last().unwrap().feedback.cycle.0 - LIGHT_LAG);
     let completed = ControllerReport { completed: 1, last_cycle, ..ControllerReport::default() };
-    judge.finish(StreamEnd::Reported(&completed))
+    evaluator.finish(StreamEnd::Reported(&completed))
 }
 
 /// Asserts what is unrecorded without the records in these gaps, and that nothing of the rest is
@@ -44,8 +44,8 @@ fn check(
     unrecorded: f64,
     strokes: Option<(u64, u64)>,
 ) {
-    let judgement = judged(art, records, gaps).unwrap();
-    let marks = &judgement.marks;
+    let evaluation = judged(art, records, gaps).unwrap();
+    let marks = &evaluation.marks;
     near(marks.unrecorded, unrecorded, ROUNDING, "unrecorded");
     near(marks.length, art.length() - unrecorded, ROUNDING, "length");
     for (value, what) in [
@@ -58,7 +58,7 @@ fn check(
     ] {
         near(value, 0.0, ROUNDING, what);
     }
-    assert_eq!((marks.strokes_lost, judgement.unrecorded_strokes), (0, strokes));
+    assert_eq!((marks.strokes_lost, evaluation.unrecorded_strokes), (0, strokes));
     if marks.speed_max > 0.0 {
         near(marks.speed_min, SPEED, 1e-12, "speed_min");
         near(marks.speed_max, SPEED, 1e-12, "speed_max");
@@ -154,9 +154,9 @@ fn a_dot_in_a_gap_is_not_lost() {
         (45..500, Some((3, 3))),
         (-100..25, Some((1, 1))),
     ] {
-        let judgement = judged(&art, &records, std::slice::from_ref(&gap)).unwrap();
-        assert_eq!(judgement.marks.strokes_lost, 0, "{gap:?}");
-        assert_eq!(judgement.unrecorded_strokes, strokes, "{gap:?}");
+        let evaluation = judged(&art, &records, std::slice::from_ref(&gap)).unwrap();
+        assert_eq!(evaluation.marks.strokes_lost, 0, "{gap:?}");
+        assert_eq!(evaluation.unrecorded_strokes, strokes, "{gap:?}");
     }
 }
 
@@ -180,28 +180,28 @@ fn a_tool_that_was_not_known_is_as_good_as_not_recorded() {
 #[test]
 fn where_the_job_was_broken_off_only_what_may_have_been_marked_is_hidden() {
     let (art, records) = three();
-    let judge = |kept: &[CycleRecord], last: i64, fastest: f64| {
-        let mut judge = Judge::new(&art).with_fastest(fastest);
-        kept.iter().for_each(|record| judge.push(record));
+    let evaluate = |kept: &[CycleRecord], last: i64, fastest: f64| {
+        let mut evaluator = MarkEvaluator::new(&art).with_fastest(fastest);
+        kept.iter().for_each(|record| evaluator.push(record));
         let zero = FIRST as i64 + (START / CYCLE_TIME).round() as i64;
         let last_cycle = Cycle((zero + last) as u64);
         let stopped = ControllerReport { last_cycle, ..ControllerReport::default() };
-        let judgement = judge.finish(StreamEnd::Reported(&stopped)).unwrap();
-        let Marks { missing, unrecorded, strokes_lost, .. } = judgement.marks;
-        near(judgement.marks.length + missing, art.length(), ROUNDING, "sum");
+        let evaluation = evaluator.finish(StreamEnd::Reported(&stopped)).unwrap();
+        let Marks { missing, unrecorded, strokes_lost, .. } = evaluation.marks;
+        near(evaluation.marks.length + missing, art.length(), ROUNDING, "sum");
         (
             ((missing - unrecorded) / STEP).round(),
             (unrecorded / STEP).round(),
             strokes_lost,
-            judgement.open_end,
+            evaluation.open_end,
         )
     };
     // Stopped at 30 ms and recorded to the end: all the rest is missing, whatever the speed.
     let stopped = cut(&records, &[31..500]);
-    assert_eq!(judge(&stopped, 28, SPEED), (90.0, 0.0, 2, false));
+    assert_eq!(evaluate(&stopped, 28, SPEED), (90.0, 0.0, 2, false));
     // Four cycles more were played, at most at twice the speed: 8 steps; or nobody knows.
-    assert_eq!(judge(&stopped, 32, SPEED), (82.0, 8.0, 2, false));
-    assert_eq!(judge(&stopped, 32, 0.0), (0.0, 90.0, 0, true));
+    assert_eq!(evaluate(&stopped, 32, SPEED), (82.0, 8.0, 2, false));
+    assert_eq!(evaluate(&stopped, 32, 0.0), (0.0, 90.0, 0, true));
     // A gap and dark cycles after it, to the end.
     let mut late = cut(&records, &[31..36]);
     late.truncate(late.iter().position(|record| record.command.stream_time > 0.0465).unwrap());
@@ -209,25 +209,25 @@ fn where_the_job_was_broken_off_only_what_may_have_been_marked_is_hidden() {
         (record.feedback.laser, record.command.laser) = (LaserCycle::OFF, LaserCycle::OFF);
         (record.command.stroke, record.command.state) = (0, ControllerState::Stopping as u32);
     }
-    assert_eq!(judge(&late, 44, SPEED), (78.0, 12.0, 1, false));
+    assert_eq!(evaluate(&late, 44, SPEED), (78.0, 12.0, 1, false));
 }
 
 #[test]
 fn without_a_report_the_watchdog_says_that_no_light_follows() {
     let (art, records) = three();
     let mut kept = cut(&records, &[31..500]);
-    let judge = |kept: &[CycleRecord], end: StreamEnd<'_>| {
-        let mut judge = Judge::new(&art).with_fastest(SPEED);
-        kept.iter().for_each(|record| judge.push(record));
-        let judgement = judge.finish(end).unwrap();
-        let steps = (judgement.marks.unrecorded / STEP).round();
-        (steps, judgement.marks.strokes_lost, judgement.open_end)
+    let evaluate = |kept: &[CycleRecord], end: StreamEnd<'_>| {
+        let mut evaluator = MarkEvaluator::new(&art).with_fastest(SPEED);
+        kept.iter().for_each(|record| evaluator.push(record));
+        let evaluation = evaluator.finish(end).unwrap();
+        let steps = (evaluation.marks.unrecorded / STEP).round();
+        (steps, evaluation.marks.strokes_lost, evaluation.open_end)
     };
-    assert_eq!(judge(&kept, StreamEnd::Unknown), (90.0, 0, true));
+    assert_eq!(evaluate(&kept, StreamEnd::Unknown), (90.0, 0, true));
     // Drives died: what it had been told fell for two cycles more, at most at twice the speed.
-    assert_eq!(judge(&kept, StreamEnd::Silenced), (4.0, 2, false));
-    kept.last_mut().unwrap().feedback.status |= status::STOPPED_ALONE;
-    assert_eq!(judge(&kept, StreamEnd::Unknown), (0.0, 2, false));
+    assert_eq!(evaluate(&kept, StreamEnd::Silenced), (4.0, 2, false));
+    kept.last_mut().unwrap().feedback.status |= status::WATCHDOG_TRIPPED;
+    assert_eq!(evaluate(&kept, StreamEnd::Unknown), (0.0, 2, false));
 }
 
 #[test]
@@ -241,7 +241,7 @@ fn a_gap_before_the_job_or_after_it_hides_nothing() {
     check(&one_line(), &records, &[150..200], 0.0, None);
     // All of the job between two idle records.
     let idle = judged(&one_line(), &records, &[-5..200]);
-    assert_eq!(idle, Err(Unjudged::Unrecorded));
+    assert_eq!(idle, Err(Unevaluated::Unrecorded));
 }
 
 /// A stroke that goes round twice: where in it the light is after a gap, only the time tells.
@@ -250,7 +250,7 @@ fn a_stroke_that_comes_by_twice_is_found_by_its_time_or_not_judged() {
     let radius = 0.005;
     let turn = std::f64::consts::TAU * radius / SPEED;
     let on_circle = |angle: f64| {
-        let (sine, cosine) = signals::math::sin_cos(angle);
+        let (sine, cosine) = messages::math::sin_cos(angle);
         [radius * cosine, radius * sine, 0.0]
     };
     let points = (0..=2000)
@@ -308,7 +308,7 @@ fn a_hold_in_a_gap_is_no_loss() {
             record.command.state = ControllerState::Holding as u32;
         }
     }
-    let whole = judge(&art, &records).unwrap();
+    let whole = evaluate(&art, &records).unwrap();
     let lit_way = |from: i64, to: i64| {
         // What of the light falls into the cycles from the last record before to the first after.
         let (from, to) = ((from - 1) as f64 * CYCLE_TIME, to as f64 * CYCLE_TIME);

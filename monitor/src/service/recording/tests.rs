@@ -6,7 +6,7 @@ use crate::conclusion::RecordingState;
 use crate::recording::CycleRecord;
 use crate::recording::continuity::Gap;
 use crate::recording::file::RecordingReader;
-use signals::{Command, Cycle, Feedback, Nanoseconds};
+use messages::{Command, Cycle, Feedback, Nanoseconds};
 use std::io::BufReader;
 
 const STREAM: u64 = 5;
@@ -86,23 +86,23 @@ fn the_note_tells_how_the_recording_stands_and_counts_what_is_in_the_file() {
     let mut recording = begin(&below);
     let folder = folder(&below);
     assert!(cycles(&folder).is_empty(), "the empty recording is one already");
-    // One look after a second away, and one that comes too late for three samples.
+    // One poll after a second away, and one that comes too late for three samples.
     take(&mut recording, 0, 1000, STREAM);
     assert_eq!(RecordingState::of(&folder, STREAM), RecordingState::Open);
     take(&mut recording, 1003, 1500, STREAM);
     let gaps = vec![Gap { first: 1000, last: 1002 }];
-    let open = WatchNote::read(&folder).unwrap();
+    let open = RecordingInfo::read(&folder).unwrap();
     assert_eq!((open.progress, open.lost, &open.gaps), (Progress::Open, 3, &gaps));
     recording.finish().unwrap();
-    let note = WatchNote {
+    let info = RecordingInfo {
         stream: STREAM,
         records: 1497,
         lost: 3,
         gap_count: 1,
         gaps,
-        ..WatchNote::default()
+        ..RecordingInfo::default()
     };
-    assert_eq!(RecordingState::of(&folder, STREAM), RecordingState::Complete(note));
+    assert_eq!(RecordingState::of(&folder, STREAM), RecordingState::Complete(info));
     assert_eq!(cycles(&folder).len(), 1497);
 }
 
@@ -127,10 +127,10 @@ fn a_successor_goes_on_with_the_recording_and_counts_the_gap() {
         second.finish().unwrap();
         let expect: Vec<u64> = (0..100).chain(110..kept).chain(300..400).collect();
         assert_eq!(cycles(&folder), expect);
-        let RecordingState::Complete(note) = RecordingState::of(&folder, STREAM) else { panic!() };
+        let RecordingState::Complete(info) = RecordingState::of(&folder, STREAM) else { panic!() };
         let gaps = vec![Gap { first: 100, last: 109 }, Gap { first: kept, last: 299 }];
-        assert_eq!((note.records, note.gap_count), (expect.len() as u64, 2));
-        assert_eq!((note.lost, note.gaps), (10 + 300 - kept, gaps));
+        assert_eq!((info.records, info.gap_count), (expect.len() as u64, 2));
+        assert_eq!((info.lost, info.gaps), (10 + 300 - kept, gaps));
         let log = std::fs::read_to_string(folder.file(run_folder::LATENCY)).unwrap();
         assert_eq!(log.matches("#[StartTime").count(), 1, "one log: {log}");
     }
@@ -147,7 +147,7 @@ fn a_recording_of_another_job_is_not_gone_on_with() {
     take(&mut second, 300, 310, STREAM);
     second.finish().unwrap();
     assert_eq!(cycles(&folder), (300..310).collect::<Vec<_>>());
-    assert_eq!(WatchNote::read(&folder).unwrap().gap_count, 0);
+    assert_eq!(RecordingInfo::read(&folder).unwrap().gap_count, 0);
 }
 
 #[test]

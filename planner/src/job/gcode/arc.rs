@@ -2,8 +2,8 @@
 
 use core::f64::consts::{FRAC_PI_2, PI, SQRT_2, TAU};
 
+use messages::math;
 use nalgebra::Vector3;
-use signals::math;
 
 use super::codes::{INCH, MILLIMETRE, Plane};
 use crate::drawing::Curve;

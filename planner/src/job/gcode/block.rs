@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::codes::{Codes, spell};
+use super::codes::{Codes, Stop, spell};
 use super::error::Refusal;
 use super::lexer::Word;
 
@@ -42,11 +42,11 @@ impl Block {
     }
 
     /// Takes one word.
-    pub(super) fn take(&mut self, text: &str, word: Word) -> Result<(), Box<Refusal>> {
+    pub(super) fn take(&mut self, line: &[u8], word: Word) -> Result<(), Box<Refusal>> {
         let first = !std::mem::replace(&mut self.begun, true);
         let name = char::from(word.letter);
         match word.letter {
-            b'G' | b'M' => return self.codes.take(text, word),
+            b'G' | b'M' => return self.codes.take(line, word),
             b'N' => {
                 if !first {
                     return Err(Refusal::new(
@@ -66,7 +66,7 @@ impl Block {
                 }
                 return Ok(());
             }
-            b'F' | b'I' | b'J' | b'K' | b'P' | b'Q' | b'R' | b'S' | b'X' | b'Y' | b'Z' => {}
+            b'E' | b'F' | b'I' | b'J' | b'K' | b'P' | b'Q' | b'R' | b'S' | b'X' | b'Y' | b'Z' => {}
             b'T' => {
                 whole(&word)?;
             }
@@ -78,27 +78,20 @@ impl Block {
                     "a program moves X, Y and Z",
                 ));
             }
-            b'E' => {
-                return Err(Refusal::new(
-                    word.span,
-                    "E words are not supported",
-                    "E word",
-                    "a number has no exponent, and a marking machine no extruder",
-                ));
-            }
             _ => {
                 return Err(Refusal::new(
                     word.span,
                     format!("{name} words are not supported"),
                     "unsupported word",
-                    "words begin with F G I J K M N P Q R S T X Y or Z",
+                    "words begin with E F G I J K M N P Q R S T X Y or Z",
                 ));
             }
         }
         let index = usize::from(word.letter - b'A');
         if self.present & (1 << index) != 0 {
-            let first = spell(text, &self.spans[index]);
-            let second = spell(text, &word.span);
+            self.check_gathered()?;
+            let first = spell(line, &self.spans[index]);
+            let second = spell(line, &word.span);
             return Err(Refusal::new(
                 word.span,
                 format!("{name} is on this line twice: {first} and {second}"),
@@ -110,6 +103,25 @@ impl Block {
         self.numbers[index] = word.number;
         self.spans[index] = word.span;
         Ok(())
+    }
+
+    /// Refuses words that nothing of the line could use, once it has all of them: E without M67 and M68,
+    /// which is an exponent or an extruder's.
+    pub(super) fn check_gathered(&self) -> Result<(), Box<Refusal>> {
+        if !self.has(b'E') || self.codes.analog_output.is_some() {
+            return Ok(());
+        }
+        Err(Refusal::new(
+            self.span(b'E'),
+            "E words are not supported",
+            "E word",
+            "a number has no exponent, a marking machine no extruder, and E0 belongs to M67 and M68",
+        ))
+    }
+
+    /// Whether the line ends the program.
+    pub(super) fn ends_program(&self) -> bool {
+        self.codes.stop.as_ref().is_some_and(|chosen| chosen.code == Stop::End)
     }
 
     /// Whether the line has `letter`.
@@ -161,7 +173,7 @@ impl Block {
             b'X' | b'Y' | b'Z' => "coordinates need G0, G1, G2 or G3, on this line or before",
             b'I' | b'J' | b'K' | b'R' => "I, J, K and R belong to G2 and G3",
             b'P' => "P belongs to G2, G3, G4 and G64",
-            _ => "Q belongs to G64",
+            _ => "Q belongs to G64, M67 and M68",
         };
         Err(Refusal::new(
             self.span(letter),

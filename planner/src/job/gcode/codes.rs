@@ -69,7 +69,7 @@ pub(super) enum FeedMode {
 /// Group 13.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PathControl {
-    /// G61.
+    /// G61 and G61.1.
     Exact,
     /// G64.
     Blend,
@@ -119,6 +119,8 @@ pub(super) struct Codes {
     pub(super) origin: Option<Chosen<usize>>,
     pub(super) path_control: Option<Chosen<PathControl>>,
     pub(super) laser: Option<Chosen<Laser>>,
+    /// M67 and M68.
+    pub(super) analog_output: Option<Chosen<()>>,
     pub(super) air_assist: Option<Chosen<bool>>,
     pub(super) stop: Option<Chosen<Stop>>,
     /// G80. RS-274 has it in group 1, but preambles write it beside G0, and LinuxCNC allows that.
@@ -134,86 +136,89 @@ pub(super) const INCH: f64 = 0.0254;
 /// Metres in a millimetre.
 pub(super) const MILLIMETRE: f64 = 1e-3;
 
-const SUPPORTED_G: &str = "G0 G1 G2 G3 G4 G17 G18 G19 G20 G21 G28 G53 G54-G59 G59.1-G59.3 G61 G64 \
-                           G90 G91 G90.1 G91.1 G92 G92.1-G92.3 G93 G94, and without effect G40 G49 \
+const SUPPORTED_G: &str = "G0 G1 G2 G3 G4 G17 G18 G19 G20 G21 G28 G53 G54-G59 G59.1-G59.3 G61 G61.1 \
+                           G64 G90 G91 G90.1 G91.1 G92 G92.1-G92.3 G93 G94, and without effect G40 G49 \
                            G80 G97 G98 G99";
-const SUPPORTED_M: &str = "M0 M1 M2 M3 M4 M5 M7 M8 M9 M30";
+const SUPPORTED_M: &str = "M0 M1 M2 M3 M4 M5 M7 M8 M9 M30 M67 M68";
 
 impl Codes {
     /// Takes the G or M `word` into its group.
-    pub(super) fn take(&mut self, text: &str, word: Word) -> Result<(), Box<Refusal>> {
+    pub(super) fn take(&mut self, line: &[u8], word: Word) -> Result<(), Box<Refusal>> {
         let tenths = word.number * 10.0;
         let code = tenths.round();
         // Codes have one decimal at most; ten times a decimal is off by rounding alone.
         let known = (tenths - code).abs() < 1e-9 && (0.0..65_536.0).contains(&code);
         if !known {
-            return Err(unsupported(text, &word, 65_535));
+            return Err(unsupported(line, &word, 65_535));
         }
         if word.letter == b'G' {
-            self.general(text, word, code as u16)
+            self.general(line, word, code as u16)
         } else {
-            self.miscellaneous(text, word, code as u16)
+            self.miscellaneous(line, word, code as u16)
         }
     }
 
-    fn general(&mut self, text: &str, word: Word, tenths: u16) -> Result<(), Box<Refusal>> {
+    fn general(&mut self, line: &[u8], word: Word, tenths: u16) -> Result<(), Box<Refusal>> {
         let span = word.span.clone();
         match tenths {
-            0 => choose(&mut self.motion, Motion::Rapid, span, text, "motion"),
-            10 => choose(&mut self.motion, Motion::Line, span, text, "motion"),
-            20 => choose(&mut self.motion, Motion::Clockwise, span, text, "motion"),
-            30 => choose(&mut self.motion, Motion::Counterclockwise, span, text, "motion"),
-            800 => choose(&mut self.cancelled, (), span, text, "canned cycle"),
-            40 => choose(&mut self.once, Once::Dwell, span, text, "non-modal"),
-            280 => choose(&mut self.once, Once::Home, span, text, "non-modal"),
-            530 => choose(&mut self.once, Once::MachineFrame, span, text, "non-modal"),
-            920 => choose(&mut self.once, Once::Shift, span, text, "non-modal"),
-            921 => choose(&mut self.once, Once::ClearShift, span, text, "non-modal"),
-            922 => choose(&mut self.once, Once::SuspendShift, span, text, "non-modal"),
-            923 => choose(&mut self.once, Once::RestoreShift, span, text, "non-modal"),
-            170 => choose(&mut self.plane, Plane::Xy, span, text, "plane"),
-            180 => choose(&mut self.plane, Plane::Zx, span, text, "plane"),
-            190 => choose(&mut self.plane, Plane::Yz, span, text, "plane"),
-            200 => choose(&mut self.unit, INCH, span, text, "units"),
-            210 => choose(&mut self.unit, MILLIMETRE, span, text, "units"),
-            400 => choose(&mut self.cutter_radius, (), span, text, "cutter radius"),
-            490 => choose(&mut self.tool_length, (), span, text, "tool length"),
+            0 => choose(&mut self.motion, Motion::Rapid, span, line, "motion"),
+            10 => choose(&mut self.motion, Motion::Line, span, line, "motion"),
+            20 => choose(&mut self.motion, Motion::Clockwise, span, line, "motion"),
+            30 => choose(&mut self.motion, Motion::Counterclockwise, span, line, "motion"),
+            800 => choose(&mut self.cancelled, (), span, line, "canned cycle"),
+            40 => choose(&mut self.once, Once::Dwell, span, line, "non-modal"),
+            280 => choose(&mut self.once, Once::Home, span, line, "non-modal"),
+            530 => choose(&mut self.once, Once::MachineFrame, span, line, "non-modal"),
+            920 => choose(&mut self.once, Once::Shift, span, line, "non-modal"),
+            921 => choose(&mut self.once, Once::ClearShift, span, line, "non-modal"),
+            922 => choose(&mut self.once, Once::SuspendShift, span, line, "non-modal"),
+            923 => choose(&mut self.once, Once::RestoreShift, span, line, "non-modal"),
+            170 => choose(&mut self.plane, Plane::Xy, span, line, "plane"),
+            180 => choose(&mut self.plane, Plane::Zx, span, line, "plane"),
+            190 => choose(&mut self.plane, Plane::Yz, span, line, "plane"),
+            200 => choose(&mut self.unit, INCH, span, line, "units"),
+            210 => choose(&mut self.unit, MILLIMETRE, span, line, "units"),
+            400 => choose(&mut self.cutter_radius, (), span, line, "cutter radius"),
+            490 => choose(&mut self.tool_length, (), span, line, "tool length"),
             540 | 550 | 560 | 570 | 580 | 590 => {
                 let origin = usize::from((tenths - 540) / 10);
-                choose(&mut self.origin, origin, span, text, "work coordinate system")
+                choose(&mut self.origin, origin, span, line, "work coordinate system")
             }
             591..=593 => {
                 let origin = usize::from(tenths - 591) + 6;
-                choose(&mut self.origin, origin, span, text, "work coordinate system")
+                choose(&mut self.origin, origin, span, line, "work coordinate system")
             }
-            610 => choose(&mut self.path_control, PathControl::Exact, span, text, "path control"),
-            640 => choose(&mut self.path_control, PathControl::Blend, span, text, "path control"),
-            900 => choose(&mut self.distance, Reference::Absolute, span, text, "distance"),
-            910 => choose(&mut self.distance, Reference::Incremental, span, text, "distance"),
-            901 => choose(&mut self.arc_distance, Reference::Absolute, span, text, "arc distance"),
+            610 | 611 => {
+                choose(&mut self.path_control, PathControl::Exact, span, line, "path control")
+            }
+            640 => choose(&mut self.path_control, PathControl::Blend, span, line, "path control"),
+            900 => choose(&mut self.distance, Reference::Absolute, span, line, "distance"),
+            910 => choose(&mut self.distance, Reference::Incremental, span, line, "distance"),
+            901 => choose(&mut self.arc_distance, Reference::Absolute, span, line, "arc distance"),
             911 => {
-                choose(&mut self.arc_distance, Reference::Incremental, span, text, "arc distance")
+                choose(&mut self.arc_distance, Reference::Incremental, span, line, "arc distance")
             }
-            930 => choose(&mut self.feed_mode, FeedMode::InverseTime, span, text, "feed"),
-            940 => choose(&mut self.feed_mode, FeedMode::PerMinute, span, text, "feed"),
-            970 => choose(&mut self.spindle_mode, (), span, text, "spindle speed"),
-            980 | 990 => choose(&mut self.cycle_return, (), span, text, "cycle return"),
-            _ => Err(unsupported(text, &word, tenths)),
+            930 => choose(&mut self.feed_mode, FeedMode::InverseTime, span, line, "feed"),
+            940 => choose(&mut self.feed_mode, FeedMode::PerMinute, span, line, "feed"),
+            970 => choose(&mut self.spindle_mode, (), span, line, "spindle speed"),
+            980 | 990 => choose(&mut self.cycle_return, (), span, line, "cycle return"),
+            _ => Err(unsupported(line, &word, tenths)),
         }
     }
 
-    fn miscellaneous(&mut self, text: &str, word: Word, tenths: u16) -> Result<(), Box<Refusal>> {
+    fn miscellaneous(&mut self, line: &[u8], word: Word, tenths: u16) -> Result<(), Box<Refusal>> {
         let span = word.span.clone();
         match tenths {
-            0 => choose(&mut self.stop, Stop::Pause, span, text, "stopping"),
-            10 => choose(&mut self.stop, Stop::Optional, span, text, "stopping"),
-            20 | 300 => choose(&mut self.stop, Stop::End, span, text, "stopping"),
-            30 => choose(&mut self.laser, Laser::Constant, span, text, "laser"),
-            40 => choose(&mut self.laser, Laser::FollowsSpeed, span, text, "laser"),
-            50 => choose(&mut self.laser, Laser::Off, span, text, "laser"),
-            70 | 80 => choose(&mut self.air_assist, true, span, text, "air assist"),
-            90 => choose(&mut self.air_assist, false, span, text, "air assist"),
-            _ => Err(unsupported(text, &word, tenths)),
+            0 => choose(&mut self.stop, Stop::Pause, span, line, "stopping"),
+            10 => choose(&mut self.stop, Stop::Optional, span, line, "stopping"),
+            20 | 300 => choose(&mut self.stop, Stop::End, span, line, "stopping"),
+            30 => choose(&mut self.laser, Laser::Constant, span, line, "laser"),
+            40 => choose(&mut self.laser, Laser::FollowsSpeed, span, line, "laser"),
+            50 => choose(&mut self.laser, Laser::Off, span, line, "laser"),
+            70 | 80 => choose(&mut self.air_assist, true, span, line, "air assist"),
+            90 => choose(&mut self.air_assist, false, span, line, "air assist"),
+            670 | 680 => choose(&mut self.analog_output, (), span, line, "analog output"),
+            _ => Err(unsupported(line, &word, tenths)),
         }
     }
 }
@@ -223,11 +228,11 @@ fn choose<T>(
     group: &mut Option<Chosen<T>>,
     code: T,
     span: Range<usize>,
-    text: &str,
+    line: &[u8],
     name: &str,
 ) -> Result<(), Box<Refusal>> {
     if let Some(first) = group {
-        let (one, other) = (spell(text, &first.span), spell(text, &span));
+        let (one, other) = (spell(line, &first.span), spell(line, &span));
         return Err(Refusal::new(
             span,
             format!("{one} and {other} are both of the {name} group"),
@@ -240,8 +245,8 @@ fn choose<T>(
 }
 
 /// The word at `span` as a person would write it.
-pub(super) fn spell(text: &str, span: &Range<usize>) -> String {
-    text[span.clone()]
+pub(super) fn spell(line: &[u8], span: &Range<usize>) -> String {
+    String::from_utf8_lossy(&line[span.clone()])
         .chars()
         .filter(|character| !character.is_whitespace())
         .collect::<String>()
@@ -249,8 +254,8 @@ pub(super) fn spell(text: &str, span: &Range<usize>) -> String {
 }
 
 /// Refuses a code, and says what to do about those that real files have.
-fn unsupported(text: &str, word: &Word, tenths: u16) -> Box<Refusal> {
-    let name = spell(text, &word.span);
+fn unsupported(line: &[u8], word: &Word, tenths: u16) -> Box<Refusal> {
+    let name = spell(line, &word.span);
     let advice = if word.letter == b'G' { general_advice(tenths) } else { tool_advice(tenths) };
     let supported = if word.letter == b'G' { SUPPORTED_G } else { SUPPORTED_M };
     let help = match advice {
@@ -271,7 +276,6 @@ fn general_advice(tenths: u16) -> Option<&'static str> {
             "let the post-processor offset the path by the width of the line, and write G40"
         }
         430..=432 => "a marking machine has no tool lengths: delete it or write G49",
-        611 => "write G61",
         730..=739 | 810..=899 => "canned cycles: let the post-processor write the moves out",
         950 => "a marking machine has no spindle: use G94",
         960 => "a marking machine has no spindle: delete it or write G97",
@@ -285,7 +289,7 @@ fn tool_advice(tenths: u16) -> Option<&'static str> {
         190 => "a marking machine has no spindle to orient: delete it",
         480..=530 => "delete it: override and feed hold are always at hand",
         600 => "write M0 to wait for a person",
-        620..=680 => "switch air assist with M8 and M9, and set the laser's power with S",
+        620..=660 => "switch air assist with M8 and M9, and set the laser's power with S or M67",
         980 | 990 => "subroutines: write the moves out",
         1060 | 1070 => "switch the laser with M3 or M4 and S, and off with M5",
         1000..=1990 => "user-defined commands do not exist here: delete it",

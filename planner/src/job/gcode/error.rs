@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use miette::{Diagnostic, NamedSource, SourceSpan};
+use miette::{Diagnostic, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
+
+use super::lines::decode;
 
 /// A G-code program that cannot be marked as it stands.
 #[derive(Debug, Clone, thiserror::Error, Diagnostic)]
@@ -21,13 +23,16 @@ pub struct GcodeError {
     /// What would be right.
     #[help]
     pub help: String,
+    /// What else is not supported further down in the file, each thing once and a few at most.
+    #[related]
+    pub others: Vec<GcodeError>,
     #[source_code]
-    source_code: NamedSource<String>,
+    excerpt: Excerpt,
     #[label("{found}")]
     span: SourceSpan,
 }
 
-/// A refusal while its place is still a range of bytes in the text.
+/// A refusal while its place is still a range of bytes in its line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Refusal {
     pub(super) span: Range<usize>,
@@ -49,22 +54,95 @@ impl Refusal {
 }
 
 impl GcodeError {
-    /// Turns the bytes of `refusal` into line and column of `text`.
-    pub(super) fn new(file: &str, text: &str, refusal: Refusal) -> Self {
+    /// Of a `refusal` in the line `number`, from 1, of `file`. `around` is that line with those before
+    /// and after it, as far as there are any.
+    pub(super) fn new(
+        file: &str,
+        number: u64,
+        line: &[u8],
+        around: &[String],
+        refusal: Refusal,
+    ) -> Self {
         let Refusal { span, message, found, help } = refusal;
-        let before = &text.as_bytes()[..span.start.min(text.len())];
-        let line_start = before.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
-        // Every byte that does not continue a character begins one.
-        let begins_character = |byte: &&u8| **byte & 0xC0 != 0x80;
+        let within = |bytes: &Range<usize>| bytes.start.min(line.len())..bytes.end.min(line.len());
+        let span = within(&span);
+        // An illegible line is taken for Latin-1, so that places before it are places in its text.
+        let text = decode(line);
+        let place = |byte: usize| match text {
+            std::borrow::Cow::Borrowed(_) => byte,
+            std::borrow::Cow::Owned(_) => line[..byte].iter().map(|&byte| width(byte)).sum(),
+        };
+        let (start, end) = (place(span.start), place(span.end));
+        let is_second = number > 1 && !around.is_empty();
+        let offset = if is_second { around[0].len() + 1 } else { 0 };
         Self {
             file: file.to_owned(),
-            line: 1 + before.iter().filter(|&&byte| byte == b'\n').count() as u64,
-            column: 1 + before[line_start..].iter().filter(begins_character).count() as u64,
+            line: number,
+            column: 1 + text.char_indices().take_while(|&(at, _)| at < start).count() as u64,
             message,
             found,
             help,
-            source_code: NamedSource::new(file, text.to_owned()),
-            span: (span.start, span.end.saturating_sub(span.start)).into(),
+            others: Vec::new(),
+            excerpt: Excerpt {
+                file: file.to_owned(),
+                text: around.join("\n"),
+                first: number.saturating_sub(1 + u64::from(is_second)) as usize,
+            },
+            span: (offset + start, end.saturating_sub(start)).into(),
+        }
+    }
+}
+
+/// Bytes of the character that a byte of Latin-1 stands for, in UTF-8.
+fn width(byte: u8) -> usize {
+    char::from(byte).len_utf8()
+}
+
+/// A few lines of a file, which keep their numbers.
+#[derive(Debug, Clone)]
+struct Excerpt {
+    file: String,
+    text: String,
+    /// Lines of the file before them.
+    first: usize,
+}
+
+impl SourceCode for Excerpt {
+    fn read_span<'a>(
+        &'a self,
+        span: &SourceSpan,
+        lines_before: usize,
+        lines_after: usize,
+    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
+        let contents = self.text.read_span(span, lines_before, lines_after)?;
+        Ok(Box::new(MietteSpanContents::new_named(
+            self.file.clone(),
+            contents.data(),
+            *contents.span(),
+            contents.line() + self.first,
+            contents.column(),
+            contents.line_count(),
+        )))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn an_excerpt_keeps_the_numbers_of_its_lines() {
+        let around = ["G21", "G0 X1 \u{e9}", "M2"].map(str::to_owned);
+        let refusal = *Refusal::new(6..7, "wrong", "here", "better");
+        let error = GcodeError::new("a.nc", 700, b"G0 X1 \xe9", &around, refusal);
+        assert_eq!((error.line, error.column), (700, 7));
+        let mut text = String::new();
+        let theme = miette::GraphicalTheme::unicode_nocolor();
+        miette::GraphicalReportHandler::new_themed(theme).render_report(&mut text, &error).unwrap();
+        for expected in ["a.nc:700:7", "699 │ G21", "700 │ G0 X1 \u{e9}", "701 │ M2"] {
+            assert!(text.contains(expected), "{expected}\n{text}");
         }
     }
 }

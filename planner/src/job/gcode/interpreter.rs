@@ -1,11 +1,11 @@
 //! What the words of a line do, in the order that RS-274 gives them, and what stays in force.
 
 mod arc_words;
+mod laser_words;
 
 use std::ops::Range;
 
-use machine::Machine;
-use machine::process::{GcodeSettings, ZMeaning};
+use machine::gcode_settings::{GcodeSettings, ZMeaning};
 use nalgebra::Vector3;
 
 use super::block::Block;
@@ -13,13 +13,12 @@ use super::codes::{
     Chosen, FeedMode, Laser, MILLIMETRE, Motion, Once, PathControl, Plane, Reference, Stop, spell,
 };
 use super::error::Refusal;
+use super::settings::ReaderSettings;
 use super::tracer::{Feed, Pace, Tracer};
-use crate::drawing::{Action, Note, Power};
+use crate::drawing::{Action, Corners, Note};
 
 /// Seconds in a minute.
 const MINUTE: f64 = 60.0;
-/// Longest dwell of one G4 [s]: a day.
-const LONGEST_DWELL: f64 = 86_400.0;
 /// The output bit of the air assist.
 const AIR_ASSIST: u32 = 0;
 
@@ -45,13 +44,13 @@ struct Modal {
     /// Fraction of full scale, `None` before any S.
     level: Option<f64>,
     air_assist: bool,
+    corners: Corners,
 }
 
 /// Notes, each made once.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Remark {
     BlockDelete,
-    Corners,
     Tool,
     OptionalStop,
     NoAirAssist,
@@ -62,9 +61,8 @@ pub(super) enum Remark {
 
 /// Runs a program line by line.
 #[derive(Debug)]
-pub(super) struct Interpreter<'a> {
-    text: &'a str,
-    settings: &'a GcodeSettings,
+pub(super) struct Interpreter {
+    settings: GcodeSettings,
     home: Vector3<f64>,
     modal: Modal,
     said: u32,
@@ -72,14 +70,11 @@ pub(super) struct Interpreter<'a> {
     pub(super) tracer: Tracer,
 }
 
-impl<'a> Interpreter<'a> {
-    pub(super) fn new(text: &'a str, machine: &'a Machine) -> Self {
-        let home = Vector3::from(machine.home);
-        let settings = &machine.gcode;
+impl Interpreter {
+    pub(super) fn new(settings: &ReaderSettings) -> Self {
         Self {
-            text,
-            settings,
-            home,
+            settings: settings.gcode,
+            home: settings.home,
             modal: Modal {
                 motion: None,
                 plane: Plane::Xy,
@@ -87,17 +82,18 @@ impl<'a> Interpreter<'a> {
                 arc_distance: Reference::Incremental,
                 feed_mode: FeedMode::PerMinute,
                 unit: MILLIMETRE,
-                origin: Vector3::from(settings.origins[0]),
+                origin: Vector3::from(settings.gcode.origins[0]),
                 shift: Vector3::zeros(),
                 kept_shift: Vector3::zeros(),
                 feed: None,
                 laser: Laser::Off,
                 level: None,
                 air_assist: false,
+                corners: Corners::AsMachine,
             },
             said: 0,
             notes: Vec::new(),
-            tracer: Tracer::new(home, settings.z == ZMeaning::Ignored),
+            tracer: Tracer::new(settings),
         }
     }
 
@@ -110,7 +106,6 @@ impl<'a> Interpreter<'a> {
         self.said |= bit;
         let text = match remark {
             Remark::BlockDelete => "lines that begin with / are left out (block delete)",
-            Remark::Corners => "G64 is accepted, but corners stay exact: there is no blending yet",
             Remark::Tool => "T has no effect: a marking head has no tools",
             Remark::OptionalStop => "M1 has no effect: there is no optional stop; M0 waits",
             Remark::NoAirAssist => "M7 and M8 have no effect: this machine has no air assist",
@@ -121,8 +116,8 @@ impl<'a> Interpreter<'a> {
         self.notes.push(Note { line: self.tracer.line, text: text.to_owned() });
     }
 
-    /// Does what `block` says. Gives back whether it ends the program.
-    pub(super) fn execute(&mut self, block: &mut Block) -> Result<bool, Box<Refusal>> {
+    /// Does what `block` says, which was gathered from `line`. Gives back whether it ends the program.
+    pub(super) fn execute(&mut self, line: &[u8], block: &mut Block) -> Result<bool, Box<Refusal>> {
         self.tracer.facts.blocks += 1;
         self.settle_feed(block)?;
         self.settle_laser(block)?;
@@ -147,7 +142,7 @@ impl<'a> Interpreter<'a> {
         if motion.is_some() || codes.cancelled.is_some() {
             self.modal.motion = motion.as_ref().map(|chosen| chosen.code);
         }
-        self.shift_or_home(block, once.as_ref(), motion.as_ref())?;
+        self.shift_or_home(line, block, once.as_ref(), motion.as_ref())?;
         self.motion(block, once.as_ref(), motion.as_ref())?;
         block.check_used()?;
         Ok(self.stop(block))
@@ -189,96 +184,49 @@ impl<'a> Interpreter<'a> {
         Ok(())
     }
 
-    /// S, T, M3, M4, M5, M7, M8, M9.
-    fn settle_laser(&mut self, block: &mut Block) -> Result<(), Box<Refusal>> {
-        if let Some(number) = block.number(b'S') {
-            let full_scale = self.settings.full_scale;
-            if !(0.0..=full_scale).contains(&number) {
-                return Err(Refusal::new(
-                    block.span(b'S'),
-                    format!("S{number} is outside 0 to {full_scale}"),
-                    "laser power",
-                    format!("full power is S{full_scale} (full scale in the machine file)"),
-                ));
-            }
-            self.modal.level = Some(number / full_scale);
-        }
-        if block.number(b'T').is_some() {
-            self.remark(Remark::Tool);
-        }
-        if let Some(chosen) = &block.codes.laser {
-            self.modal.laser = chosen.code;
-        }
-        let Some(on) = block.codes.air_assist.as_ref().map(|chosen| chosen.code) else {
-            return Ok(());
-        };
-        if on && !self.settings.air_assist {
-            self.remark(Remark::NoAirAssist);
-        } else if on != self.modal.air_assist {
-            self.modal.air_assist = on;
-            self.tracer.push(Action::Output { bit: AIR_ASSIST, on });
-        }
-        Ok(())
-    }
-
-    /// The laser along a mark, `None` in the dark.
-    fn power(&self) -> Option<Power> {
-        let level = self.modal.level.filter(|&level| level > 0.0)?;
-        match self.modal.laser {
-            Laser::Off => None,
-            Laser::Constant => Some(Power { level, follows_speed: false }),
-            Laser::FollowsSpeed => Some(Power { level, follows_speed: true }),
-        }
-    }
-
-    /// G4.
-    fn dwell(&mut self, block: &mut Block, span: Range<usize>) -> Result<(), Box<Refusal>> {
-        let help = "G4 waits for P seconds: G4 P0.5";
-        let Some(time) = block.number(b'P') else {
-            return Err(Refusal::new(span, "G4 has no P", "dwell without a time", help));
-        };
-        if !(0.0..=LONGEST_DWELL).contains(&time) {
-            return Err(Refusal::new(
-                block.span(b'P'),
-                format!("a dwell of {time} s is outside 0 to {LONGEST_DWELL} s"),
-                "dwell in seconds",
-                help,
-            ));
-        }
-        // Power that follows the speed is none at rest.
-        let lit = self.power().filter(|power| !power.follows_speed).map(|power| power.level);
-        if time > 0.0 {
-            self.tracer.push(Action::Dwell { time, lit });
-        }
-        Ok(())
-    }
-
-    /// G61 and G64 with the tolerances P and Q.
+    /// G61, G61.1 and G64: how corners are passed from here on.
     fn path_control(&mut self, block: &mut Block) -> Result<(), Box<Refusal>> {
         let Some(chosen) = &block.codes.path_control else { return Ok(()) };
-        if chosen.code == PathControl::Exact {
-            return Ok(());
+        let corners = match chosen.code {
+            PathControl::Exact => Corners::Exact,
+            PathControl::Blend => self.blend(block)?,
+        };
+        if corners != self.modal.corners {
+            self.modal.corners = corners;
+            self.tracer.push(Action::Corners(corners));
         }
+        Ok(())
+    }
+
+    /// G64 with its tolerance P. Q, up to which LinuxCNC joins short lines, changes nothing: lines are
+    /// joined within the tolerance anyway.
+    fn blend(&self, block: &mut Block) -> Result<Corners, Box<Refusal>> {
         for letter in [b'P', b'Q'] {
-            if block.has(letter) {
-                claim(block, letter)?;
-                if block.number(letter).is_some_and(|tolerance| tolerance < 0.0) {
-                    return Err(Refusal::new(
-                        block.span(letter),
-                        format!("the tolerance {} of G64 is negative", char::from(letter)),
-                        "tolerance",
-                        "a tolerance is 0 or above",
-                    ));
-                }
+            if !block.has(letter) {
+                continue;
+            }
+            claim(block, letter)?;
+            if block.number(letter).is_some_and(|tolerance| tolerance < 0.0) {
+                return Err(Refusal::new(
+                    block.span(letter),
+                    format!("the tolerance {} of G64 is negative", char::from(letter)),
+                    "tolerance",
+                    "a tolerance is 0 or above",
+                ));
             }
         }
-        self.remark(Remark::Corners);
-        Ok(())
+        let tolerance = block.number(b'P').map(|number| number * self.modal.unit);
+        Ok(match tolerance {
+            // No deviation at all is an exact corner.
+            Some(0.0) => Corners::Exact,
+            tolerance => Corners::Blend(tolerance),
+        })
     }
 
     /// G28 and G92 to G92.3, which take the coordinates of their line.
     fn shift_or_home(
         &mut self,
+        line: &[u8],
         block: &mut Block,
         once: Option<&Chosen<Once>>,
         motion: Option<&Chosen<Motion>>,
@@ -303,8 +251,8 @@ impl<'a> Interpreter<'a> {
                 motion.span.clone(),
                 format!(
                     "{} and {} both take the coordinates of this line",
-                    spell(self.text, span),
-                    spell(self.text, &motion.span)
+                    spell(line, span),
+                    spell(line, &motion.span)
                 ),
                 "second code with coordinates",
                 "write them on lines of their own",

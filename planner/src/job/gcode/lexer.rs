@@ -6,10 +6,14 @@
 use std::ops::Range;
 
 use super::error::Refusal;
+use super::lines::character;
 
 /// Largest magnitude of a number in a program: far beyond any machine, and small enough that no
 /// sum or product of such numbers overflows.
 const LARGEST: f64 = 1e9;
+
+/// What some editors begin a file with.
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 /// Powers of ten that a double holds exactly.
 const POWERS: [f64; 23] = [
@@ -23,7 +27,7 @@ pub(super) struct Word {
     /// The letter in upper case.
     pub(super) letter: u8,
     pub(super) number: f64,
-    /// Bytes in the text.
+    /// Bytes of the line.
     pub(super) span: Range<usize>,
 }
 
@@ -39,17 +43,25 @@ pub(super) enum Token {
 
 /// Reads the tokens of one line from left to right, without allocating.
 pub(super) struct Words<'a> {
-    text: &'a str,
+    line: &'a [u8],
     at: usize,
-    end: usize,
     /// Whether anything but blanks and comments has been read.
     begun: bool,
 }
 
 impl<'a> Words<'a> {
-    /// Over the bytes of one line of `text`, without its line feed.
-    pub(super) fn new(text: &'a str, line: Range<usize>) -> Self {
-        Self { text, at: line.start, end: line.end, begun: false }
+    /// Over the bytes of one `line`, without its line feed.
+    pub(super) fn new(line: &'a [u8]) -> Self {
+        Self { line, at: 0, begun: false }
+    }
+
+    /// Over the first line of a program: some editors begin a file with a byte order mark.
+    pub(super) fn first(line: &'a [u8]) -> Self {
+        let mut at = 0;
+        while line[at..].starts_with(BYTE_ORDER_MARK) {
+            at += BYTE_ORDER_MARK.len();
+        }
+        Self { line, at, begun: false }
     }
 
     /// The next token, `None` at the end of the line.
@@ -60,7 +72,7 @@ impl<'a> Words<'a> {
             match byte {
                 b' ' | b'\t' | b'\r' => self.at += 1,
                 b'(' => self.comment()?,
-                b';' => self.at = self.end,
+                b';' => self.at = self.line.len(),
                 b'/' if first => {
                     self.begun = true;
                     return Ok(Some(Token::Delete));
@@ -82,7 +94,7 @@ impl<'a> Words<'a> {
     }
 
     fn peek(&self) -> Option<u8> {
-        if self.at < self.end { self.text.as_bytes().get(self.at).copied() } else { None }
+        self.line.get(self.at).copied()
     }
 
     fn blanks(&mut self) {
@@ -166,7 +178,8 @@ impl<'a> Words<'a> {
         let magnitude = if count <= 15 {
             mantissa as f64 / POWERS[places]
         } else {
-            self.text[unsigned..self.at].parse().unwrap_or(f64::INFINITY)
+            let digits = std::str::from_utf8(&self.line[unsigned..self.at]).unwrap_or("");
+            digits.parse().unwrap_or(f64::INFINITY)
         };
         if magnitude > LARGEST {
             return Err(Refusal::new(
@@ -188,7 +201,7 @@ impl<'a> Words<'a> {
             'G' | 'M' => format!("write a number after {name}, such as {name}1"),
             _ => format!("write a decimal number after {name}, such as {name}10 or {name}2.5"),
         };
-        match self.text.as_bytes()[..self.end].get(digits) {
+        match self.line.get(digits) {
             Some(b'#') => Refusal::new(
                 digits..digits + 1,
                 "parameters (#) are not supported",
@@ -233,9 +246,8 @@ impl<'a> Words<'a> {
 
     /// What stands where a word was due.
     fn stray(&self) -> Box<Refusal> {
-        let rest = &self.text[self.at..self.end];
-        let character = rest.chars().next().unwrap_or('\u{fffd}');
-        let span = self.at..self.at + character.len_utf8();
+        let (character, length) = character(self.line, self.at);
+        let span = self.at..self.at + length;
         let (message, help) = match character {
             '#' => ("parameters (#) are not supported".to_owned(), "write the numbers out"),
             '[' | ']' => ("expressions ([ ]) are not supported".to_owned(), "write the number out"),
@@ -264,7 +276,7 @@ mod tests {
     use super::*;
 
     fn words(line: &str) -> Result<Vec<(char, f64)>, Box<Refusal>> {
-        let mut words = Words::new(line, 0..line.len());
+        let mut words = Words::new(line.as_bytes());
         let mut read = Vec::new();
         while let Some(token) = words.next()? {
             match token {

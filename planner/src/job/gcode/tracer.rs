@@ -1,10 +1,12 @@
 //! The pen of the interpreter: moves become steps of a drawing, and their extent is summed up.
 
+use machine::gcode_settings::ZMeaning;
+use messages::math;
 use nalgebra::Vector3;
-use signals::math;
 
-use super::ProgramFacts;
 use super::arc::{Arc, SAME_POINT};
+use super::settings::ReaderSettings;
+use super::survey::ProgramFacts;
 use crate::drawing::{Action, Curve, Power, Step};
 
 /// A projection whose second direction spans less than this is folded onto a line [m].
@@ -37,15 +39,21 @@ pub(super) struct Tracer {
     pub(super) position: Vector3<f64>,
     /// Where the last step ended; a move too short to draw leaves it behind [m].
     tool: Vector3<f64>,
+    /// Steps that have been drawn; who reads a program as a stream takes them away.
     pub(super) steps: Vec<Step>,
     pub(super) facts: ProgramFacts,
+    /// Time so far, as if no corner and no start took any [s].
+    pub(super) time: f64,
+    /// Largest speeds of a mark and in the dark [m/s].
+    fastest: [f64; 2],
 }
 
 impl Tracer {
-    pub(super) fn new(home: Vector3<f64>, ignore_z: bool) -> Self {
+    pub(super) fn new(settings: &ReaderSettings) -> Self {
+        let home = settings.home;
         let start = home.into();
         Self {
-            height: ignore_z.then_some(home.z),
+            height: (settings.gcode.z == ZMeaning::Ignored).then_some(home.z),
             line: 0,
             position: home,
             tool: home,
@@ -59,6 +67,8 @@ impl Tracer {
                 lower: start,
                 upper: start,
             },
+            time: 0.0,
+            fastest: [settings.mark_speed, settings.rapid],
         }
     }
 
@@ -67,9 +77,19 @@ impl Tracer {
         self.steps.push(Step { action, line: self.line });
     }
 
+    /// Stands still for `time` [s].
+    pub(super) fn dwell(&mut self, time: f64, lit: Option<f64>) {
+        if time > 0.0 {
+            self.time += time;
+            self.push(Action::Dwell { time, lit });
+        }
+    }
+
     /// G0 to `to`.
     pub(super) fn rapid(&mut self, to: Vector3<f64>) {
-        self.facts.rapid_length += (to - self.position).norm();
+        let length = (to - self.position).norm();
+        self.facts.rapid_length += length;
+        self.time += length / self.fastest[1];
         self.reach(to);
         self.position = to;
         let to = self.drawn(to);
@@ -183,9 +203,16 @@ impl Tracer {
 
     fn count(&mut self, length: f64, feed: Feed) {
         self.facts.feed_length += length;
-        if feed.power.is_some() {
+        let fastest = if feed.power.is_some() {
             self.facts.mark_length += length;
-        }
+            self.fastest[0]
+        } else {
+            self.fastest[1]
+        };
+        self.time += match feed.pace {
+            Pace::Speed(speed) => length / speed.min(fastest),
+            Pace::Time(time) => time.max(length / fastest),
+        };
     }
 
     fn reach(&mut self, point: Vector3<f64>) {

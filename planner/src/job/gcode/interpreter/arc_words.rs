@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use machine::process::ZMeaning;
+use machine::gcode_settings::ZMeaning;
 
 use super::{Interpreter, Modal, Remark, claim, place};
 use crate::job::gcode::arc::{Arc, Form, NoArc, axes, rounding};
@@ -13,7 +13,7 @@ use crate::job::gcode::error::Refusal;
 /// Most turns of one arc.
 const MOST_TURNS: f64 = 10_000.0;
 
-impl Interpreter<'_> {
+impl Interpreter {
     /// G2 and G3.
     pub(super) fn arc(
         &mut self,

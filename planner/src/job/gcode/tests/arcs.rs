@@ -2,8 +2,8 @@
 
 use core::f64::consts::{PI, TAU};
 
-use signals::math;
-use signals::random::SplitMix64;
+use messages::math;
+use messages::random::SplitMix64;
 
 use super::super::arc::{Arc, Form, axes, rounding};
 use super::super::codes::{MILLIMETRE, Plane};

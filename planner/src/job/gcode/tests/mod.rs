@@ -6,10 +6,11 @@ mod arcs;
 mod mutations;
 mod refusals;
 mod samples;
+mod streams;
 mod words;
 
 use machine::Machine;
-use machine::process::ZMeaning;
+use machine::gcode_settings::ZMeaning;
 use nalgebra::Vector3;
 
 use super::{GcodeError, Program, read};

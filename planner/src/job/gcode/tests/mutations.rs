@@ -2,7 +2,7 @@
 
 use super::samples::ALL;
 use super::*;
-use signals::random::SplitMix64;
+use messages::random::SplitMix64;
 
 /// Reads `text` on both kinds of machine; gives back the refusal's line.
 fn try_read(text: &str) -> Option<u64> {

@@ -26,6 +26,15 @@ fn codes_that_are_not_there() {
     check("M106 S255", 1, 1, "M106 is not supported", "M3 or M4");
     check("(é) A1", 1, 5, "A is not an axis", "X, Y and Z");
     check("X1e4", 1, 3, "E words are not supported", "no exponent");
+    check("G1 X1e1 Y2e1", 1, 6, "E words are not supported", "no exponent");
+    check("M67 E1 Q5", 1, 5, "there is no analog output E1", "M67 E0 Q50");
+    check("M67 Q5", 1, 1, "the analog output has no E", "M67 E0 Q50");
+    check("M5 M68 E0", 1, 4, "the analog output has no Q", "M67 E0 Q50");
+    check("M67 E0 Q1001", 1, 8, "Q1001 is outside 0 to 1000", "Q1000");
+    check("M67 M68 E0 Q1", 1, 5, "M67 and M68 are both of the analog output group", "lines");
+    check("M67 E0 Q1 G64 P1", 1, 8, "two codes of this line use Q", "lines of their own");
+    check("G0 X1 Q5", 1, 7, "nothing on this line uses Q", "M67");
+    check("M62 P0", 1, 1, "M62 is not supported", "M8 and M9");
     check("D1", 1, 1, "D words are not supported", "words begin with");
     check("o100 sub", 1, 1, "O words", "write the moves out");
     check("G0 X#5", 1, 5, "parameters (#)", "decimal number");
@@ -79,4 +88,36 @@ fn arcs_that_are_not_there() {
     check("F9 G2 X1 I0 J0", 1, 4, "the radius is 0", "G91.1");
     check("F9 G2 X1 I.5 P1.5", 1, 14, "P1.5 is not a number of turns", "whole number");
     check("F9 G3 X1 I.5\nX5 I1", 2, 1, "at its start", "differ by 0.028 mm");
+}
+
+/// Line and message of every error that one reading finds.
+fn all(text: &str) -> Vec<(u64, String)> {
+    let first = refused(text);
+    let others = first.others.iter().map(|other| (other.line, other.message.clone()));
+    std::iter::once((first.line, first.message.clone())).chain(others).collect()
+}
+
+#[test]
+fn what_is_not_supported_is_found_at_once() {
+    let found = all("G21 G90 G50\nT1 M6\nG43 H1 Z5\nM48\nG0 X10\nM3 S500\nM6\nG1 X2\nM18\nM2\nM19");
+    let unsupported = |line, code| (line, format!("{code} is not supported"));
+    let expected = [(1, "G50"), (2, "M6"), (3, "G43"), (4, "M48"), (9, "M18")];
+    assert_eq!(found, expected.map(|(line, code)| unsupported(line, code)));
+    // The feed that is missing below follows from the line that was refused, the marks that are no
+    // words say nothing more, and the program ends with its tape mark.
+    let found = all("%\nF600 M6\nG1 X1\nX\u{2212}5\nM48\n%\nM18");
+    assert_eq!(found, [unsupported(2, "M6"), unsupported(5, "M48")]);
+    let many: String = (200..300).map(|code| format!("M{code}\n")).collect();
+    assert_eq!(all(&many).len(), 10);
+}
+
+#[test]
+fn all_errors_are_shown_with_their_places() {
+    let error = refused("G21 G50\nG0 X1\nM6\n");
+    let mut text = String::new();
+    let theme = miette::GraphicalTheme::unicode_nocolor();
+    miette::GraphicalReportHandler::new_themed(theme).render_report(&mut text, &error).unwrap();
+    for expected in ["job.ngc:1:5", "G50 is not supported", "job.ngc:3:1", "M6 is not supported"] {
+        assert!(text.contains(expected), "{expected}\n{text}");
+    }
 }

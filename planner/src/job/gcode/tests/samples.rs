@@ -3,7 +3,7 @@
 use core::f64::consts::PI;
 
 use super::*;
-use crate::drawing::{Drawing, Power};
+use crate::drawing::{Corners, Drawing, Power};
 
 const SQUARE: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../jobs/square_arcs.ngc"));
 const PREAMBLE: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../jobs/preamble.ngc"));
@@ -60,42 +60,42 @@ fn preamble_and_forms_of_arcs() {
         notes(&program.drawing),
         [
             (4, "T has no effect: a marking head has no tools"),
-            (6, "G64 is accepted, but corners stay exact: there is no blending yet"),
             (8, "lines that begin with / are left out (block delete)"),
         ]
     );
     let steps = &program.drawing.steps;
-    assert_eq!(steps[1].action, Action::Output { bit: 0, on: true });
-    let Action::Mark { curve: Curve::Arc { sweep, .. }, power, .. } = steps[2].action else {
-        panic!("{:?}", steps[2]);
+    assert_eq!(steps[0].action, Action::Corners(Corners::Blend(Some(0.05e-3))));
+    assert_eq!(steps[2].action, Action::Output { bit: 0, on: true });
+    let Action::Mark { curve: Curve::Arc { sweep, .. }, power, .. } = steps[3].action else {
+        panic!("{:?}", steps[3]);
     };
     assert_eq!(sweep, 2.0 * PI);
     assert_eq!(power, Power { level: 0.25, follows_speed: true });
     // Inches beside G20: F100 is 100 in/min; S0 goes on in the dark at the same feed.
     let inches = 100.0 * 0.0254 / 60.0;
     assert!(
-        matches!(steps[6].action, Action::Feed { speed, .. } if (speed - inches).abs() < 1e-15)
+        matches!(steps[7].action, Action::Feed { speed, .. } if (speed - inches).abs() < 1e-15)
     );
-    assert_eq!(steps[7].action, Action::Dwell { time: 0.25, lit: None });
+    assert_eq!(steps[8].action, Action::Dwell { time: 0.25, lit: None });
     // G93: 10 mm in 1/120 min are 20 mm/s.
     assert!(matches!(
-        steps[8].action,
+        steps[9].action,
         Action::Mark { speed: Some(speed), .. } if (speed - 0.020).abs() < 1e-15
     ));
-    assert_eq!(steps[9].action, Action::Dwell { time: 0.1, lit: Some(1.0) });
-    assert_eq!(steps[10].action, Action::Output { bit: 0, on: false });
-    assert_eq!(steps.len(), 12);
+    assert_eq!(steps[10].action, Action::Dwell { time: 0.1, lit: Some(1.0) });
+    assert_eq!(steps[11].action, Action::Output { bit: 0, on: false });
+    assert_eq!(steps.len(), 13);
 }
 
 fn helix_length() -> f64 {
-    let turn = |angle: f64, rise: f64| signals::math::hypot(angle * 0.005, rise);
+    let turn = |angle: f64, rise: f64| messages::math::hypot(angle * 0.005, rise);
     turn(2.0 * PI, 0.002) + turn(4.0 * PI, 0.002) + 2.0 * turn(PI, 0.0) + turn(PI, 0.010)
 }
 
 #[test]
 fn arcs_in_space_with_a_focus_axis() {
     let program = read("helix.ngc", HELIX, &machine(ZMeaning::Focus)).unwrap();
-    let rapid = 0.005 + signals::math::hypot(0.005, 0.020);
+    let rapid = 0.005 + messages::math::hypot(0.005, 0.020);
     check(&program, 11, helix_length(), rapid, helix_length());
     assert!(program.drawing.notes.is_empty());
     // Clockwise as seen from the far end of the plane's normal: in the ZX plane from X-5 to X5 below
@@ -112,7 +112,7 @@ fn arcs_in_space_with_a_focus_axis() {
 #[test]
 fn arcs_seen_along_an_ignored_z() {
     let program = flat(HELIX);
-    let rapid = 0.005 + signals::math::hypot(0.005, 0.020);
+    let rapid = 0.005 + messages::math::hypot(0.005, 0.020);
     check(&program, 11, helix_length(), rapid, helix_length());
     assert_eq!(
         notes(&program.drawing),

@@ -1,7 +1,7 @@
 //! What single words mean.
 
 use super::*;
-use crate::drawing::Power;
+use crate::drawing::{Corners, Power};
 
 /// The ends of all moves [mm], a letter for each: rapid, mark or feed in the dark.
 fn moves(text: &str) -> Vec<(char, f64, f64)> {
@@ -151,4 +151,75 @@ fn a_machine_without_air_assist_says_so() {
     let program = read("job.ngc", "M8\nG0 X1\nM9", &machine).unwrap();
     assert_eq!(program.drawing.steps.len(), 1);
     assert_eq!(program.drawing.notes.len(), 1);
+}
+
+/// The corners of a program, each with its line.
+fn corners(text: &str) -> Vec<(u64, Corners)> {
+    let steps = flat(text).drawing.steps;
+    let corners = steps.iter().filter_map(|step| match step.action {
+        Action::Corners(corners) => Some((step.line, corners)),
+        _ => None,
+    });
+    corners.collect()
+}
+
+#[test]
+fn corners_are_exact_or_blended_from_where_the_program_says_so() {
+    assert_eq!(corners("G0 X1\nX2"), []);
+    assert_eq!(
+        corners("G61\nG0 X1 G61.1\nG64\nX2 G64 P0.05 Q0.1\nG64 P0.05\nG64 P0\nG61\nG20 G64 P0.01"),
+        [
+            (1, Corners::Exact),
+            (3, Corners::Blend(None)),
+            (4, Corners::Blend(Some(0.05e-3))),
+            (6, Corners::Exact),
+            (8, Corners::Blend(Some(0.01 * 0.0254))),
+        ]
+    );
+    assert!(flat("G64 P0.1").drawing.notes.is_empty());
+}
+
+/// Speed [m/s] and power of every feed, dark where it has none.
+fn feeds(text: &str) -> Vec<(f64, Option<Power>)> {
+    let steps = flat(text).drawing.steps;
+    let feeds = steps.iter().filter_map(|step| match step.action {
+        Action::Mark { speed, power, .. } => Some((speed.unwrap(), Some(power))),
+        Action::Feed { speed, .. } => Some((speed, None)),
+        _ => None,
+    });
+    feeds.collect()
+}
+
+#[test]
+fn power_changes_alone_on_a_line_from_the_next_move_on() {
+    let lit = |level| Some(Power { level, follows_speed: true });
+    assert_eq!(
+        feeds("M4 S500 F60\nG1 X1\nS250\nX2\nX3 S0\nX4\nS1000\nX5\nM5\nX6"),
+        [0.5, 0.25, 0.0, 0.0, 1.0, 0.0].map(|level| (1e-3, lit(level).filter(|_| level > 0.0)))
+    );
+}
+
+#[test]
+fn an_analog_output_is_the_power_until_s_says_another() {
+    let lit = |level| Some(Power { level, follows_speed: false });
+    let text = "M3 S1000 F60\nM68 E0 Q0\nG1 X1\nM67 E0 Q370\nX2\nm67e0q740 X3\nM67 E0 Q0\nX4\n\
+                S100\nX5\nM67 E0 Q20 S30\nX6\nM5\nX7\nM67 E0 Q500\nX8";
+    assert_eq!(
+        feeds(text),
+        [0.0, 0.37, 0.74, 0.0, 0.1, 0.02, 0.0, 0.0]
+            .map(|level| (1e-3, lit(level).filter(|_| level > 0.0)))
+    );
+    // Nothing but the power changes: the moves follow each other.
+    assert_eq!(flat(text).drawing.steps.len(), 8);
+    // It is a power, so there is none to miss.
+    assert!(flat("M4 M67 E0 Q5\nG1 X1 F60").drawing.notes.is_empty());
+}
+
+#[test]
+fn under_inverse_time_the_speed_is_the_length_by_the_time() {
+    let speeds: Vec<f64> =
+        feeds("G93 G1 X3 Y4 F60\nX3 Y0 F120\nG94 X0 F60").iter().map(|feed| feed.0).collect();
+    let expected = [0.005, 0.008, 0.001];
+    assert!(speeds.iter().zip(expected).all(|(speed, wanted)| (speed - wanted).abs() < 1e-15));
+    assert_eq!(speeds.len(), expected.len());
 }

@@ -1,0 +1,225 @@
+//! A platform on three triangles that hinge on its sides, each with its tip on a planar motor that
+//! moves in two coordinates over one stator (source 001): six degrees of freedom.
+//!
+//! The platform is an equilateral triangle ABC, its frame in the centroid with z upwards; the legs
+//! are triangles of the same side. Foot D hangs on the side A–C, E on C–B, F on A–B. The joints
+//! are the feet's places in the stator plane z = 0: x and y of D, then of E, then of F [m].
+//!
+//! A leg's tip must lie in the plane. Of the two turns about the hinge that bring it there, the
+//! outward one spreads the leg away from the platform and the inward one folds it below.
+
+mod chain_state;
+mod dynamics;
+mod inverse;
+mod limits;
+mod struts;
+
+use nalgebra::{SMatrix, SVector};
+
+pub use chain_state::TriPlanarChainState;
+
+use crate::kinematics::{
+    Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, TaskSpace,
+    ToolMotion,
+};
+use crate::transmission::{self, Elasticity};
+
+/// Which way a leg leans from its hinge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Fold {
+    /// Away from the platform.
+    #[default]
+    Outward,
+    /// Below the platform.
+    Inward,
+}
+
+impl Fold {
+    /// The sign of the leg's normal along z, and of the root of its equation.
+    fn sign(self) -> f64 {
+        match self {
+            Self::Outward => 1.0,
+            Self::Inward => -1.0,
+        }
+    }
+}
+
+/// How the legs of D, E and F lean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Legs(pub [Fold; 3]);
+
+impl Branch for Legs {
+    fn choices(&self) -> Vec<(&'static str, Vec<i32>)> {
+        let values = self.0.map(|fold| if fold == Fold::Outward { 1 } else { -1 });
+        vec![("legs", values.to_vec())]
+    }
+
+    fn choose(self, name: &str, values: &[i32]) -> Option<Self> {
+        let ("legs", &[d, e, f]) = (name, values) else { return None };
+        let fold = |value| match value {
+            1 => Some(Fold::Outward),
+            -1 => Some(Fold::Inward),
+            _ => None,
+        };
+        Some(Self([fold(d)?, fold(e)?, fold(f)?]))
+    }
+}
+
+/// The platform, its legs and the stator below.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TriPlanar {
+    /// Side of the platform and of each leg [m].
+    pub side: f64,
+    /// Lowest and highest x, then y, of the stator [m].
+    pub stator: [[f64; 2]; 2],
+    /// Side of a planar motor's square body, which keeps parallel to the stator [m].
+    pub inductor: f64,
+    /// Least distance between two of these bodies [m].
+    pub gap: f64,
+    /// Least height of the platform's corners above the stator plane [m].
+    pub clearance: f64,
+    /// Least distance of a leg from standing upright: the z component of its unit normal.
+    pub type_1_limit: f64,
+    /// Least singular value of the matrix of the six struts, lengths divided by the side.
+    pub type_2_limit: f64,
+    /// Mass of the platform, tool included [kg].
+    pub platform_mass: f64,
+    /// Inertia of the platform about its frame's axes through the centroid, its centre of mass
+    /// [kg·m²].
+    pub platform_inertia: [f64; 3],
+    /// Mass of one leg, a uniform thin triangle [kg].
+    pub leg_mass: f64,
+    /// Mass of the planar motor at a foot [kg].
+    pub inductor_mass: f64,
+    /// How the legs lean in the machine as built.
+    pub legs: Legs,
+    /// Spring and damper of each foot's drive along its axis; `None` when they are taken as rigid.
+    pub elasticity: Option<[Elasticity; 6]>,
+}
+
+/// √3.
+const ROOT_3: f64 = 1.732_050_807_568_877_2;
+
+/// Unit vectors in the platform's frame, from the centroid to the middle of the side on which
+/// D, E and F hang.
+const OUTWARD: [[f64; 2]; 3] = [[ROOT_3 / 2.0, 0.5], [-ROOT_3 / 2.0, 0.5], [0.0, -1.0]];
+
+/// The corners A, B and C in the platform's frame, in units of the side.
+// Source 001 eq. 3; as printed, the sides would not equal a.
+const CORNERS: [[f64; 2]; 3] = [[0.5, -0.5 / ROOT_3], [-0.5, -0.5 / ROOT_3], [0.0, 1.0 / ROOT_3]];
+
+/// The corners from which the struts to D, E and F run, two for each.
+const HINGES: [[usize; 2]; 3] = [[0, 2], [2, 1], [0, 1]];
+
+impl TriPlanar {
+    /// Height of the triangles [m].
+    fn height(&self) -> f64 {
+        self.side * (ROOT_3 / 2.0)
+    }
+}
+
+impl Mechanism<6> for TriPlanar {
+    type Branch = Legs;
+    type ChainState = TriPlanarChainState;
+
+    const NAME: &'static str = "tri_planar";
+
+    fn task_space(&self) -> TaskSpace {
+        TaskSpace::Pose
+    }
+
+    fn branch(&self) -> Legs {
+        self.legs
+    }
+
+    fn solve(
+        &self,
+        q: &Joints<6>,
+        branch: Legs,
+        near: Option<&TriPlanarChainState>,
+    ) -> Result<TriPlanarChainState, KinematicsError> {
+        chain_state::solve(self, q, branch, near)
+    }
+
+    fn solve_at(
+        &self,
+        pose: &Pose,
+        q: &Joints<6>,
+        branch: Legs,
+        near: Option<&TriPlanarChainState>,
+    ) -> Result<TriPlanarChainState, KinematicsError> {
+        chain_state::solve_at(self, pose, q, branch)
+            .map_or_else(|| chain_state::solve(self, q, branch, near), Ok)
+    }
+
+    fn pose(&self, chain: &TriPlanarChainState) -> Pose {
+        Pose { position: chain.position, rotation: chain.rotation }
+    }
+
+    fn locate(
+        &self,
+        q: &Joints<6>,
+        branch: Legs,
+        near: Option<&TriPlanarChainState>,
+    ) -> Result<Pose, KinematicsError> {
+        chain_state::locate(self, q, branch, near)
+    }
+
+    fn branch_of(&self, chain: &TriPlanarChainState) -> Legs {
+        chain.folds()
+    }
+
+    fn jacobian(&self, chain: &TriPlanarChainState) -> Jacobian<6> {
+        chain.jacobian
+    }
+
+    fn margins(&self, chain: &TriPlanarChainState) -> Vec<Margin> {
+        limits::margins(self, chain)
+    }
+
+    fn inverse(
+        &self,
+        pose: &Pose,
+        branch: Legs,
+        _previous: &Joints<6>,
+    ) -> Result<Joints<6>, KinematicsError> {
+        let rotation =
+            core::array::from_fn(|row| core::array::from_fn(|column| pose.rotation[(row, column)]));
+        let joints = inverse::feet(self, &pose.position.into(), &rotation, branch)?;
+        let joints = SVector::from(joints);
+        limits::check(self, pose, &joints)?;
+        Ok(joints)
+    }
+
+    fn joint_motion(
+        &self,
+        tool: &ToolMotion,
+        branch: Legs,
+        _previous: &Joints<6>,
+    ) -> Result<JointMotion<6>, KinematicsError> {
+        let joints = inverse::feet(self, &tool.series(), &tool.attitude.series(), branch)?;
+        let motion = JointMotion::of_series(&joints);
+        limits::check(self, &tool.pose(), &motion.position)?;
+        Ok(motion)
+    }
+
+    fn mass_matrix(&self, chain: &TriPlanarChainState) -> SMatrix<f64, 6, 6> {
+        dynamics::mass_matrix(self, chain)
+    }
+
+    fn bias(&self, chain: &TriPlanarChainState, velocity: &Joints<6>) -> Joints<6> {
+        dynamics::bias(self, chain, velocity)
+    }
+
+    fn gravity(&self, chain: &TriPlanarChainState) -> Joints<6> {
+        dynamics::bias(self, chain, &Joints::zeros())
+    }
+
+    fn stiffness(&self) -> Option<SMatrix<f64, 6, 6>> {
+        transmission::stiffness(self.elasticity)
+    }
+
+    fn damping(&self) -> SMatrix<f64, 6, 6> {
+        transmission::damping(self.elasticity)
+    }
+}

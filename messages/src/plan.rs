@@ -1,0 +1,81 @@
+//! What a plan comes to: the planner writes it as `plan.json` into the run folder, and whoever
+//! summarises the run reads it there. Like [`artwork`](crate::artwork), not a sample.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a plan comes to.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PlanFacts {
+    /// The job's name.
+    pub name: String,
+    /// Strokes and dots to mark.
+    pub strokes: usize,
+    /// Length to mark [m].
+    pub length: f64,
+    /// From the first motion to the last [s].
+    pub duration: f64,
+    /// Setpoints in the stream: the motion, and rest before and after it.
+    pub samples: u64,
+    /// Largest speed while the laser is on [m/s], 0 when nothing is drawn.
+    pub speed: f64,
+    /// What a person should know.
+    pub notes: Vec<Note>,
+    /// Largest share of each limit that the plan uses.
+    pub uses: LimitUtilization,
+    /// What bound the motion along paths, the limit that ruled longest first.
+    pub binding: Vec<Binding>,
+}
+
+/// A limit that bound the motion, for how long, and where most.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Binding {
+    /// The limit, such as `acceleration of the tool` or `motor current`.
+    pub limit: String,
+    /// The axis whose limit it is.
+    pub axis: Option<String>,
+    /// Share of the time of all paths [1].
+    pub share: f64,
+    /// The time [s].
+    pub time: f64,
+    /// Line of the job file that costs most, 0 for none.
+    pub line: u64,
+    /// The place that costs most, machine frame [m].
+    pub position: [f64; 3],
+}
+
+/// Largest value over limit, found over all setpoints.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LimitUtilization {
+    /// Joint velocity, per axis.
+    pub velocity: Vec<f64>,
+    /// Joint acceleration, per axis.
+    pub acceleration: Vec<f64>,
+    /// Joint jerk, per axis.
+    pub jerk: Vec<f64>,
+    /// Motor current, friction included, per axis.
+    pub current: Vec<f64>,
+    /// Motor voltage, per axis.
+    pub voltage: Vec<f64>,
+    /// Heating of each DC motor's winding, the root mean square of its current against what it
+    /// bears for ever; 0 where the machine file does not say that.
+    pub heat: Vec<f64>,
+    /// Motor torque as the efficiencies of gear and screw have it, in place of friction: for
+    /// sizing, against the power stage's limit or the pull-out torque. No limit is held to it.
+    pub sizing: Vec<f64>,
+    /// Speed of the tool.
+    pub path_speed: f64,
+    /// Acceleration along and across the path.
+    pub path_acceleration: f64,
+    /// Jerk along and across the path.
+    pub path_jerk: f64,
+}
+
+/// One remark on a job, such as a code that was accepted without effect.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Note {
+    /// Line of the job file from 1, 0 for none.
+    pub line: u64,
+    /// What to know.
+    pub text: String,
+}

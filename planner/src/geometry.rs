@@ -1,0 +1,14 @@
+//! Where the tool goes, without time: curves, their joints, and the drawn lines as a measure.
+
+pub(crate) mod arc_length;
+pub mod attitude;
+pub(crate) mod blend;
+pub(crate) mod contour;
+pub(crate) mod fit;
+pub mod jet;
+pub(crate) mod operation;
+pub(crate) mod path;
+pub(crate) mod polyline;
+pub(crate) mod projected;
+pub(crate) mod spline;
+pub(crate) mod track;

@@ -1,0 +1,373 @@
+//! A path that is gone without a stop: the curves of a job that go on into each other, their
+//! joints, and what the job asks for along them.
+
+use machine::PathLimits;
+use nalgebra::Vector3;
+
+use crate::geometry::blend::{Blend, BlendSegment};
+use crate::geometry::jet::Jet;
+use crate::geometry::path::Path;
+use crate::geometry::track::{Bend, Track};
+use crate::light::Policy;
+
+/// A smoothed joint of a line that is marked at one speed stays within this share of the tolerance
+/// where it is made gentler than it must be.
+const GENTLE: f64 = 0.2;
+
+/// Curves that meet within this distance are taken to meet [m].
+pub(crate) const GAP: f64 = 1e-8;
+
+/// Share of a curve that is not left as a part of its own where a line is divided.
+const SLIVER: f64 = 0.1;
+
+/// Cosine of the angle from which on two directions are a corner wherever corners are exact: 1°.
+pub(crate) const CORNER: f64 = 0.999_847_695_156_391_3;
+
+/// Cosine of the sharpest turn that is passed on the way: 150°. Beyond, the rounded path would turn
+/// almost on the spot.
+const REVERSAL: f64 = -0.866_025_403_784_438_6;
+
+/// However sharp a corner is, the rounded path passes it within twice the tolerance.
+const LEAST_NEARER: f64 = 0.5;
+
+/// What a job asks for along a stretch of a contour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Demand {
+    /// Where it begins, by the contour's parameter [m].
+    pub(crate) from: f64,
+    /// Power of the laser [fraction of full scale], 0 in the dark.
+    pub(crate) power: f64,
+    /// The speed asked for [m/s]; `None` leaves it to the job's policy, or in the dark to the
+    /// machine's rapids.
+    pub(crate) speed: Option<f64>,
+    /// Line of the job file, 0 for none.
+    pub(crate) line: u64,
+}
+
+/// How the next curve may be joined to a contour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Joining {
+    /// Whether corners beyond 1° may be rounded.
+    pub(crate) rounds: bool,
+    /// How far the rounded path may be from the drawn one [m].
+    pub(crate) tolerance: f64,
+    /// The limits that a constant speed must keep in a rounded corner.
+    pub(crate) limits: PathLimits,
+}
+
+/// Curves that are gone in one go.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Contour {
+    tracks: Vec<Track>,
+    blends: Vec<Blend>,
+    demands: Vec<Demand>,
+    /// How its light goes with its speed.
+    pub(crate) policy: Policy,
+    /// Line of the job file where it begins.
+    pub(crate) line: u64,
+    length: f64,
+    bend: Bend,
+}
+
+impl Contour {
+    /// Starts with one curve.
+    pub(crate) fn new(track: Track, demands: &[Demand], policy: Policy) -> Self {
+        let (length, bend) = (track.length(), track.bend());
+        let line = demands.first().map_or(0, |demand| demand.line);
+        Self {
+            tracks: vec![track],
+            blends: Vec::new(),
+            demands: demands.to_vec(),
+            policy,
+            line,
+            length,
+            bend,
+        }
+    }
+
+    /// Goes on with `track` and its `demands`, counted from its start, if it starts where the contour
+    /// ends and the corner between them may be passed without a stop. Says whether it does.
+    pub(crate) fn extend(&mut self, track: &Track, demands: &[Demand], joining: &Joining) -> bool {
+        let (before, after) = (self.end(), track.at(0.0));
+        if (after.point - before.point).norm() > GAP {
+            return false;
+        }
+        let cosine = before.first.normalize().dot(&after.first.normalize());
+        // The first and last curve of a contour have no other joint to leave room for, but may get
+        // one later; half of each keeps joints apart in every case.
+        let room = self.last().length().min(track.length()) / 2.0;
+        // In the middle of a turn by φ the rounded path is cos ½φ as far from both lines as from their
+        // corner.
+        let nearer = ((1.0 + cosine.max(REVERSAL)) / 2.0).sqrt().max(LEAST_NEARER);
+        let blend = Blend::new(&before, &after, room, joining.tolerance / nearer, &joining.limits);
+        if cosine < CORNER {
+            let passes = joining.rounds
+                && cosine > REVERSAL
+                && (self.policy == Policy::Proportional || self.is_even(&blend, demands, joining));
+            if !passes {
+                return false;
+            }
+        }
+        self.append(track, blend, demands);
+        true
+    }
+
+    /// Whether the corner that `blend` rounds can be passed at the speed asked for on both sides.
+    fn is_even(&self, blend: &Blend, demands: &[Demand], joining: &Joining) -> bool {
+        let limits = &joining.limits;
+        let asked = |demand: Option<&Demand>| demand.and_then(|demand| demand.speed);
+        let speed = asked(self.demands.last())
+            .into_iter()
+            .chain(asked(demands.first()))
+            .fold(0.0, f64::max);
+        let speed = if speed > 0.0 { speed.min(limits.speed) } else { limits.speed };
+        blend.sharpest(blend.room).speed(limits.acceleration, limits.jerk) >= speed
+    }
+
+    fn append(&mut self, track: &Track, blend: Blend, demands: &[Demand]) {
+        self.blends.push(blend);
+        for demand in demands {
+            self.ask(Demand { from: self.length + demand.from, ..*demand });
+        }
+        self.length += track.length();
+        self.bend = self.bend.or(track.bend());
+        self.tracks.push(track.clone());
+    }
+
+    /// Notes what is asked for from a place on, unless that is what was asked for before.
+    fn ask(&mut self, demand: Demand) {
+        let same = |last: &Demand| last.power == demand.power && last.speed == demand.speed;
+        if !self.demands.last().is_some_and(same) {
+            self.demands.push(demand);
+        }
+    }
+
+    /// The range of the parameter [m]: the length of the drawn line, or near it.
+    pub(crate) fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// What is asked for, stretch by stretch, in order.
+    pub(crate) fn demands(&self) -> &[Demand] {
+        &self.demands
+    }
+
+    /// Each stretch with where it ends [m].
+    pub(crate) fn stretches(&self) -> impl Iterator<Item = (Demand, f64)> + '_ {
+        let ends = self.demands.iter().skip(1).map(|demand| demand.from).chain([self.length]);
+        self.demands.iter().copied().zip(ends)
+    }
+
+    /// Whether anything of it is marked.
+    pub(crate) fn is_lit(&self) -> bool {
+        self.demands.iter().any(|demand| demand.power > 0.0)
+    }
+
+    /// Length that is marked [m].
+    pub(crate) fn lit_length(&self) -> f64 {
+        self.stretches()
+            .filter(|(demand, _)| demand.power > 0.0)
+            .map(|(demand, to)| to - demand.from)
+            .sum()
+    }
+
+    /// The first point.
+    pub(crate) fn start(&self) -> Jet {
+        self.tracks[0].at(0.0)
+    }
+
+    /// The last point.
+    pub(crate) fn end(&self) -> Jet {
+        let last = self.last();
+        last.at(last.length())
+    }
+
+    fn last(&self) -> &Track {
+        &self.tracks[self.tracks.len() - 1]
+    }
+
+    /// The point of the drawn line at `distance` from the start [m].
+    pub(crate) fn at(&self, distance: f64) -> Jet {
+        let mut from = 0.0;
+        for track in &self.tracks {
+            if distance < from + track.length() {
+                return track.at(distance - from);
+            }
+            from += track.length();
+        }
+        self.end()
+    }
+
+    /// True points of the drawn line from `from` to `to` [m], no chord farther than `chord_error`
+    /// from it [m].
+    pub(crate) fn points(&self, from: f64, to: f64, chord_error: f64) -> Vec<[f64; 3]> {
+        let mut points = vec![self.at(from).point.into()];
+        let mut start = 0.0;
+        for track in &self.tracks {
+            let end = start + track.length();
+            if end > from + GAP && start < to - GAP {
+                let (first, last) = ((from - start).max(0.0), (to - start).min(track.length()));
+                track.part(first, last).sample(chord_error, &mut points);
+            }
+            start = end;
+        }
+        points
+    }
+
+    /// The part between two places, with the parts of the demands; joints as in the whole.
+    pub(crate) fn part(&self, from: f64, to: f64, limits: &PathLimits) -> Option<Self> {
+        let mut part: Option<Self> = None;
+        let mut start = 0.0;
+        for track in &self.tracks {
+            let end = start + track.length();
+            let (first, last) = ((from - start).max(0.0), (to - start).min(track.length()));
+            if last - first > GAP {
+                let piece = track.part(first, last);
+                let demands = self.demands_between(start + first, start + last);
+                match &mut part {
+                    None => part = Some(Self::new(piece, &demands, self.policy)),
+                    Some(part) => {
+                        let (before, after) = (part.end(), piece.at(0.0));
+                        let room = part.last().length().min(piece.length()) / 2.0;
+                        let blend = Blend::new(&before, &after, room, limits.tolerance, limits);
+                        part.append(&piece, blend, &demands);
+                    }
+                }
+            }
+            start = end;
+        }
+        part
+    }
+
+    fn demands_between(&self, from: f64, to: f64) -> Vec<Demand> {
+        self.stretches()
+            .filter(|(demand, end)| *end > from + GAP && demand.from < to - GAP)
+            .map(|(demand, _)| Demand { from: (demand.from - from).max(0.0), ..demand })
+            .collect()
+    }
+
+    /// `cut`, or the end of its curve where that is nearer than a tenth of the curve: a short rest of
+    /// one would leave no room to smooth the joint at it, and slow all of its part.
+    pub(crate) fn beside_joints(&self, cut: f64) -> f64 {
+        let mut from = 0.0;
+        for track in &self.tracks {
+            let end = from + track.length();
+            if cut < end {
+                let near = SLIVER * track.length();
+                return match (cut - from < near, end - cut < near) {
+                    (true, _) => from,
+                    (false, true) => end,
+                    (false, false) => cut,
+                };
+            }
+            from = end;
+        }
+        cut
+    }
+
+    /// The largest constant speed [m/s]: V²κ ≤ A, V³|p‴| ≤ J, smoothed joints included.
+    pub(crate) fn top_speed(&self, limits: &PathLimits) -> f64 {
+        let (acceleration, jerk) = (limits.acceleration, limits.jerk);
+        let mut speed = self.bend.speed(acceleration, jerk);
+        for blend in self.blends.iter().filter(|blend| !blend.is_smooth()) {
+            speed = speed.min(blend.sharpest(blend.room).speed(acceleration, jerk));
+        }
+        // That takes the curves' bend at the joints alone; the smoothed joints are measured and have
+        // the last word. Each round shortens less than the one before.
+        for _ in 0..8 {
+            let measured = self.measured(speed, limits).speed(acceleration, jerk);
+            if measured >= speed {
+                break;
+            }
+            speed = measured * (1.0 - 1e-9);
+        }
+        speed
+    }
+
+    /// How sharply the path at `speed` bends at most.
+    fn measured(&self, speed: f64, limits: &PathLimits) -> Bend {
+        let mut bend = self.bend;
+        for index in 0..self.blends.len() {
+            if let Some((_, segments)) = self.smoothed(index, Some(speed), limits) {
+                bend =
+                    segments.iter().fold(bend, |bend, (part, length)| bend.or(part.bend(*length)));
+            }
+        }
+        bend
+    }
+
+    /// The reach and the segments of the joint after track `index`, as a constant `speed` needs it or
+    /// as wide as the tolerance lets it be; `None` where the curves go over into each other as they
+    /// are.
+    fn smoothed(
+        &self,
+        index: usize,
+        speed: Option<f64>,
+        limits: &PathLimits,
+    ) -> Option<(f64, Vec<(BlendSegment, f64)>)> {
+        /// Each lengthening of a joint that turns out too sharp.
+        const LONGER: f64 = 1.05;
+        let blend = self.blends.get(index).filter(|blend| !blend.is_smooth())?;
+        let (before, after) = (&self.tracks[index], &self.tracks[index + 1]);
+        let Some(speed) = speed else {
+            return Some((blend.room, blend.segments(before, after, blend.room)));
+        };
+        let (acceleration, jerk) = (limits.acceleration, limits.jerk);
+        let shortest = blend.shortest(speed, acceleration, jerk);
+        let gentle = blend.gentle(limits.tolerance * GENTLE);
+        let mut reach = shortest.max(gentle).min(blend.room);
+        loop {
+            let segments = blend.segments(before, after, reach);
+            let fits = |(part, length): &(BlendSegment, f64)| {
+                part.bend(*length).speed(acceleration, jerk) >= speed
+            };
+            if reach >= blend.room || segments.iter().all(fits) {
+                return Some((reach, segments));
+            }
+            reach = (reach * LONGER).min(blend.room);
+        }
+    }
+
+    /// The path, its joints smoothed as a constant `speed` needs [m/s], or as wide as they may be.
+    pub(crate) fn trace(&self, speed: Option<f64>, limits: &PathLimits) -> Path {
+        let mut path = Path::default();
+        let mut from = 0.0;
+        for (index, track) in self.tracks.iter().enumerate() {
+            let Some((reach, segments)) = self.smoothed(index, speed, limits) else {
+                path.push_track(track, from, track.length() - from);
+                from = 0.0;
+                continue;
+            };
+            path.push_track(track, from, track.length() - reach - from);
+            for (segment, length) in segments {
+                path.push_segment(segment, length);
+            }
+            from = reach;
+        }
+        path
+    }
+
+    /// The direction in which it ends.
+    pub(crate) fn heading(&self) -> Vector3<f64> {
+        self.end().first.normalize()
+    }
+}
+
+impl Contour {
+    /// Lowers the speed asked for wherever the light would change more than `most` times in `time`
+    /// [s], `top` being the machine's speed [m/s]. Gives the first line that is slowed.
+    pub(crate) fn limit_change_rate(&mut self, most: usize, time: f64, top: f64) -> Option<u64> {
+        let mut slowed = None;
+        for first in 0..self.demands.len().saturating_sub(most) {
+            let room = self.demands[first + most].from - self.demands[first].from;
+            let speed = room / time;
+            for demand in &mut self.demands[first..first + most] {
+                if speed < demand.speed.unwrap_or(top) {
+                    demand.speed = Some(speed);
+                    slowed = slowed.or(Some(demand.line));
+                }
+            }
+        }
+        slowed
+    }
+}

@@ -1,0 +1,422 @@
+//! What a machine does in order: paths that are gone in one go, and what happens at rest between
+//! them. Made of a drawing's steps once, for every mechanism.
+
+use machine::kinematics::KinematicsError;
+use machine::surface::Surface;
+use machine::{CornerMode, PathLimits};
+use messages::MAX_EDGES;
+use messages::time::CYCLE_TIME;
+use nalgebra::Vector3;
+
+use crate::drawing::{Action, Corners, Curve, Note, Step};
+use crate::geometry::contour::{Contour, Demand, GAP, Joining};
+use crate::geometry::polyline::{Chord, Polyline, goes_straight};
+use crate::geometry::projected;
+use crate::geometry::track::Track;
+use crate::light::Policy;
+
+/// Shorter moves are not made [m].
+const NOTHING: f64 = 1e-12;
+
+/// Changes of the light that a cycle has room for beside those that follow the speed.
+const EDGES: usize = MAX_EDGES - 2;
+
+/// A step between two rows of a raster is shorter than this [m], and than this share of the rows.
+const ROW_STEP: f64 = 1e-3;
+const ROW_SHARE: f64 = 0.05;
+
+/// One thing to do, and the line of the job file that asks for it, 0 for none.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Operation {
+    pub(crate) kind: OperationKind,
+    pub(crate) line: u64,
+}
+
+/// What is done.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum OperationKind {
+    /// Go along a path without a stop.
+    Path(Box<Contour>),
+    /// Move straight in the dark, from rest to rest.
+    Rapid(Vector3<f64>),
+    /// Stand still in the dark [s].
+    Rest(f64),
+    /// Light while the tool stands.
+    Dot(Dot),
+    /// Switch an output.
+    Output { bit: u32, on: bool },
+    /// Wait for a person.
+    Pause,
+}
+
+/// Light while the tool stands still.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Dot {
+    pub(crate) at: Vector3<f64>,
+    /// Times [s] and powers [fraction of full scale], one after the other.
+    pub(crate) exposures: Vec<(f64, f64)>,
+}
+
+/// Makes operations of steps.
+#[derive(Debug)]
+pub(crate) struct Operations<'a> {
+    limits: PathLimits,
+    surface: Option<&'a Surface>,
+    /// How corners are passed where the job says nothing.
+    machine: CornerMode,
+    /// How far the path may be from the drawn line [m]; 0 where corners are exact.
+    tolerance: f64,
+    place: Vector3<f64>,
+    polyline: Polyline,
+    contour: Option<Contour>,
+    done: Vec<Operation>,
+    /// The last two paths, as they were drawn.
+    before: [Option<Extent>; 2],
+    /// What a person should know.
+    pub(crate) notes: Vec<Note>,
+}
+
+/// A place on the surface that is beyond an edge, and its line.
+type OffSurface = (u64, KinematicsError);
+
+impl<'a> Operations<'a> {
+    /// Begins where the tool is before the first step; on a `surface` everything comes to lie on it.
+    pub(crate) fn new(
+        start: Vector3<f64>,
+        limits: &PathLimits,
+        machine: CornerMode,
+        surface: Option<&'a Surface>,
+    ) -> Self {
+        Self {
+            limits: *limits,
+            surface,
+            machine,
+            tolerance: Corners::AsMachine.tolerance(machine, limits.tolerance),
+            place: start,
+            polyline: Polyline::default(),
+            contour: None,
+            done: Vec::new(),
+            before: [None; 2],
+            notes: Vec::new(),
+        }
+    }
+
+    /// All operations of `steps`.
+    ///
+    /// # Errors
+    /// The line of what goes beyond an edge of the surface, and by how much.
+    pub(crate) fn all(mut self, steps: &[Step]) -> Result<(Vec<Operation>, Vec<Note>), OffSurface> {
+        for step in steps {
+            self.push(step)?;
+        }
+        self.finish()?;
+        Ok((self.done, self.notes))
+    }
+
+    /// Takes the next step.
+    fn push(&mut self, step: &Step) -> Result<(), OffSurface> {
+        let line = step.line;
+        match &step.action {
+            Action::Mark { curve, speed, power } => {
+                let policy =
+                    if power.follows_speed { Policy::Proportional } else { Policy::Constant };
+                let demand = Demand { from: 0.0, power: power.level, speed: *speed, line };
+                self.curve(curve, demand, Some(policy))
+            }
+            Action::Feed { curve, speed } => {
+                let demand = Demand { from: 0.0, power: 0.0, speed: Some(*speed), line };
+                self.curve(curve, demand, None)
+            }
+            Action::Rapid { to } => self.rapid(*to, line),
+            Action::Corners(corners) => {
+                self.flush_polyline()?;
+                self.tolerance = corners.tolerance(self.machine, self.limits.tolerance);
+                Ok(())
+            }
+            Action::Dwell { time, lit: Some(power) } if *time > 0.0 && *power > 0.0 => {
+                self.flush()?;
+                self.dot((*time, *power), line)
+            }
+            Action::Dwell { time, .. } => {
+                self.flush()?;
+                self.done.push(Operation { kind: OperationKind::Rest(*time), line });
+                Ok(())
+            }
+            Action::Output { bit, on } => {
+                self.flush()?;
+                let kind = OperationKind::Output { bit: *bit, on: *on };
+                self.done.push(Operation { kind, line });
+                Ok(())
+            }
+            Action::Pause => {
+                self.flush()?;
+                self.done.push(Operation { kind: OperationKind::Pause, line });
+                Ok(())
+            }
+        }
+    }
+
+    /// Ends the drawing.
+    fn finish(&mut self) -> Result<(), OffSurface> {
+        self.flush()
+    }
+
+    fn placed(&self, point: &Vector3<f64>, line: u64) -> Result<Vector3<f64>, OffSurface> {
+        match self.surface {
+            None => Ok(*point),
+            Some(surface) => projected::place(point, surface).map_err(|cause| (line, cause)),
+        }
+    }
+
+    /// Goes along a curve.
+    fn curve(
+        &mut self,
+        curve: &Curve,
+        demand: Demand,
+        policy: Option<Policy>,
+    ) -> Result<(), OffSurface> {
+        let from = curve.from();
+        let straight = matches!(curve, Curve::Line { .. }) && self.surface.is_none();
+        if straight && (curve.to() - from).norm() <= NOTHING {
+            return Ok(());
+        }
+        if (from - self.place).norm() > GAP {
+            self.flush()?;
+        }
+        let ahead = match curve {
+            Curve::Line { to, .. } => to - from,
+            Curve::Arc { .. } => Track::new(curve).at(0.0).first,
+        };
+        self.let_free_move_go(&(from + ahead))?;
+        if straight {
+            if policy.is_some() && self.polyline.policy().is_some_and(|other| Some(other) != policy)
+            {
+                self.flush_polyline()?;
+            }
+            self.place = curve.to();
+            self.polyline.push(from, Chord { to: curve.to(), demand, policy, is_free: false });
+            return Ok(());
+        }
+        self.flush_polyline()?;
+        self.place = curve.to();
+        let track = Track::on(curve, self.surface).map_err(|cause| (demand.line, cause))?;
+        if track.length() > NOTHING {
+            self.add(&track, &[demand], policy);
+        }
+        Ok(())
+    }
+
+    /// A free move: part of the path where it goes straight on, else a move of its own.
+    fn rapid(&mut self, to: Vector3<f64>, line: u64) -> Result<(), OffSurface> {
+        self.let_free_move_go(&to)?;
+        let goes_on = if self.polyline.is_empty() {
+            self.contour.as_ref().is_some_and(|contour| {
+                (contour.end().point - self.place).norm() <= GAP
+                    && goes_straight(&contour.heading(), &(to - self.place))
+            })
+        } else {
+            self.polyline.goes_straight_to(&to)
+        };
+        let from = core::mem::replace(&mut self.place, to);
+        if goes_on && self.surface.is_none() && (to - from).norm() > NOTHING {
+            let demand = Demand { from: 0.0, power: 0.0, speed: None, line };
+            self.polyline.push(from, Chord { to, demand, policy: None, is_free: true });
+            return Ok(());
+        }
+        self.flush()?;
+        let to = self.placed(&to, line)?;
+        self.done.push(Operation { kind: OperationKind::Rapid(to), line });
+        Ok(())
+    }
+
+    /// Makes a free move at the end of the polyline a move of its own, unless the path goes straight
+    /// on to `to`.
+    fn let_free_move_go(&mut self, to: &Vector3<f64>) -> Result<(), OffSurface> {
+        let is_free = self.polyline.last().is_some_and(|chord| chord.is_free);
+        if is_free && !self.polyline.goes_straight_to(to) { self.flush() } else { Ok(()) }
+    }
+
+    fn dot(&mut self, exposure: (f64, f64), line: u64) -> Result<(), OffSurface> {
+        let place = self.placed(&self.place.clone(), line)?;
+        if let Some(Operation { kind: OperationKind::Dot(dot), .. }) = self.done.last_mut()
+            && dot.at == place
+        {
+            dot.exposures.push(exposure);
+            return Ok(());
+        }
+        let kind = OperationKind::Dot(Dot { at: place, exposures: vec![exposure] });
+        self.done.push(Operation { kind, line });
+        Ok(())
+    }
+
+    /// Ends the path that is open.
+    fn flush(&mut self) -> Result<(), OffSurface> {
+        // A free move at the end leads nowhere on the path.
+        let free = self.polyline.last().is_some_and(|chord| chord.is_free);
+        let free = if free { self.polyline.pop() } else { None };
+        self.flush_polyline()?;
+        if let Some(contour) = self.contour.take() {
+            self.end(contour);
+        }
+        if let Some(Chord { to, demand, .. }) = free {
+            self.done.push(Operation { kind: OperationKind::Rapid(to), line: demand.line });
+        }
+        Ok(())
+    }
+
+    fn flush_polyline(&mut self) -> Result<(), OffSurface> {
+        if self.polyline.is_empty() {
+            return Ok(());
+        }
+        let policy = self.polyline.policy();
+        let tolerance = (self.tolerance > 0.0).then_some(self.tolerance);
+        for (track, demands) in self.polyline.take(tolerance) {
+            if track.length() > NOTHING {
+                self.add(&track, &demands, policy);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds a curve to the path, or begins another path with it.
+    fn add(&mut self, track: &Track, demands: &[Demand], policy: Option<Policy>) {
+        let joining = Joining {
+            rounds: self.tolerance > 0.0,
+            tolerance: if self.tolerance > 0.0 { self.tolerance } else { self.limits.tolerance },
+            limits: self.limits,
+        };
+        if let Some(contour) = &mut self.contour {
+            let fits = policy.is_none_or(|policy| policy == contour.policy);
+            if fits && contour.extend(track, demands, &joining) {
+                return;
+            }
+        }
+        if let Some(contour) = self.contour.take() {
+            self.end(contour);
+        }
+        let policy = policy.unwrap_or(Policy::Proportional);
+        self.contour = Some(Contour::new(track.clone(), demands, policy));
+    }
+
+    /// Hands on a path that is complete.
+    fn end(&mut self, contour: Contour) {
+        let line = contour.line;
+        let extent = Extent::of(&contour);
+        let (contour, left) = without_dark_ends(contour, &self.limits);
+        let mut contour = contour;
+        self.limit_changes(&mut contour);
+        // Free moves that only lead to a path are left to its approach.
+        if matches!(self.done.last(), Some(Operation { kind: OperationKind::Rapid(_), .. })) {
+            self.done.pop();
+        }
+        self.leave_row_step(&extent);
+        self.before = [self.before[1], Some(extent)];
+        self.done.push(Operation { kind: OperationKind::Path(Box::new(contour)), line });
+        if let Some(to) = left {
+            self.done.push(Operation { kind: OperationKind::Rapid(to), line });
+        }
+    }
+
+    /// Slows the path where the light would change more often than a cycle can say.
+    fn limit_changes(&mut self, contour: &mut Contour) {
+        if let Some(line) = contour.limit_change_rate(EDGES, CYCLE_TIME, self.limits.speed) {
+            let text =
+                "slowed: the light changes more often here than can be said in a cycle".to_owned();
+            if !self.notes.iter().any(|note| note.text == text) {
+                self.notes.push(Note { line, text });
+            }
+        }
+    }
+
+    /// Leaves out a short step between two rows of a raster: lit at one speed it could only be marked by
+    /// two loops, and it lies within the rows' own width; dark it only leads to the next row.
+    fn leave_row_step(&mut self, next: &Extent) {
+        let [Some(row), Some(step)] = &self.before else { return };
+        if !is_row_step(row, step, next) {
+            return;
+        }
+        let is_path = |operation: &Operation| matches!(operation.kind, OperationKind::Path(_));
+        let Some(index) = self.done.iter().rposition(is_path) else { return };
+        let line = self.done.remove(index).line;
+        if !step.is_lit {
+            return;
+        }
+        let text =
+            "the steps between the rows of this raster are gone in the dark: at one speed they \
+                    could not be marked"
+                .to_owned();
+        if !self.notes.iter().any(|note| note.text == text) {
+            self.notes.push(Note { line, text });
+        }
+    }
+}
+
+/// What a raster's rows and steps are known by.
+#[derive(Debug, Clone, Copy)]
+struct Extent {
+    from: Vector3<f64>,
+    to: Vector3<f64>,
+    /// Directions at the start and at the end.
+    begins: Vector3<f64>,
+    ends: Vector3<f64>,
+    length: f64,
+    is_constant: bool,
+    is_lit: bool,
+}
+
+impl Extent {
+    fn of(contour: &Contour) -> Self {
+        let (start, end) = (contour.start(), contour.end());
+        Self {
+            from: start.point,
+            to: end.point,
+            begins: start.first.normalize(),
+            ends: end.first.normalize(),
+            length: contour.length(),
+            is_constant: contour.policy == Policy::Constant,
+            is_lit: contour.is_lit(),
+        }
+    }
+}
+
+/// Whether `step` only leads from one row of a raster to the next.
+fn is_row_step(row: &Extent, step: &Extent, next: &Extent) -> bool {
+    let is_row = |part: &Extent| part.is_constant && part.is_lit;
+    let most = ROW_STEP.min(ROW_SHARE * row.length.min(next.length));
+    let meets = |one: Vector3<f64>, other: Vector3<f64>| (one - other).norm() <= GAP;
+    is_row(row)
+        && is_row(next)
+        && (step.is_constant || !step.is_lit)
+        && step.length <= most
+        && row.ends.dot(&next.begins) < -0.99
+        && row.ends.dot(&step.ends).abs() < 0.5
+        && meets(row.to, step.from)
+        && meets(step.to, next.from)
+}
+
+/// A path of one speed without what is dark at its ends, which its run-in and run-out take the place
+/// of, and where it ended.
+fn without_dark_ends(mut contour: Contour, limits: &PathLimits) -> (Contour, Option<Vector3<f64>>) {
+    if contour.policy == Policy::Proportional || !contour.is_lit() {
+        let policy = if contour.is_lit() { contour.policy } else { Policy::Proportional };
+        contour.policy = policy;
+        return (contour, None);
+    }
+    let lit: Vec<(f64, f64)> = contour
+        .stretches()
+        .filter(|(demand, _)| demand.power > 0.0)
+        .map(|(demand, to)| (demand.from, to))
+        .collect();
+    let (Some((from, _)), Some((_, to))) = (lit.first(), lit.last()) else {
+        return (contour, None);
+    };
+    if *from <= GAP && contour.length() - to <= GAP {
+        return (contour, None);
+    }
+    let end = contour.end().point;
+    let left = (contour.length() - to > GAP).then_some(end);
+    match contour.part(*from, *to, limits) {
+        Some(part) => (part, left),
+        None => (contour, None),
+    }
+}

@@ -1,0 +1,122 @@
+//! The path that the tool follows: curves with smoothed joints, by one parameter that is the arc
+//! length on lines and arcs, and near it elsewhere.
+
+use nalgebra::Vector3;
+
+use crate::drawing::Curve;
+use crate::geometry::blend::BlendSegment;
+use crate::geometry::jet::Jet;
+use crate::geometry::track::Track;
+
+/// The path of a contour. It is never empty once it is planned.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Path {
+    spans: Vec<Span>,
+    length: f64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Span {
+    /// Where it starts along the path [m].
+    start: f64,
+    shape: Shape,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Shape {
+    /// A stretch of a track from this distance on.
+    Track(Track, f64),
+    /// A part of a smoothed join.
+    BlendSegment(Box<BlendSegment>),
+}
+
+impl Path {
+    /// Goes on along `track` for `length`, from the distance `from`.
+    pub(crate) fn push_track(&mut self, track: &Track, from: f64, length: f64) {
+        if length > 0.0 {
+            self.push(Shape::Track(track.clone(), from), length);
+        }
+    }
+
+    pub(crate) fn push_segment(&mut self, segment: BlendSegment, length: f64) {
+        self.push(Shape::BlendSegment(Box::new(segment)), length);
+    }
+
+    fn push(&mut self, shape: Shape, length: f64) {
+        self.spans.push(Span { start: self.length, shape });
+        self.length += length;
+    }
+
+    /// A straight line.
+    pub(crate) fn line(from: Vector3<f64>, to: Vector3<f64>) -> Self {
+        let mut path = Self::default();
+        let track = Track::new(&Curve::Line { from, to });
+        path.push_track(&track, 0.0, track.length());
+        path
+    }
+
+    /// The range of the parameter [m].
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// The point and its derivatives at `distance` from the start [m].
+    pub fn at(&self, distance: f64) -> Jet {
+        self.on_side(distance, false)
+    }
+
+    /// The same, from the shape that ends at `distance` where one does and `before` says so.
+    pub(crate) fn on_side(&self, distance: f64, before: bool) -> Jet {
+        if before {
+            let after = self.spans.partition_point(|span| span.start < distance);
+            let span = &self.spans[after.max(1) - 1];
+            return span.before(distance - span.start);
+        }
+        let after = self.spans.partition_point(|span| span.start <= distance);
+        let span = &self.spans[after.max(1) - 1];
+        span.at(distance - span.start)
+    }
+
+    /// Distances at which the path goes over from one shape into the next [m].
+    pub fn seams(&self) -> impl Iterator<Item = f64> + '_ {
+        self.spans.iter().skip(1).map(|span| span.start)
+    }
+
+    /// Where its third derivative may jump: seams, and the knots of splines [m], growing.
+    pub(crate) fn borders(&self) -> Vec<f64> {
+        let mut borders = Vec::new();
+        let ends = self.spans.iter().skip(1).map(|span| span.start).chain([self.length]);
+        for (span, end) in self.spans.iter().zip(ends) {
+            if span.start > 0.0 {
+                borders.push(span.start);
+            }
+            if let Shape::Track(track, from) = &span.shape {
+                let inside = |knot: &f64| *knot > span.start && *knot < end;
+                borders.extend(track.knots().map(|knot| knot - from + span.start).filter(inside));
+            }
+        }
+        borders
+    }
+
+    /// Whether it is one straight line.
+    pub(crate) fn is_straight(&self) -> bool {
+        matches!(&*self.spans, [Span { shape: Shape::Track(Track::Line { .. }, _), .. }])
+    }
+}
+
+impl Span {
+    /// As [`Self::at`], just before `distance`.
+    fn before(&self, distance: f64) -> Jet {
+        match &self.shape {
+            Shape::Track(track, from) => track.before(from + distance),
+            Shape::BlendSegment(segment) => segment.at(distance),
+        }
+    }
+
+    fn at(&self, distance: f64) -> Jet {
+        match &self.shape {
+            Shape::Track(track, from) => track.at(from + distance),
+            Shape::BlendSegment(segment) => segment.at(distance),
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! What the reader of programs wants to know of a machine.
+
+use machine::Machine;
+use machine::gcode_settings::GcodeSettings;
+use nalgebra::Vector3;
+
+/// How a machine reads programs, and how fast it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ReaderSettings {
+    /// What words mean.
+    pub(super) gcode: GcodeSettings,
+    /// Where programs start [m].
+    pub(super) home: Vector3<f64>,
+    /// Largest speed of a mark [m/s].
+    pub(super) mark_speed: f64,
+    /// Largest speed in the dark [m/s].
+    pub(super) rapid: f64,
+}
+
+impl ReaderSettings {
+    pub(super) fn of(machine: &Machine) -> Self {
+        Self {
+            gcode: machine.gcode,
+            home: Vector3::from(machine.home),
+            mark_speed: machine.path.speed,
+            rapid: machine.path.rapid,
+        }
+    }
+}

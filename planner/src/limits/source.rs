@@ -1,0 +1,146 @@
+//! Which limit a row of the time law is.
+
+use machine::Axis;
+use messages::plan::Binding;
+
+use crate::verify::checker::Quantity;
+
+/// Axes come after the limits of the tool, this many numbers apart.
+const PER_AXIS: u16 = 16;
+
+/// A limit by number, as the time law carries it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Source(pub(crate) u16);
+
+impl Source {
+    /// The speed that the job asks for.
+    pub(crate) const FEED: Self = Self(0);
+    /// The machine's largest speed while marking.
+    pub(crate) const MARKING_SPEED: Self = Self(1);
+    /// The machine's largest speed of a free move.
+    pub(crate) const RAPID: Self = Self(2);
+    /// Acceleration of the tool.
+    pub(crate) const TOOL_ACCELERATION: Self = Self(3);
+    /// Jerk of the tool.
+    pub(crate) const TOOL_JERK: Self = Self(4);
+
+    /// A turn, a run-in or a run-out in the dark, within acceleration and jerk of the tool and
+    /// whatever the axes leave of them.
+    pub(crate) const DARK_TURN: Self = Self(5);
+
+    fn of_axis(axis: usize, kind: u16) -> Self {
+        Self((axis as u16 + 1) * PER_AXIS + kind)
+    }
+
+    /// Speed of a joint.
+    pub(crate) fn joint_velocity(axis: usize) -> Self {
+        Self::of_axis(axis, 0)
+    }
+
+    /// Acceleration of a joint.
+    pub(crate) fn joint_acceleration(axis: usize) -> Self {
+        Self::of_axis(axis, 1)
+    }
+
+    /// Jerk of a joint.
+    pub(crate) fn joint_jerk(axis: usize) -> Self {
+        Self::of_axis(axis, 2)
+    }
+
+    /// Current of a DC motor, or torque of a stepper.
+    pub(crate) fn torque(axis: usize) -> Self {
+        Self::of_axis(axis, 3)
+    }
+
+    /// Voltage of a DC motor, or pulse rate of a stepper.
+    pub(crate) fn voltage(axis: usize) -> Self {
+        Self::of_axis(axis, 4)
+    }
+
+    /// What a person reads, with the name of the axis.
+    pub(crate) fn describe(self, axes: &[Axis]) -> (String, Option<String>) {
+        if self.0 < PER_AXIS {
+            let name = match self {
+                Self::FEED => "speed asked for",
+                Self::MARKING_SPEED => "largest marking speed",
+                Self::RAPID => "largest rapid speed",
+                Self::DARK_TURN => "turns and runs in the dark",
+                Self::TOOL_ACCELERATION => Quantity::ToolAcceleration.name(),
+                _ => Quantity::ToolJerk.name(),
+            };
+            return (name.to_owned(), None);
+        }
+        let axis = axes.get(usize::from(self.0 / PER_AXIS - 1));
+        let is_stepper = axis.is_some_and(|axis| axis.motor.stepper().is_some());
+        let quantity = match (self.0 % PER_AXIS, is_stepper) {
+            (0, _) => Quantity::JointVelocity,
+            (1, _) => Quantity::JointAcceleration,
+            (2, _) => Quantity::JointJerk,
+            (3, false) => Quantity::MotorCurrent,
+            (3, true) => Quantity::MotorTorque,
+            (_, false) => Quantity::MotorVoltage,
+            (_, true) => Quantity::PulseRate,
+        };
+        (quantity.name().to_owned(), axis.map(|axis| axis.name.clone()))
+    }
+}
+
+/// How long each limit ruled.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Shares {
+    /// By limit: the time [s], and the longest single stretch with its line and place.
+    found: std::collections::BTreeMap<Source, Share>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Share {
+    time: f64,
+    worst: f64,
+    line: u64,
+    position: [f64; 3],
+}
+
+impl Shares {
+    /// Notes that `source` ruled for `time` [s] near `position` [m] in `line`.
+    pub(crate) fn add(&mut self, source: Source, time: f64, line: u64, position: [f64; 3]) {
+        let share = self.found.entry(source).or_default();
+        share.time += time;
+        if time > share.worst {
+            (share.worst, share.line, share.position) = (time, line, position);
+        }
+    }
+
+    /// Adds what others found.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        for (source, share) in &other.found {
+            let mine = self.found.entry(*source).or_default();
+            let time = mine.time + share.time;
+            if share.worst > mine.worst {
+                *mine = *share;
+            }
+            mine.time = time;
+        }
+    }
+
+    /// The shares of all time, the largest first.
+    pub(crate) fn report(&self, axes: &[Axis]) -> Vec<Binding> {
+        let all: f64 = self.found.values().map(|share| share.time).sum();
+        let mut report: Vec<Binding> = self
+            .found
+            .iter()
+            .map(|(source, share)| {
+                let (limit, axis) = source.describe(axes);
+                Binding {
+                    limit,
+                    axis,
+                    share: share.time / all,
+                    time: share.time,
+                    line: share.line,
+                    position: share.position,
+                }
+            })
+            .collect();
+        report.sort_by(|one, other| other.time.total_cmp(&one.time));
+        report
+    }
+}

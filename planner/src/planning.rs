@@ -1,0 +1,481 @@
+//! The planning of a job, window by window: each is timed, sampled and checked before it is handed
+//! on, and from the end of each there is a way to rest.
+
+mod paths;
+mod plateau;
+mod windows;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use machine::kinematics::Joints;
+use machine::{Machine, Mechanism, PathLimits, WorkArea};
+use messages::Setpoint;
+use messages::artwork::Stroke;
+use messages::time::CYCLE_TIME;
+use nalgebra::Vector3;
+
+use crate::drawing::{Note, Turns};
+use crate::error::{Place, PlanError};
+use crate::geometry::operation::{Operation, OperationKind};
+use crate::joint_space::configuration::{Configuration, Refused};
+use crate::joint_space::joint_move::JointMove;
+use crate::joint_space::route::{Router, still};
+use crate::law::flight::State;
+use crate::law::optimum::Speeds;
+use crate::light::exposure::{Light, TooShort, told_ahead};
+use crate::limits::motion_limits::{MotionLimits, Scope};
+use crate::limits::source::{Shares, Source};
+use crate::limits::tightening::Tightening;
+use crate::sampling::sampler::{Sampler, Unreachable};
+use crate::trajectory::{BEFORE, Motion, Piece, Trajectory};
+use crate::verify::checker::{Checker, LimitViolation, Quantity};
+use crate::verify::interpolation::InterpolationCheck;
+use paths::PathRun;
+
+/// Rest before and after an output changes [s]: a cycle each.
+const OUTPUT_REST: f64 = CYCLE_TIME;
+
+/// Rest before a pause [s], so that the springs of the transmission have settled.
+const PAUSE_REST: f64 = 0.1;
+
+/// Jobs that last longer are refused, most likely for a wrong number [s].
+const LONGEST: f64 = 7.0 * 86_400.0;
+
+/// How often a window that breaks a limit is planned again with less of it, and how often after that
+/// slower as a whole.
+const TRIALS: [usize; 2] = [24, 40];
+
+/// How much slower each of the latter is.
+const SLOWER: f64 = 0.85;
+
+/// Samples checked between two questions whether anybody still waits for the plan.
+const ASK: u64 = 4096;
+
+/// What a job does, read and understood.
+pub(crate) struct Task<'a> {
+    pub(crate) machine: &'a Machine,
+    pub(crate) limits: PathLimits,
+    pub(crate) scope: Scope,
+    pub(crate) speeds: Speeds,
+    pub(crate) turns: Turns,
+    pub(crate) attitude: crate::geometry::attitude::AttitudeLaw,
+    /// Where the joints stand [m or rad].
+    pub(crate) standing: messages::AxisArray,
+    pub(crate) abandoned: &'a dyn Fn() -> bool,
+}
+
+/// A stretch of a job that is planned, sampled and checked.
+#[derive(Debug, Default)]
+pub(crate) struct Window {
+    /// Its setpoints, whole cycles; the rest of its time is sampled with the next.
+    pub(crate) setpoints: Vec<Setpoint>,
+    /// Its motion.
+    pub(crate) trajectory: Trajectory,
+    /// The lines and dots that begin in it.
+    pub(crate) strokes: Vec<Stroke>,
+}
+
+/// A line that the limits slow below what was asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Slowed {
+    pub(crate) line: u64,
+    pub(crate) asked: f64,
+    pub(crate) speed: f64,
+    pub(crate) place: Vector3<f64>,
+}
+
+/// What the planning of a window changes.
+#[derive(Clone)]
+struct Front<const N: usize, M: Mechanism<N>> {
+    now: Configuration<N>,
+    /// The tool's state where it does not rest.
+    moving: Option<State>,
+    run: Option<PathRun<N>>,
+    /// Number of the next operation, and parts of a path that was divided.
+    next: usize,
+    parts: VecDeque<Arc<crate::geometry::contour::Contour>>,
+    time: f64,
+    outputs: u64,
+    light: Light,
+    line: u64,
+    sampler: Sampler<N, M>,
+    checker: Checker,
+    interpolation: Option<InterpolationCheck>,
+    samples: u64,
+}
+
+/// A job under way.
+pub(crate) struct Planning<'a, const N: usize, M: Mechanism<N>> {
+    limits: MotionLimits<'a, N, M>,
+    area: &'a WorkArea,
+    task: &'a Task<'a>,
+    operations: &'a [Operation],
+    front: Front<N, M>,
+    /// The first rest, which belongs to the first window.
+    lead_in: Option<Piece>,
+    is_over: bool,
+    pub(crate) shares: Shares,
+    pub(crate) slowed: Vec<Slowed>,
+    pub(crate) notes: Vec<Note>,
+    /// The largest speed while the laser is on [m/s].
+    pub(crate) speed: f64,
+}
+
+/// A window in the making.
+struct Draft<'s> {
+    trajectory: Trajectory,
+    strokes: Vec<Stroke>,
+    shares: &'s Tightening,
+    slowed: Vec<Slowed>,
+    notes: Vec<Note>,
+    bound: Shares,
+    speed: f64,
+}
+
+impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
+    /// Begins a job at rest.
+    pub(crate) fn new(
+        mechanism: &'a M,
+        task: &'a Task<'a>,
+        operations: &'a [Operation],
+        stream: u64,
+    ) -> Result<Self, PlanError> {
+        let Task { machine, limits, scope, attitude, .. } = *task;
+        let joints = Joints::<N>::from_fn(|axis, _| task.standing[axis]);
+        let limits = MotionLimits::new(mechanism, &machine.axes, limits, &joints, attitude, scope);
+        let now = Configuration { joints, branch: 0 };
+        let rest = JointMove::standing(&joints, 0);
+        // Whole cycles, so that a source that is told ahead of the first light is told at rest.
+        let cycles = (machine.laser.on_delay / CYCLE_TIME).ceil();
+        let before = BEFORE + cycles * CYCLE_TIME;
+        if before.is_nan() || before >= LONGEST {
+            return Err(PlanError::TooLong { duration: before });
+        }
+        let lead_in = Piece {
+            start: 0.0,
+            duration: before,
+            motion: Motion::Rest(rest.clone()),
+            line: 0,
+            stroke: 0,
+        };
+        let mut sampler = Sampler::new(mechanism.clone(), &machine.axes, rest, attitude, stream)
+            .map_err(|cause| PlanError::Unreachable {
+                line: 0,
+                place: Place { stroke: 0, time: 0.0 },
+                cause,
+            })?;
+        sampler.tell_ahead(told_ahead(&machine.laser));
+        // On straight joints the cubic is the tool's own.
+        let interpolates = scope == Scope::Machine && !mechanism.is_linear();
+        let tolerance = limits.path.tolerance;
+        let front = Front {
+            now,
+            moving: None,
+            run: None,
+            next: 0,
+            parts: VecDeque::new(),
+            time: before,
+            outputs: 0,
+            light: Light::new(machine.laser),
+            line: 0,
+            sampler,
+            checker: Checker::new(machine, limits.path, scope),
+            interpolation: interpolates.then(|| InterpolationCheck::new(tolerance)),
+            samples: 0,
+        };
+        Ok(Self {
+            limits,
+            area: &machine.area,
+            task,
+            operations,
+            front,
+            lead_in: Some(lead_in),
+            is_over: false,
+            shares: Shares::default(),
+            slowed: Vec::new(),
+            notes: Vec::new(),
+            speed: 0.0,
+        })
+    }
+
+    /// The next window; `None` after the last.
+    ///
+    /// # Errors
+    /// What no speed can do, with its place.
+    pub(crate) fn next_window(&mut self) -> Result<Option<Window>, PlanError> {
+        if self.is_over {
+            return Ok(None);
+        }
+        let checkpoint = self.front.clone();
+        let mut shares = Tightening::none(N);
+        let mut trial = 0;
+        loop {
+            let error = match self.attempt(&shares) {
+                Ok(draft) => return Ok(Some(self.keep(draft))),
+                Err(error) => error,
+            };
+            let PlanError::Limit { violation, .. } = &error else { return Err(error) };
+            trial += 1;
+            if trial > TRIALS[0] + TRIALS[1] || violation.quantity.is_place() {
+                return Err(error);
+            }
+            if trial > TRIALS[0] || violation.quantity == Quantity::HeatingCurrent {
+                shares.slow(SLOWER);
+            } else {
+                let axis = violation.axis.as_ref();
+                let index = axis.and_then(|name| self.index_of(name));
+                shares.tighten(violation, index);
+            }
+            self.front = checkpoint.clone();
+        }
+    }
+
+    fn index_of(&self, axis: &str) -> Option<usize> {
+        self.limits.axes.iter().position(|other| other.name == axis)
+    }
+
+    fn keep(&mut self, (draft, setpoints): (Draft<'_>, Vec<Setpoint>)) -> Window {
+        let Draft { trajectory, strokes, slowed, notes, bound, speed, .. } = draft;
+        self.lead_in = None;
+        self.slowed.extend(slowed);
+        self.notes.extend(notes);
+        self.shares.merge(&bound);
+        self.speed = self.speed.max(speed);
+        self.is_over = self.front.sampler.has_ended();
+        Window { setpoints, trajectory, strokes }
+    }
+
+    /// Plans, samples and checks one window.
+    fn attempt<'s>(
+        &mut self,
+        shares: &'s Tightening,
+    ) -> Result<(Draft<'s>, Vec<Setpoint>), PlanError> {
+        let mut draft = Draft {
+            trajectory: Trajectory { attitude: self.task.attitude, ..Trajectory::default() },
+            strokes: Vec::new(),
+            shares,
+            slowed: Vec::new(),
+            notes: Vec::new(),
+            bound: Shares::default(),
+            speed: 0.0,
+        };
+        draft.trajectory.pieces.extend(self.lead_in.clone());
+        let is_last = !self.advance(&mut draft)?;
+        let light = &mut self.front.light;
+        draft.trajectory.laser =
+            if is_last { light.take_all() } else { light.take(self.front.time) };
+        if self.front.time > LONGEST || self.front.time.is_nan() {
+            return Err(PlanError::TooLong { duration: self.front.time });
+        }
+        self.front.sampler.extend(&draft.trajectory, is_last);
+        let setpoints = self.sample()?;
+        Ok((draft, setpoints))
+    }
+
+    /// Adds the next stretch of motion to `draft`. Says whether there was any left.
+    fn advance(&mut self, draft: &mut Draft<'_>) -> Result<bool, PlanError> {
+        if self.front.run.is_some() {
+            self.go_on(draft)?;
+            return Ok(true);
+        }
+        if let Some(part) = self.front.parts.pop_front() {
+            self.front.line = part.line;
+            self.begin_path(part, draft)?;
+            return Ok(true);
+        }
+        let Some(operation) = self.operations.get(self.front.next) else {
+            self.halt(draft)?;
+            return Ok(false);
+        };
+        self.front.next += 1;
+        self.front.line = operation.line;
+        match &operation.kind {
+            OperationKind::Path(contour) => {
+                self.begin_path(Arc::new((**contour).clone()), draft)?
+            }
+            OperationKind::Rapid(to) => self.go_to(*to, draft)?,
+            OperationKind::Rest(time) => {
+                self.halt(draft)?;
+                if *time > 0.0 {
+                    self.stand(*time, draft);
+                }
+            }
+            OperationKind::Dot(dot) => {
+                self.go_to(dot.at, draft)?;
+                let start = self.front.time;
+                let lit = self.front.light.dot(start, &dot.exposures);
+                lit.map_err(|short| self.too_short(short))?;
+                draft.strokes.push(Stroke { points: vec![dot.at.into()], line: operation.line });
+                let time = dot.exposures.iter().map(|(time, _)| time).sum();
+                self.stand(time, draft);
+            }
+            OperationKind::Output { bit, on } => {
+                self.halt(draft)?;
+                let mask = 1_u64.checked_shl(*bit).unwrap_or(0);
+                let outputs = self.front.outputs;
+                self.front.outputs = if *on { outputs | mask } else { outputs & !mask };
+                let change = (self.front.time + OUTPUT_REST, self.front.outputs);
+                draft.trajectory.outputs.push(change);
+                self.stand(2.0 * OUTPUT_REST, draft);
+            }
+            OperationKind::Pause => {
+                self.halt(draft)?;
+                // One cycle before the end, so that the sample that pauses is at rest.
+                draft.trajectory.pauses.push(self.front.time + PAUSE_REST - CYCLE_TIME);
+                self.stand(PAUSE_REST, draft);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Adds a piece of motion.
+    fn push(&mut self, duration: f64, motion: Motion, stroke: u64, draft: &mut Draft<'_>) {
+        let line = self.front.line;
+        let start = self.front.time;
+        match &motion {
+            Motion::Flight(flight) => {
+                let position = flight.at(duration / 2.0).position.into();
+                draft.bound.add(Source::DARK_TURN, duration, line, position);
+            }
+            Motion::Joints(JointMove { law: Some(law), .. })
+            | Motion::Path { law, is_lit: false, .. } => {
+                for part in law.binding() {
+                    draft.bound.add(Source(part.limit), part.duration, line, [0.0; 3]);
+                }
+            }
+            _ => {}
+        }
+        draft.trajectory.pieces.push(Piece { start, duration, motion, line, stroke });
+        self.front.time += duration;
+    }
+
+    /// Stands where the joints are.
+    fn stand(&mut self, duration: f64, draft: &mut Draft<'_>) {
+        let rest = JointMove::standing(&self.front.now.joints, self.front.now.branch);
+        let stroke = self.front.light.stroke;
+        self.push(duration, Motion::Rest(rest), stroke, draft);
+    }
+
+    /// Comes to rest, then goes to `to` in the dark.
+    fn go_to(&mut self, to: Vector3<f64>, draft: &mut Draft<'_>) -> Result<(), PlanError> {
+        self.halt(draft)?;
+        let approach = self.router(draft.shares).approach(&still(to), &[]);
+        let approach = approach.map_err(|cause| self.refusal(cause))?;
+        if let Some((duration, motion)) = approach.motion {
+            self.push(duration, motion, self.front.light.stroke, draft);
+        }
+        self.front.now = approach.start;
+        self.settle_at(&still(to))?;
+        Ok(())
+    }
+
+    /// Puts the joints where the tool's motion says, which the last move led to.
+    fn settle_at(&mut self, tool: &machine::kinematics::ToolMotion) -> Result<(), PlanError> {
+        let Configuration { joints, mut branch } = self.front.now;
+        let motion = self.limits.follow(tool, &mut branch, &joints);
+        let motion = motion.map_err(|cause| self.refusal(Refused::Kinematics(cause)))?;
+        self.front.now = Configuration { joints: motion.position, branch };
+        Ok(())
+    }
+
+    fn router<'r>(&'r self, shares: &'r Tightening) -> Router<'r, 'a, N, M> {
+        Router { limits: &self.limits, area: self.area, shares, now: self.front.now }
+    }
+
+    /// Samples as far as the motion is known, and checks each sample.
+    fn sample(&mut self) -> Result<Vec<Setpoint>, PlanError> {
+        let mut setpoints = Vec::new();
+        while let Some(setpoint) = self.front.sampler.next() {
+            self.front.samples += 1;
+            if self.front.samples.is_multiple_of(ASK) && (self.task.abandoned)() {
+                return Err(PlanError::Abandoned);
+            }
+            let front = &mut self.front;
+            if let Err(violation) = front.checker.check(&setpoint, self.limits.axes, self.area) {
+                return Err(self.limit(violation));
+            }
+            if let Some(interpolation) = &mut front.interpolation {
+                let time = setpoint.sequence as f64 * CYCLE_TIME;
+                match interpolation.check(&setpoint, &front.sampler) {
+                    Ok(None) => {}
+                    Ok(Some(violation)) => return Err(self.limit(violation)),
+                    Err(cause) => return Err(self.unreachable(Unreachable { time, cause })),
+                }
+            }
+            setpoints.push(setpoint);
+        }
+        match self.front.sampler.broken() {
+            Some(found) => Err(self.unreachable(found)),
+            None => Ok(setpoints),
+        }
+    }
+
+    /// What of every limit has been used so far.
+    pub(crate) fn utilization(&self) -> &messages::plan::LimitUtilization {
+        self.front.checker.utilization()
+    }
+
+    fn place(&self, time: f64) -> (u64, Place) {
+        let piece = self.front.sampler.piece_at(time);
+        let stroke = piece.map_or(0, |piece| piece.stroke);
+        (piece.map_or(0, |piece| piece.line), Place { stroke, time })
+    }
+
+    fn limit(&self, violation: LimitViolation) -> PlanError {
+        let (line, place) = self.place(violation.time);
+        PlanError::Limit { line, place, violation }
+    }
+
+    fn unreachable(&self, found: Unreachable) -> PlanError {
+        let (line, place) = self.place(found.time);
+        PlanError::Unreachable { line, place, cause: found.cause }
+    }
+
+    fn too_short(&self, short: TooShort) -> PlanError {
+        PlanError::TooShort { line: self.front.line, duration: short.duration }
+    }
+
+    /// What it means that nothing can be done from where the job is now.
+    fn refusal(&self, cause: Refused) -> PlanError {
+        let line = self.front.line;
+        let time = self.front.time - self.first_rest();
+        let place = Place { stroke: self.front.light.stroke + 1, time };
+        match cause {
+            Refused::Kinematics(cause) => PlanError::Unreachable { line, place, cause },
+            Refused::NoConfiguration { tried } => PlanError::NoConfiguration { line, place, tried },
+            Refused::Position { axis, value, limit } => {
+                let axis = self.limits.axes.get(axis);
+                let unit = axis.map_or("", |axis| axis.unit.name());
+                let axis = axis.map(|axis| axis.name.clone());
+                let quantity = Quantity::JointPosition;
+                let violation =
+                    LimitViolation { time: place.time, axis, quantity, value, limit, unit };
+                PlanError::Limit { line, place, violation }
+            }
+        }
+    }
+
+    fn first_rest(&self) -> f64 {
+        BEFORE + (self.task.machine.laser.on_delay / CYCLE_TIME).ceil() * CYCLE_TIME
+    }
+
+    /// One note for all lines that the limits slow down.
+    pub(crate) fn slowed_note(&self) -> Option<Note> {
+        let worst = self
+            .slowed
+            .iter()
+            .min_by(|one, other| (one.speed / one.asked).total_cmp(&(other.speed / other.asked)))?;
+        let Slowed { line, asked, speed, place } = *worst;
+        let mut text = format!(
+            "slowed to {speed:.4} m/s instead of {asked:.4} m/s near x {:.3} mm, y {:.3} mm: the \
+             limits allow no more there",
+            place.x * 1e3,
+            place.y * 1e3
+        );
+        if self.slowed.len() > 1 {
+            text.push_str(&format!("; {} lines are slowed somewhere", self.slowed.len()));
+        }
+        Some(Note { line, text })
+    }
+}

@@ -1,0 +1,640 @@
+//! The beginning of a path: how the tool comes to its start, and at which speed.
+
+use std::sync::Arc;
+
+use machine::Mechanism;
+use machine::kinematics::ToolMotion;
+
+use super::windows::Timed;
+use super::{Draft, Planning};
+use crate::drawing::{Note, Turns};
+use crate::error::{Place, PlanError};
+use crate::geometry::contour::Contour;
+use crate::geometry::jet::Jet;
+use crate::geometry::path::Path;
+use crate::joint_space::configuration::{
+    Configuration, PathFunction, Refused, candidates, trail, walk,
+};
+use crate::joint_space::follow_flight::{follow_flight, tool};
+use crate::joint_space::unwind::divide;
+use crate::law::End;
+use crate::law::flight::{Flight, FlightLimits, State};
+use crate::law::row::Side;
+use crate::law::time_law::TimeLaw;
+use crate::law::windows::{even_speed, keeps_even};
+use crate::light::Policy;
+use crate::light::exposure::source_speeds;
+use crate::limits::along::{AlongPath, SpeedLimit};
+use crate::limits::motion_limits::Scope;
+use crate::limits::source::Source;
+use crate::limits::tightening::Tightening;
+use crate::trajectory::Motion;
+use crate::verify::checker::{LimitViolation, Quantity};
+
+/// How much of the speed that an end allows it is passed at, so that its limits leave room to
+/// begin to change it.
+const END_SHARE: f64 = 0.995;
+
+/// How much slower an end is tried that cannot be met, and how often before it is met at rest.
+const END_SLOWER: f64 = 0.8;
+const END_TRIALS: usize = 14;
+
+/// How much slower a run-in or run-out is tried that the axes cannot follow, and how often.
+const RUN_SLOWER: f64 = 0.87;
+const RUN_TRIALS: usize = 24;
+
+/// How often another configuration is timed where the one before cannot be reached.
+const CONFIGURATIONS: usize = 7;
+
+/// A path that is under way.
+#[derive(Debug, Clone)]
+pub(super) struct PathRun<const N: usize> {
+    pub(super) contour: Arc<Contour>,
+    pub(super) path: Arc<Path>,
+    pub(super) trail: Arc<Vec<(f64, Configuration<N>)>>,
+    pub(super) speeds: Arc<Vec<SpeedLimit>>,
+    /// Where the next window begins [m], and how.
+    pub(super) at: f64,
+    pub(super) begin: End,
+    /// How the path ends.
+    pub(super) exit: End,
+    /// The one speed of the path, where it has one [m/s].
+    pub(super) even: Option<f64>,
+    /// Whether the power follows the speed whatever the policy.
+    pub(super) follows: bool,
+    /// How far the next window goes, and at least [m].
+    pub(super) reach: f64,
+    pub(super) least_reach: f64,
+    /// The way to rest from where the next window begins.
+    pub(super) fallback: Option<TimeLaw>,
+}
+
+impl<const N: usize> PathRun<N> {
+    /// Line of the job file at a place [m].
+    pub(super) fn line_at(&self, place: f64) -> u64 {
+        let demands = self.contour.demands();
+        let after = demands.partition_point(|demand| demand.from <= place);
+        demands.get(after.max(1) - 1).map_or(0, |demand| demand.line)
+    }
+
+    /// The speed that is asked for at a place that is marked [m/s]; `None` in the dark.
+    pub(super) fn lit_speed_at(&self, place: f64) -> Option<f64> {
+        let demands = self.contour.demands();
+        let after = demands.partition_point(|demand| demand.from <= place);
+        demands.get(after.max(1) - 1).filter(|demand| demand.power > 0.0)?;
+        let after = self.speeds.partition_point(|speed| speed.from <= place);
+        Some(self.speeds[after.max(1) - 1].speed)
+    }
+}
+
+/// How the tool comes to the start of a path.
+struct Entry<const N: usize> {
+    motions: Vec<(f64, Motion)>,
+    /// The configuration at the start of the path.
+    start: Configuration<N>,
+}
+
+impl Entry<0> {
+    fn time(motions: &[(f64, Motion)]) -> f64 {
+        motions.iter().map(|(time, _)| time).sum()
+    }
+}
+
+impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
+    /// Begins a path and times its first window.
+    pub(super) fn begin_path(
+        &mut self,
+        contour: Arc<Contour>,
+        draft: &mut Draft<'_>,
+    ) -> Result<(), PlanError> {
+        self.stays_inside(&contour)?;
+        let speeds = self.speed_limits(&contour);
+        let fastest = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
+        // Told before all of it is timed and sampled.
+        let duration = self.front.time + contour.length() / fastest;
+        if duration.is_nan() || duration >= super::LONGEST {
+            return Err(PlanError::TooLong { duration });
+        }
+        if contour.policy == Policy::Constant && contour.is_lit() {
+            self.begin_constant(contour, draft)
+        } else {
+            self.begin_from_rest(contour, draft)
+        }
+    }
+
+    /// That what is drawn lies within the area: told by the tool's place before anything is told by
+    /// joints.
+    fn stays_inside(&self, contour: &Contour) -> Result<(), PlanError> {
+        /// How far a chord may lie from the curve [m].
+        const CHORD: f64 = 1e-5;
+        /// Rounding at the edge [m].
+        const ROUNDING: f64 = 1e-9;
+        if self.limits.scope == Scope::PathAlone {
+            return Ok(());
+        }
+        let (lower, upper) = (&self.area.lower, &self.area.upper);
+        for point in contour.points(0.0, contour.length(), CHORD) {
+            for row in 0..3 {
+                let limit = point[row].clamp(lower[row], upper[row]);
+                if (point[row] - limit).abs() > ROUNDING {
+                    let time = self.front.time;
+                    let place = Place { stroke: self.front.light.stroke + 1, time };
+                    let quantity = Quantity::ToolPosition(row);
+                    let value = point[row];
+                    let violation =
+                        LimitViolation { time, axis: None, quantity, value, limit, unit: "m" };
+                    return Err(PlanError::Limit { line: contour.line, place, violation });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Comes to rest, if the tool moves.
+    pub(super) fn halt(&mut self, draft: &mut Draft<'_>) -> Result<(), PlanError> {
+        let Some(state) = self.front.moving.take() else { return Ok(()) };
+        let now = self.front.now;
+        let found = self.run_out(&state, &now, draft.shares);
+        // The path before ended in motion because there was a way to rest within all limits; with less
+        // of them there is one that may be longer.
+        let (flight, end) = match found {
+            Some(found) => found,
+            None => {
+                let all = Tightening::none(N);
+                let found = self.run_out(&state, &now, &all);
+                found.ok_or_else(|| self.refusal(Refused::NoConfiguration { tried: RUN_TRIALS }))?
+            }
+        };
+        let stroke = self.front.light.stroke;
+        self.push(flight.duration(), Motion::Flight(Arc::new(flight)), stroke, draft);
+        self.front.now = end;
+        Ok(())
+    }
+
+    /// The speed limits along a contour, stretch by stretch.
+    fn speed_limits(&self, contour: &Contour) -> Vec<SpeedLimit> {
+        let path = &self.limits.path;
+        let by_source = source_speeds(contour, &self.task.machine.laser);
+        let mut limits: Vec<SpeedLimit> = Vec::new();
+        for (demand, least) in contour.demands().iter().zip(by_source) {
+            let (speed, source) = if demand.power > 0.0 {
+                let asked = self.task.speeds.of(demand.speed);
+                let most = self.task.speeds.most;
+                (asked, if asked < most { Source::FEED } else { Source::MARKING_SPEED })
+            } else {
+                match demand.speed {
+                    Some(speed) if speed < path.rapid => (speed, Source::FEED),
+                    _ => (path.rapid, Source::RAPID),
+                }
+            };
+            let speed = speed.min(least);
+            if limits.last().is_none_or(|last| last.speed != speed || last.source != source) {
+                limits.push(SpeedLimit { from: demand.from, speed, source });
+            }
+        }
+        limits
+    }
+
+    fn run(
+        &self,
+        contour: Arc<Contour>,
+        path: Path,
+        trail: Vec<(f64, Configuration<N>)>,
+        speeds: Vec<SpeedLimit>,
+    ) -> PathRun<N> {
+        let limits = &self.limits.path;
+        let top = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
+        // Twice the way to rest, at least.
+        let least_reach =
+            top * top / limits.acceleration + top * limits.acceleration / limits.jerk + 1e-5;
+        let fraction = if path.is_straight() { 1.0 } else { 0.5 };
+        PathRun {
+            contour,
+            path: Arc::new(path),
+            trail: Arc::new(trail),
+            speeds: Arc::new(speeds),
+            at: 0.0,
+            begin: End::Rest,
+            exit: End::Rest,
+            even: None,
+            follows: true,
+            reach: (fraction * top).max(least_reach),
+            least_reach: least_reach * 0.1,
+            fallback: None,
+        }
+    }
+
+    /// A path from rest to rest.
+    fn begin_from_rest(
+        &mut self,
+        contour: Arc<Contour>,
+        draft: &mut Draft<'_>,
+    ) -> Result<(), PlanError> {
+        self.halt(draft)?;
+        let path = contour.trace(None, &self.limits.path);
+        let length = path.length();
+        let along = |share: f64| path.at(length * share).motion(1.0, 0.0, 0.0);
+        let first = along(0.0);
+        let found = self.router(draft.shares).approach(&first, &[&along]);
+        let approach = match found {
+            Ok(approach) => approach,
+            Err(cause) => return self.in_parts(&contour, cause, draft),
+        };
+        if let Some((duration, motion)) = approach.motion {
+            let stroke = self.front.light.stroke + u64::from(contour.is_lit());
+            self.push(duration, motion, stroke, draft);
+        }
+        self.front.now = approach.start;
+        self.settle_at(&first)?;
+        let trail = trail(&self.limits, &self.front.now, &path)
+            .map_err(|cause| self.refusal(Refused::Kinematics(cause)))?;
+        let speeds = self.speed_limits(&contour);
+        self.front.run = Some(self.run(contour, path, trail, speeds));
+        self.go_on(draft)
+    }
+
+    /// Divides a path for which a table cannot turn far enough, or says why it cannot be gone.
+    fn in_parts(
+        &mut self,
+        contour: &Arc<Contour>,
+        cause: Refused,
+        draft: &mut Draft<'_>,
+    ) -> Result<(), PlanError> {
+        let Refused::Position { axis, .. } = cause else { return Err(self.refusal(cause)) };
+        let Some(parts) = divide(&self.limits, &self.front.now.joints, contour, axis) else {
+            return Err(self.refusal(cause));
+        };
+        let text = format!(
+            "marked in {} parts: between them an axis is turned back in the dark, whose travel is less \
+             than the stroke winds up",
+            parts.len()
+        );
+        draft.notes.push(Note { line: contour.line, text });
+        self.front.parts.extend(parts.into_iter().map(Arc::new));
+        Ok(())
+    }
+
+    /// A path at one speed, entered and left at it.
+    fn begin_constant(
+        &mut self,
+        contour: Arc<Contour>,
+        draft: &mut Draft<'_>,
+    ) -> Result<(), PlanError> {
+        let top = contour.top_speed(&self.limits.path);
+        let mut speeds = self.speed_limits(&contour);
+        let fastest = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
+        let is_open = contour.demands().iter().all(|demand| demand.speed.is_none());
+        if is_open && top < fastest {
+            // One speed all along, as the job leaves it open.
+            let source = Source::TOOL_ACCELERATION;
+            speeds.iter_mut().for_each(|speed| {
+                (speed.speed, speed.source) = (speed.speed.min(top), source);
+            });
+        }
+        let fastest = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
+        let path = contour.trace(Some(fastest.min(top)), &self.limits.path);
+        let length = path.length();
+        let middle = |share: f64| path.at(length * share).motion(1.0, 0.0, 0.0);
+        let mut wanted = match self.wanted(&path, &middle) {
+            Ok(wanted) => wanted,
+            Err(cause) => return self.in_parts(&contour, cause, draft),
+        };
+        let mut ends = [true; 2];
+        for _ in 0..CONFIGURATIONS {
+            let trail = trail(&self.limits, &wanted, &path)
+                .map_err(|cause| self.refusal(Refused::Kinematics(cause)))?;
+            let mut run = self.run(contour.clone(), path.clone(), trail, speeds.clone());
+            run.follows = false;
+            let evenly = speeds.len() == 1 && fastest <= top;
+            let timed = self
+                .time_constant(&mut run, evenly, &mut ends, draft.shares)
+                .map_err(|cause| self.refusal(cause))?;
+            match self.enter(&run, &middle, draft.shares) {
+                Ok(entry) if entry.start.is_like(&wanted) => {
+                    return self.add_constant(run, timed, entry, draft);
+                }
+                Ok(entry) => wanted = entry.start,
+                // There is no room to come to speed.
+                Err(_) if ends[0] => ends[0] = false,
+                Err(cause) => return Err(self.refusal(cause)),
+            }
+        }
+        Err(self.refusal(Refused::NoConfiguration { tried: CONFIGURATIONS }))
+    }
+
+    fn add_constant(
+        &mut self,
+        run: PathRun<N>,
+        timed: Timed,
+        entry: Entry<N>,
+        draft: &mut Draft<'_>,
+    ) -> Result<(), PlanError> {
+        if run.follows {
+            let text =
+                "marked with power in proportion to the speed near its ends: there is no room to \
+                        come to speed in the dark"
+                    .to_owned();
+            let told = |notes: &[Note]| notes.iter().any(|note| note.text == text);
+            if !told(&self.notes) && !told(&draft.notes) {
+                draft.notes.push(Note { line: run.contour.line, text });
+            }
+        }
+        let stroke = self.front.light.stroke + 1;
+        for (duration, motion) in entry.motions {
+            self.push(duration, motion, stroke, draft);
+        }
+        self.front.moving = None;
+        self.front.now = entry.start;
+        self.add(run, timed, draft)
+    }
+
+    /// The configuration at the start of a path from which it can be gone, the nearest.
+    fn wanted(&self, path: &Path, middle: &PathFunction<'_>) -> Result<Configuration<N>, Refused> {
+        if self.limits.scope == Scope::PathAlone {
+            return Ok(self.front.now);
+        }
+        let first = path.at(0.0).motion(1.0, 0.0, 0.0);
+        if self.limits.mechanism.is_linear() {
+            let Configuration { joints, mut branch } = self.front.now;
+            let motion = self.limits.follow(&first, &mut branch, &joints)?;
+            let start = Configuration { joints: motion.position, branch };
+            walk(&self.limits, start, &[middle])?.within(&self.limits)?;
+            return Ok(start);
+        }
+        let found = candidates(&self.limits, &self.front.now, &first, &[middle])?;
+        found.first().map(|(start, _)| *start).ok_or(Refused::NoConfiguration { tried: 0 })
+    }
+
+    /// Times the first window of a path that is entered and left at speed, as far as `ends` say; sets
+    /// them to false where it must be at rest.
+    fn time_constant(
+        &self,
+        run: &mut PathRun<N>,
+        evenly: bool,
+        ends: &mut [bool; 2],
+        shares: &Tightening,
+    ) -> Result<Timed, Refused> {
+        let length = run.path.length();
+        let fastest = run.speeds[0].speed;
+        let mut speeds = [0.0; 2];
+        {
+            let mut along =
+                AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
+            along.is_tool_free = true;
+            let even = fastest * shares.speed;
+            if evenly && *ends == [true; 2] && keeps_even(&mut along, 0.0, length, even) {
+                run.even = Some(fastest);
+            }
+            if let Some(cause) = along.error {
+                return Err(Refused::Kinematics(cause));
+            }
+            (along.is_tool_free, along.is_exact) = (false, true);
+            for (end, (place, side)) in
+                [(0.0, Side::After), (length, Side::Before)].into_iter().enumerate()
+            {
+                let most = self.limits.path.rapid.max(self.limits.path.speed) * 2.0;
+                let allowed = even_speed(&mut along, place, side, most);
+                let demand =
+                    if end == 0 { run.speeds[0] } else { run.speeds[run.speeds.len() - 1] };
+                let asked = shares.speed * demand.speed;
+                // The speed asked for needs no room to begin to change: it is held.
+                let is_asked = allowed >= asked * (1.0 - 1e-9);
+                speeds[end] = if is_asked { asked } else { END_SHARE * allowed };
+            }
+        }
+        if run.even.is_some() {
+            run.begin = End::Moving { speed: fastest * shares.speed, acceleration: 0.0 };
+            run.exit = run.begin;
+            // The way to rest is there from the end of the path at this speed, or else from rest.
+            if self.can_leave(run, fastest * shares.speed, shares) {
+                return self.time(run, shares)?.map_err(|_| Refused::NoConfiguration { tried: 1 });
+            }
+            run.even = None;
+        }
+        let mut trials = [0; 2];
+        loop {
+            for end in 0..2 {
+                ends[end] &= trials[end] < END_TRIALS;
+            }
+            let [begin, exit] = [0, 1].map(|end| match ends[end] {
+                true => End::Moving { speed: speeds[end], acceleration: 0.0 },
+                false => End::Rest,
+            });
+            (run.begin, run.exit) = (begin, exit);
+            run.follows = ends.contains(&false);
+            if ends[1] && !self.can_leave(run, speeds[1], shares) {
+                trials[1] += 2;
+                speeds[1] *= END_SLOWER * END_SLOWER;
+                continue;
+            }
+            match self.time(run, shares)? {
+                Ok(timed) => return Ok(timed),
+                Err(found) => {
+                    let end = usize::from(found.at_end);
+                    let end = if ends[end] { end } else { 1 - end };
+                    if !ends[end] {
+                        return Err(Refused::NoConfiguration { tried: 1 });
+                    }
+                    speeds[end] *= if trials[end] == 0 { END_SHARE } else { END_SLOWER };
+                    trials[end] += 1;
+                }
+            }
+        }
+    }
+
+    /// Whether there is a way to rest from the end of a path that is passed at `speed` [m/s].
+    fn can_leave(&self, run: &PathRun<N>, speed: f64, shares: &Tightening) -> bool {
+        if self.limits.scope == Scope::PathAlone {
+            return true;
+        }
+        let end = run.path.on_side(run.path.length(), true);
+        let tool = end.motion(1.0, 0.0, 0.0);
+        let Configuration { joints, mut branch } = run.trail[run.trail.len() - 1].1;
+        let Ok(motion) = self.limits.follow(&tool, &mut branch, &joints) else { return false };
+        let now = Configuration { joints: motion.position, branch };
+        self.run_out(&state(&end, speed), &now, shares).is_some()
+    }
+
+    /// The tool's limits in a flight, with less of them where it is played slower.
+    fn flight_limits(&self, shares: &Tightening, slower: f64) -> FlightLimits {
+        let path = &self.limits.path;
+        FlightLimits {
+            speed: shares.speed * path.rapid.max(path.speed),
+            acceleration: shares.acceleration * path.acceleration * slower * slower,
+            jerk: shares.jerk * path.jerk * slower * slower * slower,
+        }
+    }
+
+    /// The way to rest from `state`, and where the joints then stand.
+    fn run_out(
+        &self,
+        state: &State,
+        now: &Configuration<N>,
+        shares: &Tightening,
+    ) -> Option<(Flight, Configuration<N>)> {
+        let mut slower = 1.0;
+        for _ in 0..RUN_TRIALS {
+            let limits = self.flight_limits(shares, slower);
+            if state.acceleration.norm() >= 0.999 * limits.acceleration && slower < 1.0 {
+                return None;
+            }
+            let flight = Flight::run_out(state, &limits);
+            if let Some(end) = follow_flight(&self.limits, self.area, now, &flight, shares) {
+                return Some((flight, end));
+            }
+            slower *= RUN_SLOWER;
+        }
+        None
+    }
+
+    /// The way from rest to `state`, where the joints are as in `start`.
+    fn run_in(
+        &self,
+        state: &State,
+        start: &Configuration<N>,
+        shares: &Tightening,
+    ) -> Option<Flight> {
+        let mut slower = 1.0;
+        for _ in 0..RUN_TRIALS {
+            let limits = self.flight_limits(shares, slower);
+            if state.acceleration.norm() >= 0.999 * limits.acceleration && slower < 1.0 {
+                return None;
+            }
+            let flight = Flight::run_in(state, &limits);
+            if let Some(first) = self.before(&flight, start)
+                && follow_flight(&self.limits, self.area, &first, &flight, shares).is_some()
+            {
+                return Some(flight);
+            }
+            slower *= RUN_SLOWER;
+        }
+        None
+    }
+
+    /// The joints at the start of a flight that ends in `end`.
+    fn before(&self, flight: &Flight, end: &Configuration<N>) -> Option<Configuration<N>> {
+        const STEPS: u32 = 16;
+        let mut now = *end;
+        for step in (0..STEPS).rev() {
+            let time = flight.duration() * f64::from(step) / f64::from(STEPS);
+            let motion =
+                self.limits.follow(&tool(flight, time), &mut now.branch, &now.joints).ok()?;
+            now.joints = motion.position;
+        }
+        Some(now)
+    }
+
+    /// Comes to the start of `run` as it begins: in a flight from where the tool is, or from rest.
+    fn enter(
+        &self,
+        run: &PathRun<N>,
+        middle: &PathFunction<'_>,
+        shares: &Tightening,
+    ) -> Result<Entry<N>, Refused> {
+        let first = run.path.at(0.0);
+        let End::Moving { speed, .. } = run.begin else {
+            return self.enter_from_rest(None, &first, middle, shares);
+        };
+        let to = state(&first, speed);
+        let flown =
+            (self.task.turns == Turns::Fly).then(|| self.fly(&to, middle, shares)).flatten();
+        let is_linear = self.limits.mechanism.is_linear();
+        match flown {
+            Some(entry) if is_linear => Ok(entry),
+            flown => match (flown, self.enter_from_rest(Some(&to), &first, middle, shares)) {
+                (Some(flown), Ok(other)) => {
+                    let quicker = Entry::time(&flown.motions) <= Entry::time(&other.motions);
+                    Ok(if quicker { flown } else { other })
+                }
+                (Some(flown), Err(_)) => Ok(flown),
+                (None, other) => other,
+            },
+        }
+    }
+
+    /// In one flight from where the tool is.
+    fn fly(&self, to: &State, middle: &PathFunction<'_>, shares: &Tightening) -> Option<Entry<N>> {
+        let from = match &self.front.moving {
+            Some(state) => *state,
+            None => State::rest(self.router(shares).tool().ok()?.position),
+        };
+        let now = self.front.now;
+        let follow = |flight: &Flight| follow_flight(&self.limits, self.area, &now, flight, shares);
+        let limits = self.flight_limits(shares, 1.0);
+        let flight = Flight::new(&from, to, &limits, &mut |flight| follow(flight).is_some())?;
+        let start = follow(&flight)?;
+        if self.limits.scope == Scope::Machine {
+            walk(&self.limits, start, &[middle]).ok()?.within(&self.limits).ok()?;
+        }
+        let motions = vec![(flight.duration(), Motion::Flight(Arc::new(flight)))];
+        Some(Entry { motions, start })
+    }
+
+    /// From rest: to where a run-in begins, or to the start itself.
+    fn enter_from_rest(
+        &self,
+        to: Option<&State>,
+        first: &Jet,
+        middle: &PathFunction<'_>,
+        shares: &Tightening,
+    ) -> Result<Entry<N>, Refused> {
+        let mut motions = Vec::new();
+        let mut router = self.router(shares);
+        if let Some(state) = &self.front.moving {
+            let found = self.run_out(state, &router.now, shares);
+            let (flight, end) = found.ok_or(Refused::NoConfiguration { tried: RUN_TRIALS })?;
+            motions.push((flight.duration(), Motion::Flight(Arc::new(flight))));
+            router.now = end;
+        }
+        let still = first.motion(1.0, 0.0, 0.0);
+        let Some(to) = to else {
+            let approach = router.approach(&still, &[middle])?;
+            motions.extend(approach.motion);
+            let start = self.joints_at(&still, &approach.start)?;
+            return Ok(Entry { motions, start });
+        };
+        let near = self.joints_at(&still, &self.wanted_near(&still, &router.now)?)?;
+        let run_in = self.run_in(to, &near, shares);
+        let run_in = run_in.ok_or(Refused::NoConfiguration { tried: RUN_TRIALS })?;
+        let into = |share: f64| tool(&run_in, run_in.duration() * share);
+        let approach = router.approach(&into(0.0), &[&into, middle])?;
+        motions.extend(approach.motion);
+        let end = if self.limits.scope == Scope::PathAlone {
+            approach.start
+        } else {
+            walk(&self.limits, approach.start, &[&into])?.end
+        };
+        let start = self.joints_at(&still, &end)?;
+        motions.push((run_in.duration(), Motion::Flight(Arc::new(run_in))));
+        Ok(Entry { motions, start })
+    }
+
+    /// Joints that bring the tool to `first` on some branch, the nearest to `now`.
+    fn wanted_near(
+        &self,
+        first: &ToolMotion,
+        now: &Configuration<N>,
+    ) -> Result<Configuration<N>, Refused> {
+        if self.limits.mechanism.is_linear() || self.limits.scope == Scope::PathAlone {
+            return Ok(*now);
+        }
+        let found = candidates(&self.limits, now, first, &[])?;
+        found.first().map(|(start, _)| *start).ok_or(Refused::NoConfiguration { tried: 0 })
+    }
+
+    fn joints_at(
+        &self,
+        first: &ToolMotion,
+        near: &Configuration<N>,
+    ) -> Result<Configuration<N>, Refused> {
+        let mut branch = near.branch;
+        let motion = self.limits.follow(first, &mut branch, &near.joints)?;
+        Ok(Configuration { joints: motion.position, branch })
+    }
+}
+
+/// The tool's state at a place of a path that is passed at an even speed [m/s].
+fn state(jet: &Jet, speed: f64) -> State {
+    let tool = jet.motion(speed, 0.0, 0.0);
+    State { position: tool.position, velocity: tool.velocity, acceleration: tool.acceleration }
+}

@@ -1,0 +1,258 @@
+//! A path in windows: the time law of the next stretch, closed by a stop, of which the first part is
+//! handed on.
+
+use std::sync::Arc;
+
+use machine::Mechanism;
+use messages::artwork::Artwork;
+use messages::artwork::Stroke;
+use nalgebra::Vector3;
+
+use super::paths::PathRun;
+use super::{Draft, Planning, Slowed};
+use crate::error::PlanError;
+use crate::geometry::contour::Contour;
+use crate::joint_space::configuration::{Configuration, Refused};
+use crate::law::flight::State;
+use crate::law::time_law::TimeLaw;
+use crate::law::windows::{between, straight};
+use crate::law::{End, Infeasible};
+use crate::limits::along::AlongPath;
+use crate::limits::source::Source;
+use crate::limits::tightening::Tightening;
+use crate::trajectory::Motion;
+
+/// The time that a window should take [s].
+const WINDOW: f64 = 1.2;
+
+/// The part of a window that is handed on; the rest is planned anew with what follows.
+const HANDED_ON: f64 = 0.6;
+
+/// A line that is marked at less than this share of the speed asked for is told.
+const SLOW: f64 = 0.99;
+
+/// How far a chord may lie from the curve in the artwork [m]: a little less than promised, for
+/// rounding.
+const CHORD: f64 = Artwork::CHORD_ERROR * 0.8;
+
+/// A stretch of a path, timed.
+pub(super) struct Timed {
+    pub(super) law: TimeLaw,
+    /// How the next stretch begins; `None` where the path ends.
+    pub(super) next: Option<End>,
+    /// From there to rest.
+    pub(super) fallback: Option<TimeLaw>,
+}
+
+impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
+    /// Times the next stretch of `run`.
+    pub(super) fn time(
+        &self,
+        run: &PathRun<N>,
+        shares: &Tightening,
+    ) -> Result<Result<Timed, Infeasible>, Refused> {
+        let length = run.path.length();
+        if let Some(speed) = run.even {
+            let speed = speed * shares.speed;
+            let to = (run.at + speed * WINDOW).min(length);
+            let law = TimeLaw::even(run.at, to, speed, run.speeds[0].source.0);
+            let next = End::Moving { speed, acceleration: 0.0 };
+            return Ok(Ok(Timed { law, next: (to < length).then_some(next), fallback: None }));
+        }
+        let mut along = AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
+        let is_whole = run.at == 0.0 && run.begin == End::Rest && run.exit == End::Rest;
+        if is_whole && run.path.is_straight() {
+            along.is_exact = true;
+            if let Some(law) = straight(&mut along, length) {
+                return Ok(Ok(Timed { law, next: None, fallback: None }));
+            }
+            along.is_exact = false;
+        }
+        if let Some(timed) = Self::plateau(run, &mut along) {
+            return Ok(Ok(timed));
+        }
+        let to = if length - run.at <= 1.3 * run.reach { length } else { run.at + run.reach };
+        let end = if to < length { End::Rest } else { run.exit };
+        if to < length
+            && let Some(timed) = Self::onto_plateau(run, &mut along, to)
+        {
+            return Ok(Ok(timed));
+        }
+        let law = between(&mut along, run.at, to, [run.begin, end]);
+        if let Some(cause) = along.error {
+            return Err(Refused::Kinematics(cause));
+        }
+        let law = match law {
+            Ok(law) => law,
+            Err(infeasible) => {
+                let Some(fallback) = &run.fallback else { return Ok(Err(infeasible)) };
+                let law = fallback.clone();
+                let next = (law.places().end < length).then_some(End::Rest);
+                return Ok(Ok(Timed { law, next, fallback: None }));
+            }
+        };
+        if to >= length {
+            return Ok(Ok(Timed { law, next: None, fallback: None }));
+        }
+        Ok(Ok(cut(law, run.at + HANDED_ON * (to - run.at))))
+    }
+
+    /// Goes on along the path that is under way.
+    pub(super) fn go_on(&mut self, draft: &mut Draft<'_>) -> Result<(), PlanError> {
+        let Some(mut run) = self.front.run.take() else { return Ok(()) };
+        let timed = self.time(&run, draft.shares).map_err(|cause| self.refusal(cause))?;
+        let timed = match timed {
+            Ok(timed) => timed,
+            // The end cannot be met at its speed: it is met at rest.
+            Err(_) => {
+                run.exit = End::Rest;
+                run.follows = true;
+                let timed = self.time(&run, draft.shares).map_err(|cause| self.refusal(cause))?;
+                timed.map_err(|found| self.stuck(&run, &found))?
+            }
+        };
+        self.add(run, timed, draft)
+    }
+
+    /// A motion that cannot go on, which the plan of the window before excludes.
+    fn stuck(&self, run: &PathRun<N>, found: &Infeasible) -> PlanError {
+        self.refusal(Refused::Kinematics(machine::kinematics::KinematicsError {
+            code: "no_time_law",
+            axis: None,
+            value: found.place,
+            limit: run.path.length(),
+            detail: "no speed was found at which the limits hold along this path",
+        }))
+    }
+
+    /// Adds a timed stretch of `run` to the draft, with its light.
+    pub(super) fn add(
+        &mut self,
+        mut run: PathRun<N>,
+        timed: Timed,
+        draft: &mut Draft<'_>,
+    ) -> Result<(), PlanError> {
+        let Timed { law, next, fallback } = timed;
+        let duration = law.duration();
+        if duration.is_nan() || duration >= super::LONGEST {
+            return Err(PlanError::TooLong { duration });
+        }
+        let start = self.front.time;
+        let before = self.front.light.stroke;
+        let begins = run.at == 0.0;
+        let marking = self.task.speeds.of(None);
+        let lit = self.front.light.path(&run.contour, &law, start, run.follows, marking);
+        lit.map_err(|short| self.too_short(short))?;
+        let stroke = if run.contour.is_lit() {
+            (before + 1).min(self.front.light.stroke.max(1))
+        } else {
+            before
+        };
+        if begins {
+            draft.strokes.extend(strokes(&run.contour));
+        }
+        self.account(&run, &law, draft);
+        let places = law.places();
+        run.reach = (WINDOW * (places.end - places.start) / duration).max(run.least_reach);
+        let motion = Motion::Path {
+            path: run.path.clone(),
+            law: Arc::new(law),
+            is_lit: run.contour.is_lit(),
+        };
+        self.push(duration, motion, stroke, draft);
+        match next {
+            Some(begin) => {
+                run.at = places.end;
+                run.begin = begin;
+                run.fallback = fallback;
+                self.front.run = Some(run);
+            }
+            None => self.leave(&run, draft.shares)?,
+        }
+        Ok(())
+    }
+
+    /// Ends a path: the joints are where it ends, at rest or moving.
+    fn leave(&mut self, run: &PathRun<N>, shares: &Tightening) -> Result<(), PlanError> {
+        let end = run.path.on_side(run.path.length(), true);
+        let tool = end.motion(1.0, 0.0, 0.0);
+        let Configuration { joints, mut branch } = run.trail[run.trail.len() - 1].1;
+        let motion = self.limits.follow(&tool, &mut branch, &joints);
+        let motion = motion.map_err(|cause| self.refusal(Refused::Kinematics(cause)))?;
+        self.front.now = Configuration { joints: motion.position, branch };
+        let speed = match (run.even, run.exit) {
+            (Some(speed), End::Moving { .. }) => Some(speed * shares.speed),
+            (None, End::Moving { speed, .. }) => Some(speed),
+            (_, End::Rest) => None,
+        };
+        self.front.moving = speed.map(|speed| {
+            let tool = end.motion(speed, 0.0, 0.0);
+            State {
+                position: tool.position,
+                velocity: tool.velocity,
+                acceleration: tool.acceleration,
+            }
+        });
+        Ok(())
+    }
+
+    /// Notes what bound the law, and where light was slower than asked.
+    fn account(&self, run: &PathRun<N>, law: &TimeLaw, draft: &mut Draft<'_>) {
+        let mut slowest: Option<Slowed> = None;
+        for part in law.binding() {
+            let middle = (part.places.start + part.places.end) / 2.0;
+            let line = run.line_at(middle);
+            let position: Vector3<f64> = run.path.at(middle).point;
+            if run.contour.is_lit() {
+                draft.bound.add(Source(part.limit), part.duration, line, position.into());
+            }
+            let Some(asked) = run.lit_speed_at(middle) else { continue };
+            let mean = (part.places.end - part.places.start) / part.duration;
+            let speed = run.even.map_or(mean.min(asked), |even| even * draft.shares.speed);
+            draft.speed = draft.speed.max(speed);
+            let slowed = Slowed { line, asked, speed, place: position };
+            let worse = slowest.is_none_or(|worst| speed / asked < worst.speed / worst.asked);
+            if !run.follows && speed < SLOW * asked && worse {
+                slowest = Some(slowed);
+            }
+        }
+        draft.slowed.extend(slowest);
+    }
+}
+
+/// The part of a law up to `place` that is handed on, and what is left of it as the way to rest.
+fn cut(law: TimeLaw, place: f64) -> Timed {
+    let (first, rest) = law.split(place);
+    if first.is_empty() || rest.is_empty() {
+        return Timed { law, next: Some(End::Rest), fallback: None };
+    }
+    let now = rest.at(0.0);
+    let next = if now.velocity > 0.0 {
+        End::Moving { speed: now.velocity, acceleration: now.acceleration }
+    } else {
+        End::Rest
+    };
+    Timed { law: first, next: Some(next), fallback: Some(rest) }
+}
+
+/// The lines that a contour marks, each from light to dark.
+fn strokes(contour: &Contour) -> Vec<Stroke> {
+    let mut strokes = Vec::new();
+    let mut open: Option<(f64, f64, u64)> = None;
+    for (demand, to) in contour.stretches() {
+        let is_lit = demand.power > 0.0;
+        open = match open {
+            Some((from, _, line)) if is_lit => Some((from, to, line)),
+            None if is_lit => Some((demand.from, to, demand.line)),
+            Some((from, end, line)) => {
+                strokes.push(Stroke { points: contour.points(from, end, CHORD), line });
+                None
+            }
+            None => None,
+        };
+    }
+    if let Some((from, end, line)) = open {
+        strokes.push(Stroke { points: contour.points(from, end, CHORD), line });
+    }
+    strokes
+}

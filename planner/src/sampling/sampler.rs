@@ -1,0 +1,454 @@
+//! The setpoint of every cycle: the tool's motion, the joints', the motors' lead and torque, the
+//! laser.
+//!
+//! The trajectory is looked at four times a cycle, for the lead. The effort of a sample is the mean
+//! over the cycle centred on it: the motor's torque steps with the jerk, up to a tenth of its
+//! peak, and a value at one instant would lose or double up to half a cycle of such a step.
+
+use std::sync::Arc;
+
+use machine::kinematics::{JointMotion, Joints, KinematicsError, ToolMotion};
+use machine::{Axis, Friction, Mechanism, StepperMotor};
+use messages::time::CYCLE_TIME;
+use messages::{GateEdge, LaserCycle, Setpoint, axis::axis_array, setpoint::flags};
+use nalgebra::Vector3;
+
+use crate::geometry::attitude::AttitudeLaw;
+use crate::joint_space::configuration::{branches, follow, keeps_margins};
+use crate::joint_space::joint_move::{JointLine, JointMove, JointsAt};
+use crate::sampling::backlash::BacklashCompensation;
+use crate::sampling::deflection::Deflection;
+use crate::trajectory::{Piece, Reference, Trajectory};
+
+/// Looks at the trajectory in a cycle; even, so that a sample lies on one.
+const STEPS: usize = 4;
+
+/// Time between two looks [s].
+const STEP: f64 = CYCLE_TIME / STEPS as f64;
+
+/// A stream ends once no motor is farther than this from where it will stay [joint units].
+const SETTLED: f64 = 1e-9;
+
+/// Nanoseconds in a cycle.
+const CYCLE: i64 = messages::time::CYCLE_PERIOD.0;
+
+/// How long a piece is kept after its end [s].
+const KEPT: f64 = 10.0 * CYCLE_TIME;
+
+/// Setpoints of a motion that becomes known piece by piece, in order.
+#[derive(Clone)]
+pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
+    mechanism: M,
+    /// What is known of the motion from a little before the next sample on.
+    trajectory: Trajectory,
+    is_complete: bool,
+    drives: [Drive; N],
+    stream: u64,
+    sequence: u64,
+    /// Index of the next look, in steps of [`STEP`] from the first sample.
+    look: i64,
+    cursor: usize,
+    /// Of a mechanism whose joints do not go straight with the tool: its branches, and the number of
+    /// the one that the joints are on.
+    branches: Vec<M::Branch>,
+    branch: usize,
+    joints: Joints<N>,
+    assembly: M::ChainState,
+    lead: Deflection<N>,
+    gaps: BacklashCompensation<N>,
+    axes: Arc<[Axis]>,
+    /// Speed of the motor side [joint units/s], and effort on the load side, at the last look.
+    motor_velocity: Joints<N>,
+    effort: Joints<N>,
+    laser: Gate,
+    next_output: usize,
+    outputs: u64,
+    next_pause: usize,
+    /// How far ahead of time the source is told [cycles].
+    told_ahead: f64,
+    end: i64,
+    state: Stream,
+}
+
+/// Where the stream is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stream {
+    Running,
+    /// Samples left after the motion has settled.
+    Ended,
+    /// A sample could not be made.
+    Broken(KinematicsError),
+}
+
+/// What the effort of an axis is made of.
+#[derive(Debug, Clone, Copy)]
+struct Drive {
+    ratio: f64,
+    inertia: f64,
+    friction: Friction,
+    stepper: Option<StepperMotor>,
+}
+
+impl Drive {
+    /// Adds to the lead of `axis` what a stepper's magnetic axis must be ahead of its rotor, which
+    /// moves at `velocity` [joint units/s]. A DC motor's angle is its rotor's.
+    ///
+    /// Like the rest of the lead it is then played with the square of the rate, the part of a
+    /// change of rate taken at the stiffness around zero torque.
+    fn lead_rotor(&self, axis: usize, velocity: f64, setpoint: &mut Setpoint) {
+        let Some(stepper) = &self.stepper else { return };
+        let speed = velocity / self.ratio;
+        let torque = setpoint.effort[axis] + self.friction.torque(speed);
+        // Beyond its torque there is no load angle: the checker refuses the sample for that torque.
+        let angle = stepper
+            .load_angle(torque, speed)
+            .unwrap_or_else(|_| stepper.largest_load_angle().copysign(torque));
+        setpoint.lead[axis] += self.ratio * angle;
+        let standing = stepper.load_angle(setpoint.static_effort[axis], 0.0);
+        setpoint.static_lead[axis] += self.ratio * standing.unwrap_or(0.0);
+        setpoint.lead_momentum[axis] += self.ratio * setpoint.momentum[axis] / stepper.stiffness();
+    }
+}
+
+/// The laser as the samples so far left it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gate {
+    next: usize,
+    power: f64,
+    stroke: u64,
+}
+
+/// The joints at one look.
+struct Look<const N: usize, A> {
+    reference: Reference,
+    motion: JointMotion<N>,
+    assembly: A,
+    effort: Joints<N>,
+}
+
+/// Why sampling stopped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Unreachable {
+    pub(crate) time: f64,
+    pub(crate) cause: KinematicsError,
+}
+
+impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
+    pub(crate) fn new(
+        mechanism: M,
+        axes: &[Axis],
+        rest: JointMove,
+        attitude: AttitudeLaw,
+        stream: u64,
+    ) -> Result<Self, KinematicsError> {
+        let motion = joint_motion(&rest.at(0.0));
+        let branch = rest.branch;
+        let branches = branches(&mechanism, &motion.position);
+        let assembly = mechanism.solve(&motion.position, branches[branch], None)?;
+        let effort = mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
+        let lead = Deflection::new(&mechanism, effort, STEP);
+        let gaps = BacklashCompensation::new(axes, &effort, STEP);
+        Ok(Self {
+            mechanism,
+            drives: std::array::from_fn(|axis| Drive {
+                ratio: axes[axis].ratio,
+                inertia: axes[axis].motor.rotor_inertia(),
+                friction: axes[axis].friction,
+                stepper: axes[axis].motor.stepper().copied(),
+            }),
+            trajectory: Trajectory { attitude, ..Trajectory::default() },
+            is_complete: false,
+            stream,
+            sequence: 0,
+            look: -(STEPS as i64) / 2,
+            cursor: 0,
+            branches,
+            branch,
+            joints: motion.position,
+            assembly,
+            lead,
+            gaps,
+            axes: axes.into(),
+            motor_velocity: Joints::zeros(),
+            effort,
+            laser: Gate::default(),
+            next_output: 0,
+            outputs: 0,
+            next_pause: 0,
+            told_ahead: 0.0,
+            end: 0,
+            state: Stream::Running,
+        })
+    }
+
+    /// Waits with each sample until the motion is known for `time` [s] more, since the laser source is
+    /// told so long before.
+    pub(crate) fn tell_ahead(&mut self, time: f64) {
+        self.told_ahead = time / CYCLE_TIME;
+    }
+
+    /// Goes on with `more`, which begins where the motion known so far ends; `is_last` says that nothing
+    /// comes after it.
+    pub(crate) fn extend(&mut self, more: &Trajectory, is_last: bool) {
+        self.forget();
+        self.trajectory.append(more);
+        self.is_complete = is_last;
+        self.end = (self.trajectory.end() / CYCLE_TIME).ceil() as i64;
+    }
+
+    /// Lets go what was sampled.
+    fn forget(&mut self) {
+        let before = self.sequence as f64 * CYCLE_TIME - KEPT;
+        let past = |piece: &Piece| piece.start + piece.duration < before;
+        let count = self.trajectory.pieces.iter().take_while(|piece| past(piece)).count();
+        let count = count.min(self.trajectory.pieces.len().saturating_sub(1));
+        self.trajectory.pieces.drain(..count);
+        self.cursor = self.cursor.saturating_sub(count);
+        self.trajectory.laser.drain(..self.laser.next);
+        self.laser.next = 0;
+        self.trajectory.outputs.drain(..self.next_output);
+        self.next_output = 0;
+        self.trajectory.pauses.drain(..self.next_pause);
+        self.next_pause = 0;
+    }
+
+    /// Whether the motion and the light are known as far as the next sample needs them. The source is
+    /// told ahead of time, so its changes lie before the motion that they belong to.
+    fn is_known(&self) -> bool {
+        let ahead = self.sequence as f64 + 1.0 + self.told_ahead;
+        self.is_complete || self.trajectory.end() >= ahead * CYCLE_TIME
+    }
+
+    /// Whether the last setpoint has been made.
+    pub(crate) fn has_ended(&self) -> bool {
+        self.state != Stream::Running
+    }
+
+    /// The piece at `time` [s].
+    pub(crate) fn piece_at(&self, time: f64) -> Option<&Piece> {
+        self.trajectory.piece_at(time)
+    }
+
+    /// What is said of the motion at `time` [s], near the last sample.
+    pub(crate) fn reference_at(&self, time: f64) -> Reference {
+        self.trajectory.at(time, &mut self.cursor.clone())
+    }
+
+    /// Why it ended early, if it did.
+    pub(crate) fn broken(&self) -> Option<Unreachable> {
+        match self.state {
+            Stream::Broken(cause) => {
+                Some(Unreachable { time: self.sequence as f64 * CYCLE_TIME, cause })
+            }
+            Stream::Running | Stream::Ended => None,
+        }
+    }
+
+    /// Where the tool is with the joints at `joints` [m or rad], near the last sample and on its
+    /// branch [m].
+    pub(crate) fn locate(&self, joints: &Joints<N>) -> Result<Vector3<f64>, KinematicsError> {
+        let branch = self.branches[self.branch];
+        Ok(self.mechanism.locate(joints, branch, Some(&self.assembly))?.position)
+    }
+
+    /// The mechanism with the joints at `joints` [m or rad], near the last sample and on its branch.
+    pub(crate) fn solve(&self, joints: &Joints<N>) -> Result<M::ChainState, KinematicsError> {
+        self.mechanism.solve(joints, self.branches[self.branch], Some(&self.assembly))
+    }
+
+    /// Goes on to the next look.
+    fn advance(&mut self) -> Result<Look<N, M::ChainState>, KinematicsError> {
+        self.look += 1;
+        let reference = self.trajectory.at(self.look as f64 * STEP, &mut self.cursor);
+        let motion = match &reference {
+            Reference::Tool(tool) => {
+                let tool = &self.trajectory.attitude.apply(tool)?;
+                follow(&self.mechanism, &self.branches, tool, &mut self.branch, &self.joints)?
+            }
+            Reference::Joints(at) => {
+                self.branch = at.branch;
+                joint_motion(at)
+            }
+        };
+        let branch = self.branches[self.branch];
+        let assembly = self.mechanism.solve(&motion.position, branch, Some(&self.assembly))?;
+        let effort =
+            self.mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
+        // Inertia changes slowly beside the jerk: its own rate is left out where only a spring
+        // without damper asks for it.
+        let effort_rate = self.mechanism.mass_matrix(&assembly) * motion.jerk;
+        self.lead.advance(&effort, &effort_rate);
+        self.gaps.advance(&self.axes, &effort, motion.velocity.amax() > 0.0);
+        self.joints = motion.position;
+        self.assembly = assembly;
+        self.effort = effort;
+        self.motor_velocity = motion.velocity + self.lead.rate() + self.gaps.speed();
+        Ok(Look { reference, motion, assembly, effort })
+    }
+
+    /// The tool's motion while the joints lead.
+    fn tool(&self, at: &JointsAt, assembly: &M::ChainState) -> Result<ToolMotion, KinematicsError> {
+        let branch = self.branches[at.branch];
+        let line = JointLine::<N>::of(&at.from, &at.change);
+        let (tool, _) = line.tool(&self.mechanism, branch, at.share, Some(assembly))?;
+        Ok(tool)
+    }
+
+    fn setpoint(&mut self) -> Result<Setpoint, KinematicsError> {
+        let before = self.motor_velocity;
+        let mut mean = self.effort / 2.0;
+        let mut add = |effort: &Joints<N>, weight: f64| mean += effort * weight;
+        for _ in 1..STEPS / 2 {
+            let look = self.advance()?;
+            add(&look.effort, 1.0);
+        }
+        let Look { reference, motion, assembly, effort } = self.advance()?;
+        let tool = match reference {
+            Reference::Tool(tool) => tool,
+            Reference::Joints(at) => self.tool(&at, &assembly)?,
+        };
+        keeps_margins(&self.mechanism, &assembly)?;
+        add(&effort, 1.0);
+        let in_gap = *self.gaps.value();
+        let lead = self.lead.value() + in_gap;
+        let motor_velocity = self.motor_velocity;
+        for _ in 1..STEPS / 2 {
+            let look = self.advance()?;
+            add(&look.effort, 1.0);
+        }
+        let look = self.advance()?;
+        add(&look.effort, 0.5);
+        mean /= STEPS as f64;
+        let acceleration = (self.motor_velocity - before) / CYCLE_TIME;
+
+        let gravity = self.mechanism.gravity(&assembly);
+        let impulse = self.mechanism.mass_matrix(&assembly) * motion.velocity;
+        let per_axis = |value: &dyn Fn(usize, &Drive) -> f64| {
+            let values: [f64; N] = std::array::from_fn(|axis| value(axis, &self.drives[axis]));
+            axis_array(&values)
+        };
+        let mut setpoint = Setpoint {
+            tool: tool.position.into(),
+            path_velocity: tool.velocity.norm(),
+            path_acceleration: tool.acceleration.norm(),
+            path_jerk: tool.jerk.norm(),
+            position: axis_array(motion.position.as_slice()),
+            velocity: axis_array(motion.velocity.as_slice()),
+            acceleration: axis_array(motion.acceleration.as_slice()),
+            jerk: axis_array(motion.jerk.as_slice()),
+            lead: axis_array(lead.as_slice()),
+            static_lead: axis_array((self.lead.settled(&gravity) + in_gap).as_slice()),
+            effort: per_axis(&|axis, drive| {
+                drive.inertia * acceleration[axis] / drive.ratio + drive.ratio * mean[axis]
+            }),
+            static_effort: per_axis(&|axis, drive| drive.ratio * gravity[axis]),
+            lead_momentum: axis_array(self.lead.settled(&impulse).as_slice()),
+            momentum: per_axis(&|axis, drive| {
+                drive.inertia * motion.velocity[axis] / drive.ratio + drive.ratio * impulse[axis]
+            }),
+            ..Setpoint::default()
+        };
+        for (axis, drive) in self.drives.iter().enumerate() {
+            drive.lead_rotor(axis, motor_velocity[axis], &mut setpoint);
+        }
+        Ok(setpoint)
+    }
+
+    /// The laser in the cycle that starts with sample `sequence`, and the stroke it lights. A change
+    /// that the cycle cannot hold is left to the next one; the checker refuses such a stream.
+    fn laser(&mut self) -> (LaserCycle, u64) {
+        let start = self.sequence as i64 * CYCLE;
+        let mut cycle = LaserCycle {
+            gate: gate(self.laser.power, self.laser.stroke),
+            power: self.laser.power,
+            ..LaserCycle::OFF
+        };
+        let mut stroke = self.laser.stroke;
+        while let Some(change) = self.trajectory.laser.get(self.laser.next) {
+            let offset = change.time.0 - start;
+            if offset >= CYCLE {
+                break;
+            }
+            let edge = GateEdge {
+                offset: u32::try_from(offset).unwrap_or(0),
+                gate: gate(change.power, change.stroke),
+                power: change.power,
+            };
+            if !cycle.push(edge) {
+                break;
+            }
+            self.laser =
+                Gate { next: self.laser.next + 1, power: change.power, stroke: change.stroke };
+            if change.stroke != 0 {
+                stroke = change.stroke;
+            }
+        }
+        (cycle, stroke)
+    }
+
+    /// Outputs and flags of the sample at `time`.
+    fn switch(&mut self, setpoint: &mut Setpoint, time: f64) {
+        while let Some(&(from, outputs)) = self.trajectory.outputs.get(self.next_output) {
+            if from > time {
+                break;
+            }
+            self.outputs = outputs;
+            self.next_output += 1;
+        }
+        setpoint.outputs = self.outputs;
+        if self.trajectory.pauses.get(self.next_pause).is_some_and(|&pause| pause <= time) {
+            self.next_pause += 1;
+            setpoint.flags |= flags::PAUSE;
+        }
+    }
+
+    /// Whether everything has come to rest.
+    fn is_settled(&self) -> bool {
+        self.sequence as i64 > self.end
+            && (self.lead.value() - self.lead.settled(&self.effort)).amax() <= SETTLED
+            && self.gaps.left() <= SETTLED
+    }
+}
+
+impl<const N: usize, M: Mechanism<N>> Iterator for Sampler<N, M> {
+    type Item = Setpoint;
+
+    fn next(&mut self) -> Option<Setpoint> {
+        if self.state != Stream::Running || !self.is_known() {
+            return None;
+        }
+        let mut setpoint = match self.setpoint() {
+            Ok(setpoint) => setpoint,
+            Err(cause) => {
+                self.state = Stream::Broken(cause);
+                return None;
+            }
+        };
+        setpoint.stream = self.stream;
+        setpoint.sequence = self.sequence;
+        (setpoint.laser, setpoint.stroke) = self.laser();
+        self.switch(&mut setpoint, self.sequence as f64 * CYCLE_TIME);
+        if self.is_settled() {
+            setpoint.flags |= flags::LAST;
+            self.state = Stream::Ended;
+        }
+        self.sequence += 1;
+        Some(setpoint)
+    }
+}
+
+/// The joints of a mechanism with `N` axes.
+fn joint_motion<const N: usize>(at: &JointsAt) -> JointMotion<N> {
+    let of = |array: &messages::AxisArray| Joints::from_fn(|axis, _| array[axis]);
+    JointMotion {
+        position: of(&at.position),
+        velocity: of(&at.velocity),
+        acceleration: of(&at.acceleration),
+        jerk: of(&at.jerk),
+    }
+}
+
+/// The gate of a sample: open for `stroke` where there is power.
+fn gate(power: f64, stroke: u64) -> u32 {
+    if power > 0.0 { u32::try_from(stroke).unwrap_or(u32::MAX) } else { 0 }
+}

@@ -1,0 +1,107 @@
+//! G-code programs in files: held, or read again as they are marked.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use machine::Machine;
+use planner::Job;
+use planner::drawing::{Action, Step};
+use planner::job::{JobError, gcode};
+
+/// A program of so many moves to and fro, in a file of its own folder.
+fn program(moves: u64) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("program.nc");
+    let mut text = String::from("G21 G90 T1\nM4 S100 F6000\n");
+    for index in 0..moves {
+        writeln!(text, "G1 X{} Y{}", index % 7, index % 5).unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    (folder, path)
+}
+
+fn steps(job: &Job) -> Vec<Step> {
+    job.steps().unwrap().collect::<Result<_, _>>().unwrap()
+}
+
+fn open(path: &Path) -> Job {
+    Job::open(path, &[], &Machine::builtin()).unwrap()
+}
+
+#[test]
+fn a_long_program_stays_in_its_file_and_has_the_same_steps() {
+    let machine = Machine::builtin();
+    let (_folder, path) = program(Job::HELD);
+    let (whole, long) = (Job::read(&path, &[], &machine).unwrap(), open(&path));
+    assert!(whole.rest.is_none());
+    assert!(long.rest.is_some() && long.drawing.steps.is_empty());
+    assert_eq!(steps(&long), whole.drawing.steps);
+    assert_eq!(steps(&long), steps(&whole));
+    assert_eq!((&long.survey, &long.program), (&whole.survey, &whole.program));
+    assert_eq!(
+        (&long.drawing.name, &long.drawing.notes),
+        (&whole.drawing.name, &whole.drawing.notes)
+    );
+    assert_eq!(long.drawing.notes.len(), 1);
+    assert_eq!(gcode::survey(&path, &machine).unwrap(), whole.survey.unwrap());
+
+    // What is put before the drawing comes before the steps of the file.
+    let mut moved = long.clone();
+    moved.approach_from([0.01, 0.02, 0.0].into());
+    let steps = steps(&moved);
+    assert_eq!(steps[0].action, Action::Rapid { to: long.drawing.start });
+    assert_eq!(steps[1..], whole.drawing.steps);
+}
+
+#[test]
+fn a_short_program_is_held() {
+    let (_folder, path) = program(100);
+    let job = open(&path);
+    assert!(job.rest.is_none());
+    assert_eq!(job.drawing.steps.len() as u64, job.survey.unwrap().steps);
+}
+
+#[test]
+fn a_job_file_opens_its_long_program_from_its_own_home() {
+    let (folder, path) = program(Job::HELD);
+    let file = folder.path().join("job.toml");
+    let text = "[gcode]\nfile = \"program.nc\"\n[surface.cylinder]\nradius = \"50 mm\"\n\
+                height = \"80 mm\"\n";
+    std::fs::write(&file, text).unwrap();
+    let machine = Machine::builtin();
+    let (whole, long) = (Job::read(&file, &[], &machine).unwrap(), open(&file));
+    assert!(long.rest.is_some());
+    assert_eq!(long.files, [path, file]);
+    assert_eq!(steps(&long), whole.drawing.steps);
+}
+
+#[test]
+fn a_file_that_changes_after_it_was_read_ends_the_steps_with_an_error() {
+    let (_folder, path) = program(Job::HELD);
+    let job = open(&path);
+    let mut steps = job.steps().unwrap();
+    steps.next().unwrap().unwrap();
+    let mut text = std::fs::read_to_string(&path).unwrap();
+    text.push_str("G1 X9\n");
+    std::fs::write(&path, &text).unwrap();
+    let error = steps.find_map(Result::err).unwrap();
+    assert!(error.to_string().contains("was changed after it was read first"), "{error}");
+    assert!(error.position().unwrap().0 > 1);
+    assert!(steps.next().is_none());
+    // Nor is another file read in its place.
+    let error = job.steps().unwrap().next().unwrap().unwrap_err();
+    assert!(error.to_string().contains("was changed"), "{error}");
+    std::fs::remove_file(&path).unwrap();
+    assert!(matches!(job.steps().err(), Some(JobError::Unreadable { .. })));
+}
+
+#[test]
+fn a_folder_is_no_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("program.nc");
+    std::fs::create_dir(&path).unwrap();
+    let error = Job::open(&path, &[], &Machine::builtin()).unwrap_err();
+    assert!(matches!(error, JobError::Unreadable { .. }), "{error}");
+}

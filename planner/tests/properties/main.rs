@@ -1,0 +1,199 @@
+//! What every plan of every drawing must keep, on random machines and drawings that shrink to the
+//! smallest that fails.
+//!
+//! Some hundred cases by default, the same ones each time; as many as are asked for, and others, by
+//! `GRAVER_CASES=1000000 GRAVER_SEED=7 cargo test --release -p planner --test properties`.
+
+#![allow(missing_docs, unreachable_pub, clippy::unwrap_used)]
+
+mod cases;
+mod checks;
+
+use cases::{CURVED, Case, Element, LINEAR, case};
+use machine::Machine;
+use messages::Setpoint;
+use planner::drawing::{Action, Step};
+use planner::{Job, plan};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
+
+/// Cases of all tests together.
+const CASES: u32 = 600;
+
+/// How much longer a job may get where it should not: the law is optimal to a few parts in a thousand.
+const LONGER: f64 = 1.01;
+
+/// What sampling adds to a duration [s].
+const CYCLES: f64 = 3e-3;
+
+/// Tries `test` with its share in a hundred of all cases on machines of `range`.
+fn for_cases(
+    share: u32,
+    range: std::ops::Range<usize>,
+    number: u8,
+    test: impl Fn(&Case, &Change) -> Result<(), TestCaseError>,
+) {
+    let of = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    let all = of("GRAVER_CASES").map_or(CASES, |cases| u32::try_from(cases).unwrap_or(u32::MAX));
+    let config = Config {
+        cases: (u64::from(all) * u64::from(share)).div_ceil(100) as u32,
+        failure_persistence: None,
+        max_shrink_iters: 3000,
+        max_shrink_time: 15_000,
+        max_global_rejects: u32::MAX,
+        ..Config::default()
+    };
+    let mut seed = [number; 32];
+    seed[..8].copy_from_slice(&of("GRAVER_SEED").unwrap_or(0).to_le_bytes());
+    let random = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
+    let mut runner = TestRunner::new_with_rng(config, random);
+    let found = runner.run(&(case(range), change()), |(case, change)| {
+        if case.leaves_at_an_axis_speed_limit() { Ok(()) } else { test(&case, &change) }
+    });
+    if let Err(failure) = found {
+        panic!("{failure}");
+    }
+}
+
+fn linear() -> std::ops::Range<usize> {
+    0..LINEAR.len()
+}
+
+fn curved() -> std::ops::Range<usize> {
+    LINEAR.len()..LINEAR.len() + CURVED.len()
+}
+
+/// One limit raised, or the feeds lowered.
+#[derive(Debug, Clone)]
+struct Change {
+    which: usize,
+    factor: f64,
+}
+
+fn change() -> impl Strategy<Value = Change> {
+    (0..7_usize, 1.05..8.0).prop_map(|(which, factor)| Change { which, factor })
+}
+
+impl Change {
+    /// Raises the limit.
+    fn raise(&self, machine: &mut Machine) {
+        let Self { which, factor } = *self;
+        match which {
+            0 => machine.path.speed *= factor,
+            1 => machine.path.rapid *= factor,
+            2 => machine.path.acceleration *= factor,
+            3 => machine.path.jerk *= factor,
+            which => machine.axes.iter_mut().for_each(|axis| match which {
+                4 => axis.limits.velocity *= factor,
+                5 => axis.limits.acceleration *= factor,
+                _ => axis.limits.jerk *= factor,
+            }),
+        }
+    }
+}
+
+/// The setpoints of a plan and its duration; `None` where it is refused for a place.
+fn planned(machine: &Machine, job: &Job) -> Result<Option<(f64, Vec<Setpoint>)>, TestCaseError> {
+    match plan(machine, job) {
+        Ok(plan) => Ok(Some((plan.facts.duration, plan.setpoints(1).collect()))),
+        Err(error) if checks::is_sound(&error) => Ok(None),
+        Err(error) => Err(TestCaseError::fail(format!("refused: {error}"))),
+    }
+}
+
+fn keeps_everything(case: &Case) -> Result<(), TestCaseError> {
+    let machine = case.machine();
+    let job = case.job(&machine);
+    let Some((duration, setpoints)) = planned(&machine, &job)? else { return Ok(()) };
+    prop_assert!(duration.is_finite() && duration < 7.0 * 86_400.0, "lasts {duration} s");
+    checks::keeps_everything(&setpoints, &job, &machine).map_err(TestCaseError::fail)?;
+    // What is within a tolerance of noise or of nothing may be drawn straight.
+    let is_plain = |element: &Element| !matches!(element, Element::Chords(..) | Element::Tiny(..));
+    if case.elements.iter().all(is_plain) && !case.elements.iter().any(is_dot) {
+        checks::marks_all(&setpoints, &job, &machine).map_err(TestCaseError::fail)?;
+    }
+    Ok(())
+}
+
+fn is_dot(element: &Element) -> bool {
+    matches!(element, Element::Dot(_))
+}
+
+fn raised_limits_never_cost_time(case: &Case, change: &Change) -> Result<(), TestCaseError> {
+    if case.limits.has_axis_limits_below_the_paths(change.which) || chooses_speeds(case, change) {
+        return Ok(());
+    }
+    let machine = case.machine();
+    let job = case.job(&machine);
+    let mut better = machine.clone();
+    change.raise(&mut better);
+    let Some((slow, fast)) = plan_both(&machine, &job, &better, &job)? else { return Ok(()) };
+    prop_assert!(fast <= slow * LONGER + CYCLES, "{fast} s with more, {slow} s with less");
+    Ok(())
+}
+
+fn lowered_feeds_never_save_time(case: &Case, change: &Change) -> Result<(), TestCaseError> {
+    if case.marks_at_one_speed() {
+        return Ok(());
+    }
+    let machine = case.machine();
+    let job = case.job(&machine);
+    let mut slower = job.clone();
+    slower.drawing.steps.iter_mut().for_each(|step| lower(step, machine.path.speed, change.factor));
+    let Some((slow, fast)) = plan_both(&machine, &slower, &machine, &job)? else { return Ok(()) };
+    prop_assert!(fast <= slow * LONGER + CYCLES, "{fast} s as drawn, {slow} s at a lower feed");
+    Ok(())
+}
+
+/// Whether a higher speed is not quicker: lines at one speed have a run-in, which is longer then.
+fn chooses_speeds(case: &Case, change: &Change) -> bool {
+    change.which == 0 && case.marks_at_one_speed()
+}
+
+fn lower(step: &mut Step, most: f64, factor: f64) {
+    match &mut step.action {
+        Action::Mark { speed, .. } => *speed = Some(speed.unwrap_or(most).min(most) / factor),
+        Action::Feed { speed, .. } => *speed /= factor,
+        _ => {}
+    }
+}
+
+/// The durations of two plans, unless one is refused for a place.
+fn plan_both(
+    one: &Machine,
+    job: &Job,
+    other: &Machine,
+    other_job: &Job,
+) -> Result<Option<(f64, f64)>, TestCaseError> {
+    let duration = |machine: &Machine, job: &Job| match plan(machine, job) {
+        Ok(plan) => Ok(Some(plan.facts.duration)),
+        Err(error) if checks::is_sound(&error) => Ok(None),
+        Err(error) => Err(TestCaseError::fail(format!("refused: {error}"))),
+    };
+    Ok(duration(one, job)?.zip(duration(other, other_job)?))
+}
+
+#[test]
+fn plans_on_straight_joints_keep_every_limit() {
+    for_cases(40, linear(), 1, |case, _| keeps_everything(case));
+}
+
+#[test]
+fn plans_on_turning_joints_keep_every_limit() {
+    for_cases(20, curved(), 2, |case, _| keeps_everything(case));
+}
+
+#[test]
+fn a_raised_limit_never_costs_time_on_straight_joints() {
+    for_cases(20, linear(), 3, raised_limits_never_cost_time);
+}
+
+#[test]
+fn a_raised_limit_never_costs_time_on_turning_joints() {
+    for_cases(5, curved(), 4, raised_limits_never_cost_time);
+}
+
+#[test]
+fn a_lowered_feed_never_saves_time() {
+    for_cases(15, linear(), 5, lowered_feeds_never_save_time);
+}

@@ -1,0 +1,350 @@
+//! The supervisor: a domain, its four services, and the jobs that run in it.
+//!
+//! `graver run` is a [`Pipeline`] with services of its own and one job; `graver domain` is one
+//! whose services systemd starts and whose jobs operators submit. The supervisor is not on the
+//! real-time path: it watches, asks and writes down.
+
+pub mod configuration;
+pub mod control;
+pub mod job_run;
+pub mod operators;
+pub mod power_up;
+pub mod services;
+pub mod status;
+
+use crate::exit::Failure;
+use configuration::Configuration;
+use control::JobControl;
+use machine::Machine;
+use messages::{
+    ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorReply, OperatorVerb,
+    PlannerReport, Progress,
+};
+use operators::{Operators, Submission};
+use power_up::PowerUp;
+use runtime::domain::Role;
+use runtime::operator::{OperatorError, OperatorLink};
+use runtime::peer::Peer;
+use runtime::{Domain, DomainError, Instance, Publisher, Samples, Subscriber, message};
+use services::{Ended, Recovery, Services};
+use status::StatusBoard;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// How often the supervisor polls the services.
+pub const POLL_INTERVAL: Duration = Duration::from_millis(10);
+
+/// The number of the job of a pipeline that has one only.
+const ONLY_JOB: u64 = 1;
+
+/// How long the axes may take to come to rest.
+const REST_PATIENCE: Duration = Duration::from_secs(10);
+
+/// How long the controller may take to answer when the pipeline ends: one that lives answers within
+/// a few cycles of its operators' thread.
+const LAST_ANSWER: Duration = Duration::from_millis(300);
+
+/// Who starts the services.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ServiceOwner {
+    /// This process does.
+    Own,
+    /// Somebody else does, such as systemd.
+    Others,
+}
+
+/// The newest of what the services say.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Latest {
+    /// From the controller.
+    pub progress: Progress,
+    /// From the controller.
+    pub controller: ControllerReport,
+    /// From drives.
+    pub drives: DrivesReport,
+    /// From the planner.
+    pub planner: PlannerReport,
+}
+
+struct Subscriptions {
+    progress: Subscriber<Progress>,
+    controller: Subscriber<ControllerReport>,
+    drives: Subscriber<DrivesReport>,
+    planner: Subscriber<PlannerReport>,
+}
+
+/// A domain with its services. Dropping it, in a panic too, is its ordered end: laser, axes,
+/// processes; nothing is left in shared memory afterwards.
+pub struct Pipeline {
+    /// The machine that it drives.
+    pub machine: Machine,
+    /// The newest of what the services say.
+    pub latest: Latest,
+    /// What operators see.
+    pub board: Arc<StatusBoard>,
+    /// What they ask of the job under way.
+    pub control: Arc<JobControl>,
+    operators: Operators,
+    link: Arc<OperatorLink>,
+    offers: Publisher<JobOffer>,
+    subscriptions: Subscriptions,
+    services: Services,
+    owner: ServiceOwner,
+    streams: u64,
+    domain: Domain,
+}
+
+impl Pipeline {
+    /// Creates the domain, and starts the services if they are its own. They need time to come up:
+    /// see [`PowerUp`].
+    ///
+    /// # Errors
+    /// An instance in use, or a service that cannot be started.
+    pub fn start(
+        instance: &Instance,
+        configuration: &Configuration,
+        owner: ServiceOwner,
+    ) -> Result<Self, Failure> {
+        for warning in instance.warnings() {
+            message::tell(&warning);
+        }
+        let machine = configuration.source.machine()?;
+        let domain = Domain::create(instance).map_err(Failure::service)?;
+        configuration.write(instance)?;
+        let subscriptions = Subscriptions {
+            progress: domain.subscriber(Samples::Latest).map_err(Failure::service)?,
+            controller: domain.subscriber(Samples::Latest).map_err(Failure::service)?,
+            drives: domain.subscriber(Samples::Latest).map_err(Failure::service)?,
+            planner: domain.subscriber(Samples::Latest).map_err(Failure::service)?,
+        };
+        let offers = domain.publisher().map_err(Failure::service)?;
+        let link = Arc::new(OperatorLink::start(&domain).map_err(Failure::service)?);
+        let board = Arc::new(StatusBoard::default());
+        let control = Arc::new(JobControl::default());
+        if owner == ServiceOwner::Own {
+            // Its one job is under way from here on: an operator who says stop means it.
+            control.begin(ONLY_JOB);
+        }
+        let answers = operators::Answers::new(link.clone(), board.clone(), control.clone());
+        let operators = Operators::bind(&domain, answers, owner)?;
+        let services = match owner {
+            ServiceOwner::Own => Services::start(&domain)?,
+            ServiceOwner::Others => Services::of_others(),
+        };
+        Ok(Self {
+            machine,
+            latest: Latest::default(),
+            board,
+            control,
+            operators,
+            link,
+            offers,
+            subscriptions,
+            services,
+            owner,
+            streams: 0,
+            domain,
+        })
+    }
+
+    /// Takes the latest samples; call it every [`POLL_INTERVAL`]. Services of its own that have ended are told.
+    ///
+    /// # Errors
+    /// A channel that fails.
+    pub fn poll(&mut self) -> Result<Vec<Ended>, Failure> {
+        // An offer is published once: a service that was started again has not heard it.
+        self.offers.greet().map_err(Failure::service)?;
+        let latest = &mut self.latest;
+        if let Some(sample) = self.subscriptions.progress.newest().map_err(Failure::service)? {
+            latest.progress = sample;
+        }
+        if let Some(sample) = self.subscriptions.controller.newest().map_err(Failure::service)? {
+            latest.controller = sample;
+        }
+        if let Some(sample) = self.subscriptions.drives.newest().map_err(Failure::service)? {
+            latest.drives = sample;
+        }
+        if let Some(sample) = self.subscriptions.planner.newest().map_err(Failure::service)? {
+            latest.planner = sample;
+        }
+        let ended = self.services.poll(&self.domain);
+        self.board.post(&self.latest, self.control.is_held(), &self.services.pids(&self.domain));
+        Ok(ended)
+    }
+
+    /// Offers a job to the planner under a new stream number, which it returns.
+    ///
+    /// # Errors
+    /// A path too long for an offer, or a channel that fails.
+    pub fn offer(&mut self, folder: &str) -> Result<u64, Failure> {
+        self.streams += 1;
+        let offer = JobOffer::new(self.streams, folder).ok_or_else(|| {
+            Failure::bad_input(format!(
+                "the path of the run folder is longer than {} bytes: {folder}",
+                messages::job::MAX_PATH
+            ))
+        })?;
+        self.offers.publish(&offer).map_err(Failure::service)?;
+        Ok(self.streams)
+    }
+
+    /// Withdraws the newest offer. What of it is being played goes on until the axes rest.
+    ///
+    /// # Errors
+    /// A channel that fails.
+    pub fn withdraw(&mut self) -> Result<(), Failure> {
+        self.take_back(JobOffer::default())
+    }
+
+    /// Withdraws the newest offer, of which nothing more will be played.
+    ///
+    /// # Errors
+    /// A channel that fails.
+    pub fn close(&mut self) -> Result<(), Failure> {
+        self.take_back(JobOffer { is_over: 1, ..JobOffer::default() })
+    }
+
+    fn take_back(&mut self, offer: JobOffer) -> Result<(), Failure> {
+        let offer = JobOffer { stream: self.streams, ..offer };
+        self.offers.publish(&offer).map_err(Failure::service)?;
+        Ok(())
+    }
+
+    /// Asks the controller; whether it agreed.
+    pub fn ask(&self, verb: OperatorVerb, value: f64) -> bool {
+        self.link.request(verb, value).is_ok_and(|reply| reply.accepted == 1)
+    }
+
+    /// Asks the controller, and waits for its answer at most `patience`.
+    ///
+    /// # Errors
+    /// No controller, or no answer.
+    pub fn request(
+        &self,
+        verb: OperatorVerb,
+        value: f64,
+        patience: Duration,
+    ) -> Result<OperatorReply, OperatorError> {
+        self.link.request_within(verb, value, patience)
+    }
+
+    /// A job that an operator submitted and nobody has taken yet.
+    pub fn submission(&self) -> Option<Submission> {
+        self.operators.submission()
+    }
+
+    /// Who starts the services.
+    pub fn owner(&self) -> ServiceOwner {
+        self.owner
+    }
+
+    /// The living process with this role in the domain.
+    pub fn peer(&self, role: Role) -> Option<Peer> {
+        self.domain.peer(role)
+    }
+
+    /// Whether a process with this role lives in the domain.
+    pub fn has(&self, role: Role) -> bool {
+        self.peer(role).is_some()
+    }
+
+    /// Makes sure that all shared memory of the domain is there, so that none can lack in a cycle.
+    ///
+    /// # Errors
+    /// What is lacking.
+    pub fn allocate(&self) -> Result<(), DomainError> {
+        self.domain.allocate()
+    }
+
+    /// The domain's own directory.
+    pub fn root(&self) -> PathBuf {
+        self.domain.instance().root()
+    }
+
+    /// Whether this process has started the service with this role, and it has not ended.
+    pub fn starts(&self, role: Role) -> bool {
+        self.services.runs(role)
+    }
+
+    /// Waits for the services, powers the motors and waits until the controller is ready for a
+    /// stream.
+    ///
+    /// # Errors
+    /// A service that does not come up or ends, or a controller that does not become ready.
+    pub fn enable(&mut self) -> Result<(), Failure> {
+        let mut power_up = PowerUp::begin();
+        loop {
+            for ended in self.poll()? {
+                match ended.recovery {
+                    Recovery::Stop => {
+                        return Err(Failure::service(format!("{ended} while starting")));
+                    }
+                    _ => message::tell(&ended.to_string()),
+                }
+            }
+            if power_up.advance(self).map_err(Failure::service)? {
+                return Ok(());
+            }
+            std::thread::sleep(POLL_INTERVAL);
+        }
+    }
+
+    /// Ends in order: laser, axes, processes. The same as dropping it, named so that the order is
+    /// seen.
+    pub fn shut_down(self) {
+        drop(self);
+    }
+
+    /// Laser off and axes to rest, then unpowered; as far as somebody is there to do it.
+    fn bring_to_rest(&mut self) {
+        let able = self.has(Role::Controller) && self.has(Role::Drives);
+        if !able || watchdog_tripped(&self.latest) {
+            return;
+        }
+        // Without an answer the controller hangs, and drives stops alone.
+        let _ = self.request(OperatorVerb::Stop, 0.0, LAST_ANSWER);
+        // What was heard before may be older than the last thing that was asked.
+        std::thread::sleep(POLL_INTERVAL);
+        let _ = self.poll();
+        self.wait(|latest| !is_moving(latest) || watchdog_tripped(latest));
+        let _ = self.request(OperatorVerb::Disable, 0.0, LAST_ANSWER);
+        self.wait(is_dark_and_at_rest);
+    }
+
+    fn wait(&mut self, condition: impl Fn(&Latest) -> bool) {
+        let started = Instant::now();
+        while !condition(&self.latest) && started.elapsed() < REST_PATIENCE {
+            let able = self.has(Role::Controller) && self.has(Role::Drives);
+            if !able || self.poll().is_err() {
+                return;
+            }
+            std::thread::sleep(POLL_INTERVAL);
+        }
+    }
+}
+
+impl Drop for Pipeline {
+    fn drop(&mut self) {
+        self.bring_to_rest();
+        self.services.stop();
+    }
+}
+
+/// Whether the controller moves the axes, or may.
+fn is_moving(latest: &Latest) -> bool {
+    matches!(
+        ControllerState::from_wire(latest.progress.state),
+        ControllerState::Running | ControllerState::Holding | ControllerState::Stopping
+    )
+}
+
+/// Whether drives says that the laser is off and the axes rest, for good.
+fn is_dark_and_at_rest(latest: &Latest) -> bool {
+    latest.drives.at_rest == 1 && latest.drives.lit == 0
+}
+
+/// Whether drives has stopped the axes without the controller.
+fn watchdog_tripped(latest: &Latest) -> bool {
+    latest.drives.fault.is_some() && is_dark_and_at_rest(latest)
+}
