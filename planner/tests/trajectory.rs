@@ -328,7 +328,7 @@ fn check_stream(plan: &Plan, case: &str) {
 }
 
 /// Drawings whose law is beyond the jerk for an instant between the places where it is held to it.
-const BEYOND_THE_JERK: [u64; 5] = [28, 54, 57, 67, 82];
+const BEYOND_THE_JERK: [u64; 5] = [11, 28, 54, 57, 67, 82];
 
 #[test]
 fn random_drawings_are_smooth_and_keep_their_limits() {
@@ -449,7 +449,8 @@ fn a_mark_off_the_area_is_refused_with_its_place() {
         other => panic!("{other}"),
     };
     assert_eq!((found.quantity, found.limit), (Quantity::ToolPosition(0), 0.2));
-    assert!(found.value > 0.2 && found.value < 0.2003, "{}", found.value);
+    // The end of the drawn line, which says how much is missing.
+    assert!((found.value - 0.22).abs() < 1e-9, "{}", found.value);
     let message = plan(&machine, &line_along_x(0.12, &machine)).unwrap_err().to_string();
     assert!(message.contains("of the tool"), "{message}");
 }
