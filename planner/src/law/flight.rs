@@ -128,15 +128,17 @@ impl Flight {
         search::fitting(from, to, limits, fits)
     }
 
-    /// From rest into `to` in the shortest time found, wherever that starts; `to` keeps `limits`.
-    pub fn run_in(to: &State, limits: &FlightLimits) -> Self {
+    /// From rest into `to` in the shortest time found, wherever that starts; `to` keeps `limits`. `None`
+    /// where no motion was found.
+    pub fn run_in(to: &State, limits: &FlightLimits) -> Option<Self> {
         run::into(to, limits)
     }
 
-    /// From `from` to rest in the shortest time found, wherever that ends; `from` keeps `limits`.
-    pub fn run_out(from: &State, limits: &FlightLimits) -> Self {
+    /// From `from` to rest in the shortest time found, wherever that ends; `from` keeps `limits`. `None`
+    /// where no motion was found.
+    pub fn run_out(from: &State, limits: &FlightLimits) -> Option<Self> {
         let back = State { velocity: -from.velocity, ..*from };
-        run::into(&back, limits).reversed()
+        run::into(&back, limits).map(|flight| flight.reversed())
     }
 
     /// [s].

@@ -154,17 +154,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     pub(super) fn halt(&mut self, draft: &mut Draft<'_>) -> Result<(), PlanError> {
         let Some(state) = self.front.moving.take() else { return Ok(()) };
         let now = self.front.now;
-        let found = self.run_out(&state, &now, draft.shares);
-        // The path before ended in motion because there was a way to rest within all limits; with less
-        // of them there is one that may be longer.
-        let (flight, end) = match found {
-            Some(found) => found,
-            None => {
-                let all = Tightening::none(N);
-                let found = self.run_out(&state, &now, &all);
-                found.ok_or_else(|| self.refusal(Refused::NoConfiguration { tried: RUN_TRIALS }))?
-            }
-        };
+        let (flight, end) =
+            self.way_to_rest(&state, &now, draft.shares).map_err(|cause| self.refusal(cause))?;
         let stroke = self.front.light.stroke;
         self.push(flight.duration(), Motion::Flight(Arc::new(flight)), stroke, draft);
         self.front.now = end;
@@ -465,6 +456,19 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         }
     }
 
+    /// The way to rest where a path has ended in motion: it did so because there was one within all
+    /// limits, so with less of them the longer one that keeps them, or else that.
+    fn way_to_rest(
+        &self,
+        state: &State,
+        now: &Configuration<N>,
+        shares: &Tightening,
+    ) -> Result<(Flight, Configuration<N>), Refused> {
+        self.run_out(state, now, shares)
+            .or_else(|| self.run_out(state, now, &Tightening::none(N)))
+            .ok_or(Refused::NoConfiguration { tried: RUN_TRIALS })
+    }
+
     /// The way to rest from `state`, and where the joints then stand.
     fn run_out(
         &self,
@@ -478,8 +482,9 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             if state.acceleration.norm() >= 0.999 * limits.acceleration && slower < 1.0 {
                 return None;
             }
-            let flight = Flight::run_out(state, &limits);
-            if let Some(end) = follow_flight(&self.limits, self.area, now, &flight, shares) {
+            if let Some(flight) = Flight::run_out(state, &limits)
+                && let Some(end) = follow_flight(&self.limits, self.area, now, &flight, shares)
+            {
                 return Some((flight, end));
             }
             slower *= RUN_SLOWER;
@@ -500,8 +505,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             if state.acceleration.norm() >= 0.999 * limits.acceleration && slower < 1.0 {
                 return None;
             }
-            let flight = Flight::run_in(state, &limits);
-            if let Some(first) = self.before(&flight, start)
+            if let Some(flight) = Flight::run_in(state, &limits)
+                && let Some(first) = self.before(&flight, start)
                 && follow_flight(&self.limits, self.area, &first, &flight, shares).is_some()
             {
                 return Some(flight);
@@ -581,8 +586,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let mut motions = Vec::new();
         let mut router = self.router(shares);
         if let Some(state) = &self.front.moving {
-            let found = self.run_out(state, &router.now, shares);
-            let (flight, end) = found.ok_or(Refused::NoConfiguration { tried: RUN_TRIALS })?;
+            let (flight, end) = self.way_to_rest(state, &router.now, shares)?;
             motions.push((flight.duration(), Motion::Flight(Arc::new(flight))));
             router.now = end;
         }

@@ -1,9 +1,10 @@
 //! Every sample of a plan against every limit of path, area and axes, before the first one is sent.
 
 use machine::trip::Limit;
+use machine::trip::following::DISCONTINUITY;
 use machine::{Axis, DcMotor, Friction, Machine, Motor, PathLimits, WorkArea};
-use messages::Setpoint;
 use messages::time::CYCLE_TIME;
+use messages::{AxisArray, Setpoint};
 
 use messages::plan::LimitUtilization;
 
@@ -35,6 +36,8 @@ pub enum Quantity {
     PathDeviation,
     /// Position of a joint [m or rad].
     JointPosition,
+    /// How far a joint is from where the speeds of two setpoints that follow each other lead [m or rad].
+    JointJump,
     /// Speed of a joint [m/s or rad/s].
     JointVelocity,
     /// Acceleration of a joint [m/s² or rad/s²].
@@ -65,6 +68,7 @@ impl Quantity {
             Self::ToolJerk => "jerk of the tool",
             Self::PathDeviation => "deviation from the drawn path",
             Self::JointPosition => "joint position",
+            Self::JointJump => "jump of a joint",
             Self::JointVelocity => "joint velocity",
             Self::JointAcceleration => "joint acceleration",
             Self::JointJerk => "joint jerk",
@@ -78,7 +82,7 @@ impl Quantity {
 
     /// Whether it says where something is, so that no other speed along the same way changes it.
     pub fn is_place(self) -> bool {
-        matches!(self, Self::ToolPosition(_) | Self::JointPosition)
+        matches!(self, Self::ToolPosition(_) | Self::JointPosition | Self::JointJump)
     }
 
     /// Whether it comes of all the motion before, and not of that at one instant.
@@ -118,6 +122,8 @@ pub(crate) struct Checker {
     scope: Scope,
     /// The motors at the sample before: angle [rad] and current [A].
     before: Option<Vec<(f64, f64)>>,
+    /// The joints at the sample before: position and velocity.
+    joints_before: Option<(AxisArray, AxisArray)>,
     /// Mean square of each motor's current, as the controller's watch averages it [A²].
     heating: Vec<f64>,
     uses: LimitUtilization,
@@ -133,6 +139,7 @@ impl Checker {
             dark: path.rapid.max(path.speed),
             scope,
             before: None,
+            joints_before: None,
             heating: none(),
             uses: LimitUtilization {
                 velocity: none(),
@@ -207,6 +214,14 @@ impl Checker {
             let nearest = position.clamp(limits.position[0], limits.position[1]);
             let [place, speed, acceleration, jerk] = axis.unit.names();
             within(position, nearest, time, name, Quantity::JointPosition, place)?;
+            if let Some((positions, velocities)) = &self.joints_before {
+                let mean = (velocities[index] + setpoint.velocity[index]) / 2.0;
+                let jump = (position - positions[index] - mean * CYCLE_TIME).abs();
+                // What supervision forgives, and what a change of acceleration in the cycle makes.
+                let most = DISCONTINUITY * limits.following_error
+                    + setpoint.acceleration[index].abs() * CYCLE_TIME * CYCLE_TIME;
+                below(jump, most, 1.0, time, name, Quantity::JointJump, place)?;
+            }
             let demands = [
                 (
                     setpoint.velocity[index],
@@ -229,6 +244,7 @@ impl Checker {
                 *most = most.max(share);
             }
         }
+        self.joints_before = Some((setpoint.position, setpoint.velocity));
         Ok(())
     }
 

@@ -37,12 +37,15 @@ struct Pair {
     swing: Swing,
 }
 
-/// The shortest found from rest into `to`.
-pub(super) fn into(to: &State, limits: &FlightLimits) -> Flight {
+/// The shortest found from rest into `to`; `None` where there is none.
+pub(super) fn into(to: &State, limits: &FlightLimits) -> Option<Flight> {
     let speed = to.velocity.norm();
     let wanted = to.acceleration.norm();
-    if !to.is_finite() || (speed <= ROUNDING && wanted <= STRAIGHT) {
-        return Flight::nothing(to);
+    if !to.is_finite() {
+        return None;
+    }
+    if speed <= ROUNDING && wanted <= STRAIGHT {
+        return Some(Flight::nothing(to));
     }
     // The state itself is never in question.
     let limits = FlightLimits {
@@ -52,12 +55,12 @@ pub(super) fn into(to: &State, limits: &FlightLimits) -> Flight {
     };
     if wanted <= STRAIGHT {
         let ramp = Ramp::to_speed(speed, limits.acceleration, limits.jerk);
-        return Pair { ramp, swing: Swing::default() }.flight(to);
+        return Some(Pair { ramp, swing: Swing::default() }.flight(to));
     }
     let gridded = search::free(to, &limits);
     let across = to.velocity.dot(&to.acceleration).abs() <= 1e-9 * speed * wanted;
     let paired = across.then(|| paired(to, &limits));
-    search::shorter(gridded, paired).unwrap_or_else(|| Flight::nothing(to))
+    search::shorter(gridded, paired)
 }
 
 /// Into `to`, whose acceleration is across its velocity, by a ramp and a swing.
