@@ -50,6 +50,8 @@ pub(crate) struct Planner {
     best: Vec<f64>,
     limits: Vec<u16>,
     effort: Effort,
+    /// Whether the first programme of the last stretch found no answer.
+    has_failed: bool,
 }
 
 /// Plans one stretch, see [`Planner::plan`].
@@ -76,6 +78,7 @@ impl Planner {
         settings: &Settings,
     ) -> Result<TimeLaw, Infeasible> {
         self.effort = Effort::default();
+        self.has_failed = false;
         self.solver.steps = 0;
         let length = to - from;
         if !(length > 0.0 && length.is_finite()) {
@@ -86,6 +89,12 @@ impl Planner {
         self.verify(limits, &stretch, settings);
         self.effort.steps = self.solver.steps;
         Ok(self.law(&stretch))
+    }
+
+    /// Whether the last law is only a slow one within the limits, since the programme found no answer
+    /// with these cells.
+    pub(crate) fn has_failed(&self) -> bool {
+        self.has_failed
     }
 
     /// What the last law took.
@@ -208,6 +217,7 @@ impl Planner {
                 if round > 0 {
                     break;
                 }
+                self.has_failed = true;
                 self.first_way(stretch, settings)?;
             }
             let time = self.time(stretch);
