@@ -13,6 +13,9 @@ use crate::limits::motion_limits::{MotionLimits, Scope};
 use crate::limits::source::Source;
 use crate::limits::tightening::Tightening;
 
+/// How far beside a border its sides are looked at [m]: more than rounding, less than any span.
+const NEAR: f64 = 1e-13;
+
 /// A speed that the tool must keep from a place on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SpeedLimit {
@@ -101,8 +104,15 @@ impl<const N: usize, M: Mechanism<N>> Limits for AlongPath<'_, '_, N, M> {
 
     fn site(&mut self, place: f64, side: Side, rows: &mut Vec<Row>) -> Site {
         let start = rows.len();
-        let place = place.clamp(0.0, self.path.length());
-        match self.look(place, side == Side::Before, rows) {
+        let length = self.path.length();
+        // A border that comes back from the law may be off by rounding: the side decides.
+        let aside = NEAR.max(length * f64::EPSILON * 2.0);
+        let place = match side {
+            Side::Before => place - aside,
+            Side::At => place,
+            Side::After => place + aside,
+        };
+        match self.look(place.clamp(0.0, length), side == Side::Before, rows) {
             Ok(local) => site(&local, start, rows),
             Err(cause) => refused(&mut self.error, cause, start, rows),
         }
