@@ -19,6 +19,9 @@ const LEAST_LOOKS: f64 = 12.0;
 /// A joint that goes farther than this between two looks jumps [m or rad].
 const JUMP: f64 = 0.3;
 
+/// Joints nearer to each other than this are the same [m or rad].
+const SAME: f64 = 1e-8;
+
 /// Rounding at the edge of the area and at a soft limit [m or rad].
 const ROUNDING: f64 = 1e-9;
 
@@ -47,6 +50,11 @@ pub(crate) fn follow_flight<const N: usize, M: Mechanism<N>>(
     for index in 0..=count {
         let tool = tool(flight, flight.duration() * index as f64 / count as f64);
         now = step(limits, &now, &tool, shares, &mut rows).ok()??;
+        // A tool that must first be turned cannot fly from here.
+        let starts_elsewhere = index == 0 && (now.joints - start.joints).amax() > SAME;
+        if starts_elsewhere && limits.scope == Scope::Machine {
+            return None;
+        }
     }
     Some(now)
 }

@@ -134,6 +134,25 @@ impl<const N: usize, M: Mechanism<N>> Router<'_, '_, N, M> {
         Ok(())
     }
 
+    /// That the joints stand as a motion of the tool from here asks for: it may be turned otherwise.
+    fn starts_here(&self, tool: &ToolMotion) -> Result<(), KinematicsError> {
+        /// Joints nearer to each other than this are the same [m or rad].
+        const SAME: f64 = 1e-8;
+        let mut branch = self.now.branch;
+        let motion = self.limits.follow(tool, &mut branch, &self.now.joints)?;
+        let off = motion.position - self.now.joints;
+        if off.amax() <= SAME {
+            return Ok(());
+        }
+        Err(KinematicsError {
+            code: "discontinuous",
+            axis: Some(off.iamax()),
+            value: off.amax(),
+            limit: SAME,
+            detail: "the tool would have to be turned before a straight move",
+        })
+    }
+
     /// The way straight with the tool to where `parts` begin.
     fn straight(
         &self,
@@ -145,6 +164,9 @@ impl<const N: usize, M: Mechanism<N>> Router<'_, '_, N, M> {
         let line =
             |share: f64| ToolMotion { velocity: to - from, ..still(from + (to - from) * share) };
         let is_free = self.limits.scope == Scope::PathAlone;
+        if !is_free {
+            self.starts_here(&line(0.0))?;
+        }
         let start = if (to - from).norm() <= NOTHING || is_free {
             self.now
         } else {
