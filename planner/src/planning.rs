@@ -1,8 +1,10 @@
 //! The planning of a job, window by window: each is timed, sampled and checked before it is handed
 //! on, and from the end of each there is a way to rest.
 
+mod entry;
 mod paths;
 mod plateau;
+mod runs;
 mod windows;
 
 use std::collections::VecDeque;

@@ -3,22 +3,19 @@
 use std::sync::Arc;
 
 use machine::Mechanism;
-use machine::kinematics::ToolMotion;
 
+use super::entry::Entry;
 use super::windows::Timed;
 use super::{Draft, Planning};
-use crate::drawing::{Note, Turns};
+use crate::drawing::Note;
 use crate::error::{Place, PlanError};
 use crate::geometry::contour::Contour;
-use crate::geometry::jet::Jet;
 use crate::geometry::path::Path;
 use crate::joint_space::configuration::{
     Configuration, PathFunction, Refused, candidates, trail, walk,
 };
-use crate::joint_space::follow_flight::{follow_flight, tool};
 use crate::joint_space::unwind::divide;
 use crate::law::End;
-use crate::law::flight::{Flight, FlightLimits, State};
 use crate::law::row::Side;
 use crate::law::time_law::TimeLaw;
 use crate::law::windows::{even_speed, keeps_even};
@@ -28,7 +25,6 @@ use crate::limits::along::{AlongPath, SpeedLimit};
 use crate::limits::motion_limits::Scope;
 use crate::limits::source::Source;
 use crate::limits::tightening::Tightening;
-use crate::trajectory::Motion;
 use crate::verify::checker::{LimitViolation, Quantity};
 
 /// How much of the speed that an end allows it is passed at, so that its limits leave room to
@@ -38,10 +34,6 @@ const END_SHARE: f64 = 0.995;
 /// How much slower an end is tried that cannot be met, and how often before it is met at rest.
 const END_SLOWER: f64 = 0.8;
 const END_TRIALS: usize = 14;
-
-/// How much slower a run-in or run-out is tried that the axes cannot follow, and how often.
-const RUN_SLOWER: f64 = 0.87;
-const RUN_TRIALS: usize = 24;
 
 /// How often another configuration is timed where the one before cannot be reached.
 const CONFIGURATIONS: usize = 7;
@@ -84,19 +76,6 @@ impl<const N: usize> PathRun<N> {
         demands.get(after.max(1) - 1).filter(|demand| demand.power > 0.0)?;
         let after = self.speeds.partition_point(|speed| speed.from <= place);
         Some(self.speeds[after.max(1) - 1].speed)
-    }
-}
-
-/// How the tool comes to the start of a path.
-struct Entry<const N: usize> {
-    motions: Vec<(f64, Motion)>,
-    /// The configuration at the start of the path.
-    start: Configuration<N>,
-}
-
-impl Entry<0> {
-    fn time(motions: &[(f64, Motion)]) -> f64 {
-        motions.iter().map(|(time, _)| time).sum()
     }
 }
 
@@ -147,18 +126,6 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
                 }
             }
         }
-        Ok(())
-    }
-
-    /// Comes to rest, if the tool moves.
-    pub(super) fn halt(&mut self, draft: &mut Draft<'_>) -> Result<(), PlanError> {
-        let Some(state) = self.front.moving.take() else { return Ok(()) };
-        let now = self.front.now;
-        let (flight, end) =
-            self.way_to_rest(&state, &now, draft.shares).map_err(|cause| self.refusal(cause))?;
-        let stroke = self.front.light.stroke;
-        self.push(flight.duration(), Motion::Flight(Arc::new(flight)), stroke, draft);
-        self.front.now = end;
         Ok(())
     }
 
@@ -432,213 +399,4 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             }
         }
     }
-
-    /// Whether there is a way to rest from the end of a path that is passed at `speed` [m/s].
-    fn can_leave(&self, run: &PathRun<N>, speed: f64, shares: &Tightening) -> bool {
-        if self.limits.scope == Scope::PathAlone {
-            return true;
-        }
-        let end = run.path.on_side(run.path.length(), true);
-        let tool = end.motion(1.0, 0.0, 0.0);
-        let Configuration { joints, mut branch } = run.trail[run.trail.len() - 1].1;
-        let Ok(motion) = self.limits.follow(&tool, &mut branch, &joints) else { return false };
-        let now = Configuration { joints: motion.position, branch };
-        self.run_out(&state(&end, speed), &now, shares).is_some()
-    }
-
-    /// The tool's limits in a flight, with less of them where it is played slower.
-    fn flight_limits(&self, shares: &Tightening, slower: f64) -> FlightLimits {
-        let path = &self.limits.path;
-        FlightLimits {
-            speed: shares.speed * path.rapid.max(path.speed),
-            acceleration: shares.acceleration * path.acceleration * slower * slower,
-            jerk: shares.jerk * path.jerk * slower * slower * slower,
-        }
-    }
-
-    /// The way to rest where a path has ended in motion: it did so because there was one within all
-    /// limits, so with less of them the longer one that keeps them, or else that.
-    fn way_to_rest(
-        &self,
-        state: &State,
-        now: &Configuration<N>,
-        shares: &Tightening,
-    ) -> Result<(Flight, Configuration<N>), Refused> {
-        self.run_out(state, now, shares)
-            .or_else(|| self.run_out(state, now, &Tightening::none(N)))
-            .ok_or(Refused::NoConfiguration { tried: RUN_TRIALS })
-    }
-
-    /// The way to rest from `state`, and where the joints then stand.
-    fn run_out(
-        &self,
-        state: &State,
-        now: &Configuration<N>,
-        shares: &Tightening,
-    ) -> Option<(Flight, Configuration<N>)> {
-        let mut slower = 1.0;
-        for _ in 0..RUN_TRIALS {
-            let limits = self.flight_limits(shares, slower);
-            if state.acceleration.norm() >= 0.999 * limits.acceleration && slower < 1.0 {
-                return None;
-            }
-            if let Some(flight) = Flight::run_out(state, &limits)
-                && let Some(end) = follow_flight(&self.limits, self.area, now, &flight, shares)
-            {
-                return Some((flight, end));
-            }
-            slower *= RUN_SLOWER;
-        }
-        None
-    }
-
-    /// The way from rest to `state`, where the joints are as in `start`.
-    fn run_in(
-        &self,
-        state: &State,
-        start: &Configuration<N>,
-        shares: &Tightening,
-    ) -> Option<Flight> {
-        let mut slower = 1.0;
-        for _ in 0..RUN_TRIALS {
-            let limits = self.flight_limits(shares, slower);
-            if state.acceleration.norm() >= 0.999 * limits.acceleration && slower < 1.0 {
-                return None;
-            }
-            if let Some(flight) = Flight::run_in(state, &limits)
-                && let Some(first) = self.before(&flight, start)
-                && follow_flight(&self.limits, self.area, &first, &flight, shares).is_some()
-            {
-                return Some(flight);
-            }
-            slower *= RUN_SLOWER;
-        }
-        None
-    }
-
-    /// The joints at the start of a flight that ends in `end`.
-    fn before(&self, flight: &Flight, end: &Configuration<N>) -> Option<Configuration<N>> {
-        const STEPS: u32 = 16;
-        let mut now = *end;
-        for step in (0..STEPS).rev() {
-            let time = flight.duration() * f64::from(step) / f64::from(STEPS);
-            let motion =
-                self.limits.follow(&tool(flight, time), &mut now.branch, &now.joints).ok()?;
-            now.joints = motion.position;
-        }
-        Some(now)
-    }
-
-    /// Comes to the start of `run` as it begins: in a flight from where the tool is, or from rest.
-    fn enter(
-        &self,
-        run: &PathRun<N>,
-        middle: &PathFunction<'_>,
-        shares: &Tightening,
-    ) -> Result<Entry<N>, Refused> {
-        let first = run.path.at(0.0);
-        let End::Moving { speed, .. } = run.begin else {
-            return self.enter_from_rest(None, &first, middle, shares);
-        };
-        let to = state(&first, speed);
-        let flown =
-            (self.task.turns == Turns::Fly).then(|| self.fly(&to, middle, shares)).flatten();
-        let is_linear = self.limits.mechanism.is_linear();
-        match flown {
-            Some(entry) if is_linear => Ok(entry),
-            flown => match (flown, self.enter_from_rest(Some(&to), &first, middle, shares)) {
-                (Some(flown), Ok(other)) => {
-                    let quicker = Entry::time(&flown.motions) <= Entry::time(&other.motions);
-                    Ok(if quicker { flown } else { other })
-                }
-                (Some(flown), Err(_)) => Ok(flown),
-                (None, other) => other,
-            },
-        }
-    }
-
-    /// In one flight from where the tool is.
-    fn fly(&self, to: &State, middle: &PathFunction<'_>, shares: &Tightening) -> Option<Entry<N>> {
-        let from = match &self.front.moving {
-            Some(state) => *state,
-            None => State::rest(self.router(shares).tool().ok()?.position),
-        };
-        let now = self.front.now;
-        let follow = |flight: &Flight| follow_flight(&self.limits, self.area, &now, flight, shares);
-        let limits = self.flight_limits(shares, 1.0);
-        let flight = Flight::new(&from, to, &limits, &mut |flight| follow(flight).is_some())?;
-        let start = follow(&flight)?;
-        if self.limits.scope == Scope::Machine {
-            walk(&self.limits, start, &[middle]).ok()?.within(&self.limits).ok()?;
-        }
-        let motions = vec![(flight.duration(), Motion::Flight(Arc::new(flight)))];
-        Some(Entry { motions, start })
-    }
-
-    /// From rest: to where a run-in begins, or to the start itself.
-    fn enter_from_rest(
-        &self,
-        to: Option<&State>,
-        first: &Jet,
-        middle: &PathFunction<'_>,
-        shares: &Tightening,
-    ) -> Result<Entry<N>, Refused> {
-        let mut motions = Vec::new();
-        let mut router = self.router(shares);
-        if let Some(state) = &self.front.moving {
-            let (flight, end) = self.way_to_rest(state, &router.now, shares)?;
-            motions.push((flight.duration(), Motion::Flight(Arc::new(flight))));
-            router.now = end;
-        }
-        let still = first.motion(1.0, 0.0, 0.0);
-        let Some(to) = to else {
-            let approach = router.approach(&still, &[middle])?;
-            motions.extend(approach.motion);
-            let start = self.joints_at(&still, &approach.start)?;
-            return Ok(Entry { motions, start });
-        };
-        let near = self.joints_at(&still, &self.wanted_near(&still, &router.now)?)?;
-        let run_in = self.run_in(to, &near, shares);
-        let run_in = run_in.ok_or(Refused::NoConfiguration { tried: RUN_TRIALS })?;
-        let into = |share: f64| tool(&run_in, run_in.duration() * share);
-        let approach = router.approach(&into(0.0), &[&into, middle])?;
-        motions.extend(approach.motion);
-        let end = if self.limits.scope == Scope::PathAlone {
-            approach.start
-        } else {
-            walk(&self.limits, approach.start, &[&into])?.end
-        };
-        let start = self.joints_at(&still, &end)?;
-        motions.push((run_in.duration(), Motion::Flight(Arc::new(run_in))));
-        Ok(Entry { motions, start })
-    }
-
-    /// Joints that bring the tool to `first` on some branch, the nearest to `now`.
-    fn wanted_near(
-        &self,
-        first: &ToolMotion,
-        now: &Configuration<N>,
-    ) -> Result<Configuration<N>, Refused> {
-        if self.limits.mechanism.is_linear() || self.limits.scope == Scope::PathAlone {
-            return Ok(*now);
-        }
-        let found = candidates(&self.limits, now, first, &[])?;
-        found.first().map(|(start, _)| *start).ok_or(Refused::NoConfiguration { tried: 0 })
-    }
-
-    fn joints_at(
-        &self,
-        first: &ToolMotion,
-        near: &Configuration<N>,
-    ) -> Result<Configuration<N>, Refused> {
-        let mut branch = near.branch;
-        let motion = self.limits.follow(first, &mut branch, &near.joints)?;
-        Ok(Configuration { joints: motion.position, branch })
-    }
-}
-
-/// The tool's state at a place of a path that is passed at an even speed [m/s].
-fn state(jet: &Jet, speed: f64) -> State {
-    let tool = jet.motion(speed, 0.0, 0.0);
-    State { position: tool.position, velocity: tool.velocity, acceleration: tool.acceleration }
 }
