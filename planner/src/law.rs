@@ -5,7 +5,6 @@ pub(crate) mod flight;
 pub(crate) mod optimum;
 pub mod profile;
 pub(crate) mod row;
-pub(crate) mod run_in;
 pub mod time_law;
 pub(crate) mod windows;
 

@@ -134,6 +134,12 @@ impl Flight {
         run::into(to, limits)
     }
 
+    /// From rest into `to`, whose acceleration is across its velocity, by a ramp and a swing: a little
+    /// slower than [`Self::run_in`] on a curve, and found at once.
+    pub(crate) fn ramp_in(to: &State, limits: &FlightLimits) -> Self {
+        run::paired(to, limits)
+    }
+
     /// From `from` to rest in the shortest time found, wherever that ends; `from` keeps `limits`. `None`
     /// where no motion was found.
     pub fn run_out(from: &State, limits: &FlightLimits) -> Option<Self> {

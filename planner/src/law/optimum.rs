@@ -6,10 +6,11 @@ use nalgebra::Vector3;
 
 use crate::drawing::Note;
 use crate::geometry::contour::Contour;
+use crate::geometry::jet::Jet;
 use crate::geometry::operation::{Operation, OperationKind};
 use crate::job::{Marking, MarkingSpeed};
+use crate::law::flight::{Flight, FlightLimits, State};
 use crate::law::profile::Move;
-use crate::law::run_in::RunIn;
 use crate::light::Policy;
 
 /// Speeds tried between nothing and the largest before the best is refined.
@@ -114,13 +115,13 @@ fn travel(
             OperationKind::Path(contour) => {
                 let asked = contour.demands().first().and_then(|demand| demand.speed);
                 let speed = asked.unwrap_or(open).min(most).min(contour.top_speed(limits));
-                let run_in = RunIn::new(&contour.start(), speed, limits);
+                let run_in = run_in_of(&contour.start(), speed, limits);
                 let end = contour.end();
-                let back = crate::geometry::jet::Jet { first: -end.first, ..end };
-                let run_out = RunIn::new(&back, speed, limits);
-                go(run_in.from(), &mut place);
+                // Backwards in time the velocity is the other way, and the acceleration the same.
+                let run_out = run_in_of(&Jet { first: -end.first, ..end }, speed, limits);
+                go(run_in.at(0.0).position, &mut place);
                 total += run_in.duration() + contour.length() / speed + run_out.duration();
-                place = run_out.from();
+                place = run_out.at(0.0).position;
             }
             OperationKind::Rapid(to) => go(*to, &mut place),
             OperationKind::Dot(dot) => go(dot.at, &mut place),
@@ -128,6 +129,17 @@ fn travel(
         }
     }
     total
+}
+
+/// From rest to a place of a line at `speed` [m/s].
+fn run_in_of(start: &Jet, speed: f64, limits: &PathLimits) -> Flight {
+    let to = State {
+        position: start.point,
+        velocity: start.first * speed,
+        acceleration: start.second * (speed * speed),
+    };
+    let PathLimits { acceleration, jerk, .. } = *limits;
+    Flight::ramp_in(&to, &FlightLimits { speed, acceleration, jerk })
 }
 
 /// The speed up to `most` with the least time. The time has one minimum for one stroke; for many

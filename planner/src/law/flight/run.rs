@@ -54,8 +54,7 @@ pub(super) fn into(to: &State, limits: &FlightLimits) -> Option<Flight> {
         jerk: limits.jerk,
     };
     if wanted <= STRAIGHT {
-        let ramp = Ramp::to_speed(speed, limits.acceleration, limits.jerk);
-        return Some(Pair { ramp, swing: Swing::default() }.flight(to));
+        return Some(paired(to, &limits));
     }
     let gridded = search::free(to, &limits);
     let across = to.velocity.dot(&to.acceleration).abs() <= 1e-9 * speed * wanted;
@@ -65,7 +64,12 @@ pub(super) fn into(to: &State, limits: &FlightLimits) -> Option<Flight> {
 
 /// Into `to`, whose acceleration is across its velocity, by a ramp and a swing.
 pub(super) fn paired(to: &State, limits: &FlightLimits) -> Flight {
-    Pair::new(to.velocity.norm(), to.acceleration.norm(), limits).flight(to)
+    let (speed, wanted) = (to.velocity.norm(), to.acceleration.norm());
+    if wanted <= STRAIGHT {
+        let ramp = Ramp::to_speed(speed, limits.acceleration, limits.jerk);
+        return Pair { ramp, swing: Swing::default() }.flight(to);
+    }
+    Pair::new(speed, wanted, limits).flight(to)
 }
 
 impl Swing {
