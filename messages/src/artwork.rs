@@ -12,6 +12,18 @@ pub struct Artwork {
     pub strokes: Vec<Stroke>,
 }
 
+/// A line of `artwork.json`: a stroke, or a part of one. The file grows while the job is planned, and
+/// what of it has been written can be read whenever that ends.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ArtworkLine {
+    /// Whether it goes on with the stroke before, from that one's last point.
+    #[serde(default)]
+    pub goes_on: bool,
+    /// The stroke.
+    #[serde(flatten)]
+    pub stroke: Stroke,
+}
+
 /// One continuous run of laser-on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stroke {
@@ -25,6 +37,14 @@ pub struct Stroke {
 impl Artwork {
     /// Farthest a chord of [`Stroke::points`] may lie from the curve [m].
     pub const CHORD_ERROR: f64 = 5e-8;
+
+    /// Adds the next stroke, or what comes next of the last one.
+    pub fn add(&mut self, ArtworkLine { goes_on, stroke }: ArtworkLine) {
+        match self.strokes.last_mut() {
+            Some(last) if goes_on => last.points.extend(stroke.points.iter().skip(1)),
+            _ => self.strokes.push(stroke),
+        }
+    }
 
     /// Length of all strokes [m].
     pub fn length(&self) -> f64 {

@@ -14,6 +14,14 @@ pub enum PlanError {
     /// Whoever asked for the plan does not want it any more.
     #[error("planning was given up: the job was withdrawn")]
     Abandoned,
+    /// The job's file cannot be read on while it is planned.
+    #[error("{message}")]
+    Unreadable {
+        /// Line of the job file, 0 for none.
+        line: u64,
+        /// Why.
+        message: String,
+    },
     /// A motion that would not end while anybody waits for it.
     #[error("this job would take {:.1} days, more than a week", duration / 86_400.0)]
     TooLong {
@@ -107,6 +115,7 @@ impl PlanError {
             Self::IdealOnly(_) | Self::Abandoned | Self::TooLong { .. } => 0,
             Self::TooShort { line, .. }
             | Self::TooManyEdges { line, .. }
+            | Self::Unreadable { line, .. }
             | Self::Unreachable { line, .. }
             | Self::NoConfiguration { line, .. }
             | Self::Limit { line, .. } => *line,

@@ -2,21 +2,16 @@
 
 use std::sync::Arc;
 
-use machine::kinematics::Joints;
-use machine::{Axis, Machine, Mechanism, MechanismKind, MechanismVisitor, PathLimits, Pose};
+use machine::{Axis, Machine, Mechanism, MechanismKind, MechanismVisitor};
+use messages::Setpoint;
 use messages::artwork::Artwork;
-use messages::axis::axis_array;
-use messages::{AxisArray, Setpoint};
-use nalgebra::Vector3;
 
-use crate::drawing::Note;
-use crate::error::{Place, PlanError};
-use crate::geometry::operation::{Operation, OperationKind, Operations};
+use crate::error::PlanError;
 use crate::job::Job;
 use crate::joint_space::joint_move::JointMove;
-use crate::law::optimum::Speeds;
 use crate::limits::motion_limits::Scope;
-use crate::planning::{Planning, Task};
+use crate::planning::Window;
+use crate::planning::run::{Outlet, plan_windows};
 use crate::sampling::sampler::Sampler;
 use crate::trajectory::{Motion, Trajectory};
 
@@ -49,10 +44,7 @@ pub(crate) fn plan_unless(
     job: &Job,
     abandoned: &dyn Fn() -> bool,
 ) -> Result<Plan, PlanError> {
-    match job.ideal_only {
-        Some(reason) => Err(PlanError::IdealOnly(reason)),
-        None => plan_within(machine, job, Scope::Machine, abandoned),
-    }
+    plan_within(machine, job, Scope::Machine, abandoned)
 }
 
 /// Plans `job` and checks it against the limits of the path only: what the tool's motion would be
@@ -70,42 +62,9 @@ fn plan_within(
     scope: Scope,
     abandoned: &dyn Fn() -> bool,
 ) -> Result<Plan, PlanError> {
-    let drawing = &job.drawing;
-    let limits = PathLimits {
-        rapid: job.rapid.unwrap_or(machine.path.rapid),
-        tolerance: job.marking.tolerance.unwrap_or(machine.path.tolerance),
-        ..machine.path
-    };
-    let surface = job.surface.as_ref();
-    let operations = Operations::new(drawing.start, &limits, machine.corners, surface);
-    let (operations, found) = operations.all(&drawing.steps).map_err(|(line, cause)| {
-        PlanError::Unreachable { line, place: Place { stroke: 0, time: 0.0 }, cause }
-    })?;
-    let mut notes = [drawing.notes.as_slice(), &found].concat();
-    let speeds = Speeds::choose(drawing.start, &operations, &limits, &job.marking, &mut notes);
-    let standing = job
-        .standing
-        .unwrap_or_else(|| machine.mechanism.visit(Start { machine, start: drawing.start }));
-    let task = Task {
-        machine,
-        limits,
-        scope,
-        speeds,
-        turns: job.marking.turns,
-        attitude: job.attitude,
-        standing,
-        abandoned,
-    };
-    let whole = Whole { task: &task, operations: &operations };
-    let (trajectory, artwork, facts) = machine.mechanism.visit(whole)?;
-    let facts = PlanFacts {
-        name: drawing.name.clone(),
-        strokes: artwork.strokes.len(),
-        // From 0, since the sum of nothing is -0.
-        length: lit_length(&operations).fold(0.0, |a, b| a + b),
-        notes: [notes, facts.notes].concat(),
-        ..facts
-    };
+    let mut whole = Whole::default();
+    let facts = plan_windows(machine, job, scope, 1, &mut Taking { whole: &mut whole, abandoned })?;
+    let Whole { trajectory, artwork } = whole;
     Ok(Plan {
         artwork,
         facts,
@@ -115,67 +74,28 @@ fn plan_within(
     })
 }
 
-fn lit_length(operations: &[Operation]) -> impl Iterator<Item = f64> + '_ {
-    operations.iter().map(|operation| match &operation.kind {
-        OperationKind::Path(contour) => contour.lit_length(),
-        _ => 0.0,
-    })
+/// Keeps the motion of all windows.
+#[derive(Default)]
+struct Whole {
+    trajectory: Trajectory,
+    artwork: Artwork,
 }
 
-/// Where the joints stand when nobody says: at home, or where the drawing begins on a machine whose
-/// joints follow from that.
-struct Start<'a> {
-    machine: &'a Machine,
-    start: Vector3<f64>,
+struct Taking<'a> {
+    whole: &'a mut Whole,
+    abandoned: &'a dyn Fn() -> bool,
 }
 
-impl MechanismVisitor for Start<'_> {
-    type Output = AxisArray;
-
-    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> AxisArray {
-        let home = axis_array(self.machine.home_joints.as_slice());
-        if !mechanism.is_linear() {
-            return home;
-        }
-        let near = Joints::<N>::from_fn(|axis, _| home[axis]);
-        let joints = mechanism.inverse(&Pose::at(self.start), mechanism.branch(), &near);
-        joints.map_or(home, |joints| axis_array(joints.as_slice()))
+impl Outlet for Taking<'_> {
+    fn is_abandoned(&self) -> bool {
+        (self.abandoned)()
     }
-}
 
-/// Plans all windows of a job and keeps their motion.
-struct Whole<'a> {
-    task: &'a Task<'a>,
-    operations: &'a [Operation],
-}
-
-impl MechanismVisitor for Whole<'_> {
-    type Output = Result<(Trajectory, Artwork, PlanFacts), PlanError>;
-
-    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let Self { task, operations } = self;
-        let mut planning = Planning::new(&mechanism, task, operations, 1)?;
-        let attitude = task.attitude;
-        let mut trajectory = Trajectory { attitude, ..Trajectory::default() };
-        let mut artwork = Artwork::default();
-        let mut samples = 0;
-        while let Some(window) = planning.next_window()? {
-            samples += window.setpoints.len() as u64;
-            trajectory.append(&window.trajectory);
-            artwork.strokes.extend(window.strokes);
-        }
-        let mut notes: Vec<Note> = planning.notes.clone();
-        notes.extend(planning.slowed_note());
-        let facts = PlanFacts {
-            duration: trajectory.duration(),
-            samples,
-            speed: planning.speed,
-            notes,
-            uses: planning.utilization().clone(),
-            binding: planning.shares.report(&task.machine.axes),
-            ..PlanFacts::default()
-        };
-        Ok((trajectory, artwork, facts))
+    fn take(&mut self, window: Window) -> Result<(), Window> {
+        self.whole.trajectory.attitude = window.trajectory.attitude;
+        self.whole.trajectory.append(&window.trajectory);
+        window.strokes.into_iter().for_each(|line| self.whole.artwork.add(line));
+        Ok(())
     }
 }
 

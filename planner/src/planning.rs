@@ -2,9 +2,12 @@
 //! on, and from the end of each there is a way to rest.
 
 mod entry;
+mod parts;
 mod paths;
 mod plateau;
+pub(crate) mod run;
 mod runs;
+pub(crate) mod source;
 mod windows;
 
 use std::collections::VecDeque;
@@ -13,13 +16,14 @@ use std::sync::Arc;
 use machine::kinematics::Joints;
 use machine::{Machine, Mechanism, PathLimits, WorkArea};
 use messages::Setpoint;
-use messages::artwork::Stroke;
+use messages::artwork::ArtworkLine;
 use messages::time::CYCLE_TIME;
 use nalgebra::Vector3;
 
 use crate::drawing::{Note, Turns};
 use crate::error::{Place, PlanError};
-use crate::geometry::operation::{Operation, OperationKind};
+use crate::geometry::contour::Contour;
+use crate::geometry::operation::OperationKind;
 use crate::joint_space::configuration::{Configuration, Refused};
 use crate::joint_space::joint_move::JointMove;
 use crate::joint_space::route::{Router, still};
@@ -34,6 +38,8 @@ use crate::trajectory::{BEFORE, Motion, Piece, Trajectory};
 use crate::verify::checker::{Checker, LimitViolation, Quantity};
 use crate::verify::interpolation::InterpolationCheck;
 use paths::PathRun;
+use source::Source as Operations;
+use windows::dot as dot_of;
 
 /// Rest before and after an output changes [s]: a cycle each.
 const OUTPUT_REST: f64 = CYCLE_TIME;
@@ -62,9 +68,12 @@ pub(crate) struct Task<'a> {
     pub(crate) speeds: Speeds,
     pub(crate) turns: Turns,
     pub(crate) attitude: crate::geometry::attitude::AttitudeLaw,
+    /// How long the job takes at the speeds asked for, if starts and turns took no time [s].
+    pub(crate) estimate: f64,
+    /// Where the tool is before it [m].
+    pub(crate) start: Vector3<f64>,
     /// Where the joints stand [m or rad].
     pub(crate) standing: messages::AxisArray,
-    pub(crate) abandoned: &'a dyn Fn() -> bool,
 }
 
 /// A stretch of a job that is planned, sampled and checked.
@@ -74,8 +83,11 @@ pub(crate) struct Window {
     pub(crate) setpoints: Vec<Setpoint>,
     /// Its motion.
     pub(crate) trajectory: Trajectory,
-    /// The lines and dots that begin in it.
-    pub(crate) strokes: Vec<Stroke>,
+    /// The lines and dots that begin in it, and parts of those that go on.
+    pub(crate) strokes: Vec<ArtworkLine>,
+    /// Stream time at its end [s], and an estimate of that at the end of the job.
+    pub(crate) end: f64,
+    pub(crate) estimate: f64,
 }
 
 /// A line that the limits slow below what was asked for.
@@ -94,6 +106,8 @@ struct Front<const N: usize, M: Mechanism<N>> {
     /// The tool's state where it does not rest.
     moving: Option<State>,
     run: Option<PathRun<N>>,
+    /// Whether that goes on in the next operation.
+    goes_on: bool,
     /// Number of the next operation, and parts of a path that was divided.
     next: usize,
     parts: VecDeque<Arc<crate::geometry::contour::Contour>>,
@@ -105,6 +119,34 @@ struct Front<const N: usize, M: Mechanism<N>> {
     checker: Checker,
     interpolation: Option<InterpolationCheck>,
     samples: u64,
+    /// The first rest, which belongs to the first window.
+    lead_in: Option<Piece>,
+    /// How long the operations so far were estimated to take [s], and where the tool is after them
+    /// [m].
+    estimated: f64,
+    place: Vector3<f64>,
+}
+
+/// What is told of the windows so far.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Account {
+    pub(crate) shares: Shares,
+    /// The line that is slowed most, and how many are.
+    slowed: Option<Slowed>,
+    slowed_lines: u64,
+    pub(crate) notes: Vec<Note>,
+    /// The largest speed while the laser is on [m/s].
+    pub(crate) speed: f64,
+    /// Length that is marked [m], and the number of lines and dots.
+    pub(crate) length: f64,
+    pub(crate) strokes: u64,
+}
+
+/// Where planning can go back to.
+#[derive(Clone)]
+pub(crate) struct Checkpoint<const N: usize, M: Mechanism<N>> {
+    front: Front<N, M>,
+    account: Account,
 }
 
 /// A job under way.
@@ -112,22 +154,18 @@ pub(crate) struct Planning<'a, const N: usize, M: Mechanism<N>> {
     limits: MotionLimits<'a, N, M>,
     area: &'a WorkArea,
     task: &'a Task<'a>,
-    operations: &'a [Operation],
+    operations: Operations<'a>,
     front: Front<N, M>,
-    /// The first rest, which belongs to the first window.
-    lead_in: Option<Piece>,
-    is_over: bool,
-    pub(crate) shares: Shares,
-    pub(crate) slowed: Vec<Slowed>,
-    pub(crate) notes: Vec<Note>,
-    /// The largest speed while the laser is on [m/s].
-    pub(crate) speed: f64,
+    pub(crate) account: Account,
+    /// How much faster than the job asks for it is marked, 1 as it asks.
+    rate: f64,
 }
 
 /// A window in the making.
 struct Draft<'s> {
     trajectory: Trajectory,
-    strokes: Vec<Stroke>,
+    strokes: Vec<ArtworkLine>,
+    length: f64,
     shares: &'s Tightening,
     slowed: Vec<Slowed>,
     notes: Vec<Note>,
@@ -140,7 +178,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     pub(crate) fn new(
         mechanism: &'a M,
         task: &'a Task<'a>,
-        operations: &'a [Operation],
+        operations: Operations<'a>,
         stream: u64,
     ) -> Result<Self, PlanError> {
         let Task { machine, limits, scope, attitude, .. } = *task;
@@ -175,6 +213,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             now,
             moving: None,
             run: None,
+            goes_on: false,
             next: 0,
             parts: VecDeque::new(),
             time: before,
@@ -185,35 +224,30 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             checker: Checker::new(machine, limits.path, scope),
             interpolation: interpolates.then(|| InterpolationCheck::new(tolerance)),
             samples: 0,
-        };
-        Ok(Self {
-            limits,
-            area: &machine.area,
-            task,
-            operations,
-            front,
             lead_in: Some(lead_in),
-            is_over: false,
-            shares: Shares::default(),
-            slowed: Vec::new(),
-            notes: Vec::new(),
-            speed: 0.0,
-        })
+            estimated: 0.0,
+            place: task.start,
+        };
+        let account = Account::default();
+        Ok(Self { limits, area: &machine.area, task, operations, front, account, rate: 1.0 })
     }
 
     /// The next window; `None` after the last.
     ///
     /// # Errors
     /// What no speed can do, with its place.
-    pub(crate) fn next_window(&mut self) -> Result<Option<Window>, PlanError> {
-        if self.is_over {
+    pub(crate) fn next_window(
+        &mut self,
+        abandoned: &dyn Fn() -> bool,
+    ) -> Result<Option<Window>, PlanError> {
+        if self.front.sampler.has_ended() {
             return Ok(None);
         }
         let checkpoint = self.front.clone();
         let mut shares = Tightening::none(N);
         let mut trial = 0;
         loop {
-            let error = match self.attempt(&shares) {
+            let error = match self.attempt(&shares, abandoned) {
                 Ok(draft) => return Ok(Some(self.keep(draft))),
                 Err(error) => error,
             };
@@ -238,31 +272,91 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     }
 
     fn keep(&mut self, (draft, setpoints): (Draft<'_>, Vec<Setpoint>)) -> Window {
-        let Draft { trajectory, strokes, slowed, notes, bound, speed, .. } = draft;
-        self.lead_in = None;
-        self.slowed.extend(slowed);
-        self.notes.extend(notes);
-        self.shares.merge(&bound);
-        self.speed = self.speed.max(speed);
-        self.is_over = self.front.sampler.has_ended();
-        Window { setpoints, trajectory, strokes }
+        let Draft { trajectory, strokes, slowed, notes, bound, speed, length, .. } = draft;
+        let account = &mut self.account;
+        account.note_slowed(&slowed);
+        account.notes.extend(notes);
+        account.shares.merge(&bound);
+        account.speed = account.speed.max(speed);
+        account.length += length;
+        account.strokes += strokes.iter().filter(|stroke| !stroke.goes_on).count() as u64;
+        let (end, estimate) = (self.front.time, self.estimate());
+        Window { setpoints, trajectory, strokes, end, estimate }
+    }
+
+    /// Stream time at the end of the job, as far as it can be told now [s].
+    fn estimate(&self) -> f64 {
+        let Front { time, estimated, .. } = self.front;
+        if self.front.sampler.has_ended() {
+            return time;
+        }
+        let run = self.front.run.as_ref();
+        let ahead = run.map_or(0.0, |run| {
+            self.estimate_of(&run.contour) * (1.0 - run.at / run.contour.length())
+        });
+        let parts = self.front.parts.iter().map(|part| self.estimate_of(part));
+        let ahead = parts.fold(ahead, |sum, part| sum + part);
+        let done = estimated - ahead;
+        let left = (self.task.estimate - done).max(0.0);
+        // What is still to come is slower than estimated in the same measure as what has been planned.
+        let slower = if done > 0.0 { (time - self.first_rest()) / done } else { 1.0 };
+        time + left * slower
+    }
+
+    /// How long a path takes at the speeds asked for [s].
+    fn estimate_of(&self, contour: &Contour) -> f64 {
+        let speeds = self.speed_limits(contour);
+        let ends = speeds.iter().skip(1).map(|speed| speed.from).chain([contour.length()]);
+        speeds.iter().zip(ends).map(|(speed, end)| (end - speed.from) / speed.speed).sum()
+    }
+
+    /// From the first motion to the end of the last window [s].
+    pub(crate) fn duration(&self) -> f64 {
+        self.front.time - self.first_rest()
+    }
+
+    /// Setpoints so far.
+    pub(crate) fn samples(&self) -> u64 {
+        self.front.samples
+    }
+
+    /// How much faster than the job asks for it is marked.
+    pub(crate) fn rate(&self) -> f64 {
+        self.rate
+    }
+
+    /// Where planning can be taken up again.
+    pub(crate) fn checkpoint(&self) -> Checkpoint<N, M> {
+        Checkpoint { front: self.front.clone(), account: self.account.clone() }
+    }
+
+    /// Goes back to where `checkpoint` was taken.
+    pub(crate) fn restore(&mut self, checkpoint: Checkpoint<N, M>) {
+        (self.front, self.account) = (checkpoint.front, checkpoint.account);
+    }
+
+    /// Lets go of what is needed no more when planning goes back to `oldest` at most.
+    pub(crate) fn release(&mut self, oldest: &Checkpoint<N, M>) {
+        self.operations.release(oldest.front.next);
     }
 
     /// Plans, samples and checks one window.
     fn attempt<'s>(
         &mut self,
         shares: &'s Tightening,
+        abandoned: &dyn Fn() -> bool,
     ) -> Result<(Draft<'s>, Vec<Setpoint>), PlanError> {
         let mut draft = Draft {
             trajectory: Trajectory { attitude: self.task.attitude, ..Trajectory::default() },
             strokes: Vec::new(),
+            length: 0.0,
             shares,
             slowed: Vec::new(),
             notes: Vec::new(),
             bound: Shares::default(),
             speed: 0.0,
         };
-        draft.trajectory.pieces.extend(self.lead_in.clone());
+        draft.trajectory.pieces.extend(self.front.lead_in.take());
         let is_last = !self.advance(&mut draft)?;
         let light = &mut self.front.light;
         draft.trajectory.laser =
@@ -271,7 +365,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             return Err(PlanError::TooLong { duration: self.front.time });
         }
         self.front.sampler.extend(&draft.trajectory, is_last);
-        let setpoints = self.sample()?;
+        let setpoints = self.sample(abandoned)?;
         Ok((draft, setpoints))
     }
 
@@ -286,7 +380,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             self.begin_path(part, draft)?;
             return Ok(true);
         }
-        let Some(operation) = self.operations.get(self.front.next) else {
+        let Some(operation) = self.operations.get(self.front.next)?.cloned() else {
             self.halt(draft)?;
             return Ok(false);
         };
@@ -294,22 +388,32 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         self.front.line = operation.line;
         match &operation.kind {
             OperationKind::Path(contour) => {
-                self.begin_path(Arc::new((**contour).clone()), draft)?
+                self.note_rapid(&contour.start().point);
+                self.front.estimated += self.estimate_of(contour);
+                let contour = self.with_next_parts(contour.clone())?;
+                self.front.place = contour.end().point;
+                self.begin_path(contour, draft)?;
             }
-            OperationKind::Rapid(to) => self.go_to(*to, draft)?,
+            OperationKind::Rapid(to) => {
+                self.note_rapid(to);
+                self.go_to(*to, draft)?;
+            }
             OperationKind::Rest(time) => {
+                self.front.estimated += time;
                 self.halt(draft)?;
                 if *time > 0.0 {
                     self.stand(*time, draft);
                 }
             }
             OperationKind::Dot(dot) => {
+                self.note_rapid(&dot.at);
                 self.go_to(dot.at, draft)?;
                 let start = self.front.time;
                 let lit = self.front.light.dot(start, &dot.exposures);
                 lit.map_err(|short| self.too_short(short))?;
-                draft.strokes.push(Stroke { points: vec![dot.at.into()], line: operation.line });
+                draft.strokes.push(dot_of(&dot.at, operation.line));
                 let time = dot.exposures.iter().map(|(time, _)| time).sum();
+                self.front.estimated += time;
                 self.stand(time, draft);
             }
             OperationKind::Output { bit, on } => {
@@ -329,6 +433,13 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             }
         }
         Ok(true)
+    }
+
+    /// Notes how long a free move to `to` is estimated to take.
+    fn note_rapid(&mut self, to: &Vector3<f64>) {
+        let way = (to - self.front.place).norm();
+        self.front.estimated += way / self.limits.path.rapid;
+        self.front.place = *to;
     }
 
     /// Adds a piece of motion.
@@ -386,11 +497,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     }
 
     /// Samples as far as the motion is known, and checks each sample.
-    fn sample(&mut self) -> Result<Vec<Setpoint>, PlanError> {
+    fn sample(&mut self, abandoned: &dyn Fn() -> bool) -> Result<Vec<Setpoint>, PlanError> {
         let mut setpoints = Vec::new();
         while let Some(setpoint) = self.front.sampler.next() {
             self.front.samples += 1;
-            if self.front.samples.is_multiple_of(ASK) && (self.task.abandoned)() {
+            if self.front.samples.is_multiple_of(ASK) && abandoned() {
                 return Err(PlanError::Abandoned);
             }
             let front = &mut self.front;
@@ -462,21 +573,37 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         BEFORE + (self.task.machine.laser.on_delay / CYCLE_TIME).ceil() * CYCLE_TIME
     }
 
+    /// What a person should know of the job so far.
+    pub(crate) fn notes(&self) -> Vec<Note> {
+        let mut notes = self.operations.notes().to_vec();
+        notes.extend_from_slice(&self.account.notes);
+        notes.extend(self.account.slowed_note());
+        notes
+    }
+}
+
+impl Account {
+    fn note_slowed(&mut self, slowed: &[Slowed]) {
+        let share = |slowed: &Slowed| slowed.speed / slowed.asked;
+        for slowed in slowed {
+            self.slowed_lines += 1;
+            if self.slowed.as_ref().is_none_or(|worst| share(slowed) < share(worst)) {
+                self.slowed = Some(*slowed);
+            }
+        }
+    }
+
     /// One note for all lines that the limits slow down.
-    pub(crate) fn slowed_note(&self) -> Option<Note> {
-        let worst = self
-            .slowed
-            .iter()
-            .min_by(|one, other| (one.speed / one.asked).total_cmp(&(other.speed / other.asked)))?;
-        let Slowed { line, asked, speed, place } = *worst;
+    fn slowed_note(&self) -> Option<Note> {
+        let Slowed { line, asked, speed, place } = self.slowed?;
         let mut text = format!(
             "slowed to {speed:.4} m/s instead of {asked:.4} m/s near x {:.3} mm, y {:.3} mm: the \
              limits allow no more there",
             place.x * 1e3,
             place.y * 1e3
         );
-        if self.slowed.len() > 1 {
-            text.push_str(&format!("; {} lines are slowed somewhere", self.slowed.len()));
+        if self.slowed_lines > 1 {
+            text.push_str(&format!("; {} lines are slowed somewhere", self.slowed_lines));
         }
         Some(Note { line, text })
     }

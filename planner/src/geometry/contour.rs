@@ -1,6 +1,8 @@
 //! A path that is gone without a stop: the curves of a job that go on into each other, their
 //! joints, and what the job asks for along them.
 
+mod parts;
+
 use machine::PathLimits;
 use nalgebra::Vector3;
 
@@ -16,9 +18,6 @@ const GENTLE: f64 = 0.2;
 
 /// Curves that meet within this distance are taken to meet [m].
 pub(crate) const GAP: f64 = 1e-8;
-
-/// Share of a curve that is not left as a part of its own where a line is divided.
-const SLIVER: f64 = 0.1;
 
 /// Cosine of the angle from which on two directions are a corner wherever corners are exact: 1°.
 pub(crate) const CORNER: f64 = 0.999_847_695_156_391_3;
@@ -59,7 +58,11 @@ pub(crate) struct Joining {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Contour {
     tracks: Vec<Track>,
+    /// Where each track begins [m].
+    starts: Vec<f64>,
     blends: Vec<Blend>,
+    /// How it goes on from the contour before, of which it is the next part.
+    joint: Option<Blend>,
     demands: Vec<Demand>,
     /// How its light goes with its speed.
     pub(crate) policy: Policy,
@@ -67,22 +70,34 @@ pub(crate) struct Contour {
     pub(crate) line: u64,
     length: f64,
     bend: Bend,
+    /// What its tracks weigh.
+    weight: usize,
+    is_lit: bool,
 }
 
 impl Contour {
     /// Starts with one curve.
     pub(crate) fn new(track: Track, demands: &[Demand], policy: Policy) -> Self {
-        let (length, bend) = (track.length(), track.bend());
+        let (length, bend, weight) = (track.length(), track.bend(), track.weight());
         let line = demands.first().map_or(0, |demand| demand.line);
         Self {
             tracks: vec![track],
+            starts: vec![0.0],
             blends: Vec::new(),
+            joint: None,
             demands: demands.to_vec(),
             policy,
             line,
             length,
             bend,
+            weight,
+            is_lit: demands.iter().any(|demand| demand.power > 0.0),
         }
+    }
+
+    /// Whether it is the next part of the contour before it, which is gone on with without a stop.
+    pub(crate) fn goes_on_from_before(&self) -> bool {
+        self.joint.is_some()
     }
 
     /// Goes on with `track` and its `demands`, counted from its start, if it starts where the contour
@@ -129,8 +144,10 @@ impl Contour {
         for demand in demands {
             self.ask(Demand { from: self.length + demand.from, ..*demand });
         }
+        self.starts.push(self.length);
         self.length += track.length();
         self.bend = self.bend.or(track.bend());
+        self.weight += track.weight();
         self.tracks.push(track.clone());
     }
 
@@ -138,6 +155,7 @@ impl Contour {
     fn ask(&mut self, demand: Demand) {
         let same = |last: &Demand| last.power == demand.power && last.speed == demand.speed;
         if !self.demands.last().is_some_and(same) {
+            self.is_lit |= demand.power > 0.0;
             self.demands.push(demand);
         }
     }
@@ -158,9 +176,21 @@ impl Contour {
         self.demands.iter().copied().zip(ends)
     }
 
+    /// The stretches that `places` [m] have a part in.
+    pub(crate) fn stretches_in(
+        &self,
+        places: &core::ops::Range<f64>,
+    ) -> impl Iterator<Item = (Demand, f64)> + '_ {
+        let first = self.demands.partition_point(|demand| demand.from <= places.start).max(1) - 1;
+        let end = places.end;
+        let ends = self.demands.iter().skip(first + 1).map(|demand| demand.from);
+        let stretches = self.demands.iter().skip(first).copied().zip(ends.chain([self.length]));
+        stretches.take_while(move |(demand, _)| demand.from < end)
+    }
+
     /// Whether anything of it is marked.
     pub(crate) fn is_lit(&self) -> bool {
-        self.demands.iter().any(|demand| demand.power > 0.0)
+        self.is_lit
     }
 
     /// Length that is marked [m].
@@ -188,81 +218,31 @@ impl Contour {
 
     /// The point of the drawn line at `distance` from the start [m].
     pub(crate) fn at(&self, distance: f64) -> Jet {
-        let mut from = 0.0;
-        for track in &self.tracks {
-            if distance < from + track.length() {
-                return track.at(distance - from);
-            }
-            from += track.length();
-        }
-        self.end()
+        let index = self.track_at(distance);
+        let (track, from) = (&self.tracks[index], self.starts[index]);
+        track.at((distance - from).min(track.length()))
+    }
+
+    /// The number of the track at `distance` from the start [m].
+    fn track_at(&self, distance: f64) -> usize {
+        self.starts.partition_point(|start| *start <= distance).max(1) - 1
     }
 
     /// True points of the drawn line from `from` to `to` [m], no chord farther than `chord_error`
     /// from it [m].
     pub(crate) fn points(&self, from: f64, to: f64, chord_error: f64) -> Vec<[f64; 3]> {
         let mut points = vec![self.at(from).point.into()];
-        let mut start = 0.0;
-        for track in &self.tracks {
-            let end = start + track.length();
-            if end > from + GAP && start < to - GAP {
+        let index = self.track_at(from);
+        for (track, &start) in self.tracks.iter().zip(&self.starts).skip(index) {
+            if start >= to - GAP {
+                break;
+            }
+            if start + track.length() > from + GAP {
                 let (first, last) = ((from - start).max(0.0), (to - start).min(track.length()));
                 track.part(first, last).sample(chord_error, &mut points);
             }
-            start = end;
         }
         points
-    }
-
-    /// The part between two places, with the parts of the demands; joints as in the whole.
-    pub(crate) fn part(&self, from: f64, to: f64, limits: &PathLimits) -> Option<Self> {
-        let mut part: Option<Self> = None;
-        let mut start = 0.0;
-        for track in &self.tracks {
-            let end = start + track.length();
-            let (first, last) = ((from - start).max(0.0), (to - start).min(track.length()));
-            if last - first > GAP {
-                let piece = track.part(first, last);
-                let demands = self.demands_between(start + first, start + last);
-                match &mut part {
-                    None => part = Some(Self::new(piece, &demands, self.policy)),
-                    Some(part) => {
-                        let (before, after) = (part.end(), piece.at(0.0));
-                        let room = part.last().length().min(piece.length()) / 2.0;
-                        let blend = Blend::new(&before, &after, room, limits.tolerance, limits);
-                        part.append(&piece, blend, &demands);
-                    }
-                }
-            }
-            start = end;
-        }
-        part
-    }
-
-    fn demands_between(&self, from: f64, to: f64) -> Vec<Demand> {
-        self.stretches()
-            .filter(|(demand, end)| *end > from + GAP && demand.from < to - GAP)
-            .map(|(demand, _)| Demand { from: (demand.from - from).max(0.0), ..demand })
-            .collect()
-    }
-
-    /// `cut`, or the end of its curve where that is nearer than a tenth of the curve: a short rest of
-    /// one would leave no room to smooth the joint at it, and slow all of its part.
-    pub(crate) fn beside_joints(&self, cut: f64) -> f64 {
-        let mut from = 0.0;
-        for track in &self.tracks {
-            let end = from + track.length();
-            if cut < end {
-                let near = SLIVER * track.length();
-                return match (cut - from < near, end - cut < near) {
-                    (true, _) => from,
-                    (false, true) => end,
-                    (false, false) => cut,
-                };
-            }
-            from = end;
-        }
-        cut
     }
 
     /// The largest constant speed [m/s]: V²κ ≤ A, V³|p‴| ≤ J, smoothed joints included.

@@ -1,5 +1,8 @@
 //! What a machine does in order: paths that are gone in one go, and what happens at rest between
-//! them. Made of a drawing's steps once, for every mechanism.
+//! them. Made of a drawing's steps as they come, for every mechanism.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
 
 use machine::kinematics::KinematicsError;
 use machine::surface::Surface;
@@ -25,6 +28,12 @@ const EDGES: usize = MAX_EDGES - 2;
 const ROW_STEP: f64 = 1e-3;
 const ROW_SHARE: f64 = 0.05;
 
+/// Operations that are kept back, since what comes next may change them.
+const KEPT: usize = 8;
+
+/// A path that weighs more is handed on in parts, which are gone without a stop between them.
+const LONG_PATH: usize = 1 << 15;
+
 /// One thing to do, and the line of the job file that asks for it, 0 for none.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Operation {
@@ -36,7 +45,7 @@ pub(crate) struct Operation {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum OperationKind {
     /// Go along a path without a stop.
-    Path(Box<Contour>),
+    Path(Arc<Contour>),
     /// Move straight in the dark, from rest to rest.
     Rapid(Vector3<f64>),
     /// Stand still in the dark [s].
@@ -69,15 +78,16 @@ pub(crate) struct Operations<'a> {
     place: Vector3<f64>,
     polyline: Polyline,
     contour: Option<Contour>,
-    done: Vec<Operation>,
+    done: VecDeque<Operation>,
     /// The last two paths, as they were drawn.
     before: [Option<Extent>; 2],
+    is_finished: bool,
     /// What a person should know.
     pub(crate) notes: Vec<Note>,
 }
 
 /// A place on the surface that is beyond an edge, and its line.
-type OffSurface = (u64, KinematicsError);
+pub(crate) type OffSurface = (u64, KinematicsError);
 
 impl<'a> Operations<'a> {
     /// Begins where the tool is before the first step; on a `surface` everything comes to lie on it.
@@ -95,26 +105,24 @@ impl<'a> Operations<'a> {
             place: start,
             polyline: Polyline::default(),
             contour: None,
-            done: Vec::new(),
+            done: VecDeque::new(),
             before: [None; 2],
+            is_finished: false,
             notes: Vec::new(),
         }
     }
 
-    /// All operations of `steps`.
-    ///
-    /// # Errors
-    /// The line of what goes beyond an edge of the surface, and by how much.
-    pub(crate) fn all(mut self, steps: &[Step]) -> Result<(Vec<Operation>, Vec<Note>), OffSurface> {
-        for step in steps {
-            self.push(step)?;
-        }
-        self.finish()?;
-        Ok((self.done, self.notes))
+    /// The next operation that nothing to come changes; after [`Self::finish`] whatever is left.
+    pub(crate) fn next(&mut self) -> Option<Operation> {
+        let kept = if self.is_finished { 0 } else { KEPT };
+        if self.done.len() > kept { self.done.pop_front() } else { None }
     }
 
     /// Takes the next step.
-    fn push(&mut self, step: &Step) -> Result<(), OffSurface> {
+    ///
+    /// # Errors
+    /// The line of what goes beyond an edge of the surface, and by how much.
+    pub(crate) fn push(&mut self, step: &Step) -> Result<(), OffSurface> {
         let line = step.line;
         match &step.action {
             Action::Mark { curve, speed, power } => {
@@ -139,25 +147,29 @@ impl<'a> Operations<'a> {
             }
             Action::Dwell { time, .. } => {
                 self.flush()?;
-                self.done.push(Operation { kind: OperationKind::Rest(*time), line });
+                self.done.push_back(Operation { kind: OperationKind::Rest(*time), line });
                 Ok(())
             }
             Action::Output { bit, on } => {
                 self.flush()?;
                 let kind = OperationKind::Output { bit: *bit, on: *on };
-                self.done.push(Operation { kind, line });
+                self.done.push_back(Operation { kind, line });
                 Ok(())
             }
             Action::Pause => {
                 self.flush()?;
-                self.done.push(Operation { kind: OperationKind::Pause, line });
+                self.done.push_back(Operation { kind: OperationKind::Pause, line });
                 Ok(())
             }
         }
     }
 
     /// Ends the drawing.
-    fn finish(&mut self) -> Result<(), OffSurface> {
+    ///
+    /// # Errors
+    /// As of [`Self::push`].
+    pub(crate) fn finish(&mut self) -> Result<(), OffSurface> {
+        self.is_finished = true;
         self.flush()
     }
 
@@ -195,6 +207,7 @@ impl<'a> Operations<'a> {
             }
             self.place = curve.to();
             self.polyline.push(from, Chord { to: curve.to(), demand, policy, is_free: false });
+            self.hand_on_what_is_certain();
             return Ok(());
         }
         self.flush_polyline()?;
@@ -221,11 +234,12 @@ impl<'a> Operations<'a> {
         if goes_on && self.surface.is_none() && (to - from).norm() > NOTHING {
             let demand = Demand { from: 0.0, power: 0.0, speed: None, line };
             self.polyline.push(from, Chord { to, demand, policy: None, is_free: true });
+            self.hand_on_what_is_certain();
             return Ok(());
         }
         self.flush()?;
         let to = self.placed(&to, line)?;
-        self.done.push(Operation { kind: OperationKind::Rapid(to), line });
+        self.done.push_back(Operation { kind: OperationKind::Rapid(to), line });
         Ok(())
     }
 
@@ -238,14 +252,14 @@ impl<'a> Operations<'a> {
 
     fn dot(&mut self, exposure: (f64, f64), line: u64) -> Result<(), OffSurface> {
         let place = self.placed(&self.place.clone(), line)?;
-        if let Some(Operation { kind: OperationKind::Dot(dot), .. }) = self.done.last_mut()
+        if let Some(Operation { kind: OperationKind::Dot(dot), .. }) = self.done.back_mut()
             && dot.at == place
         {
             dot.exposures.push(exposure);
             return Ok(());
         }
         let kind = OperationKind::Dot(Dot { at: place, exposures: vec![exposure] });
-        self.done.push(Operation { kind, line });
+        self.done.push_back(Operation { kind, line });
         Ok(())
     }
 
@@ -256,12 +270,23 @@ impl<'a> Operations<'a> {
         let free = if free { self.polyline.pop() } else { None };
         self.flush_polyline()?;
         if let Some(contour) = self.contour.take() {
-            self.end(contour);
+            self.end(contour, false);
         }
         if let Some(Chord { to, demand, .. }) = free {
-            self.done.push(Operation { kind: OperationKind::Rapid(to), line: demand.line });
+            self.done.push_back(Operation { kind: OperationKind::Rapid(to), line: demand.line });
         }
         Ok(())
+    }
+
+    /// Adds to the path what of a long polyline is certain.
+    fn hand_on_what_is_certain(&mut self) {
+        let policy = self.polyline.policy();
+        let tolerance = (self.tolerance > 0.0).then_some(self.tolerance);
+        for (track, demands) in self.polyline.take_certain(tolerance) {
+            if track.length() > NOTHING {
+                self.add(&track, &demands, policy);
+            }
+        }
     }
 
     fn flush_polyline(&mut self) -> Result<(), OffSurface> {
@@ -288,32 +313,40 @@ impl<'a> Operations<'a> {
         if let Some(contour) = &mut self.contour {
             let fits = policy.is_none_or(|policy| policy == contour.policy);
             if fits && contour.extend(track, demands, &joining) {
+                if contour.weight() > LONG_PATH && contour.is_lit() {
+                    let next = contour.split_last();
+                    if let Some(part) = core::mem::replace(&mut self.contour, next) {
+                        self.end(part, true);
+                    }
+                }
                 return;
             }
         }
         if let Some(contour) = self.contour.take() {
-            self.end(contour);
+            self.end(contour, false);
         }
         let policy = policy.unwrap_or(Policy::Proportional);
         self.contour = Some(Contour::new(track.clone(), demands, policy));
     }
 
-    /// Hands on a path that is complete.
-    fn end(&mut self, contour: Contour) {
+    /// Hands on a path, or a part of one that `goes_on`.
+    fn end(&mut self, contour: Contour, goes_on: bool) {
         let line = contour.line;
+        let is_first = !contour.goes_on_from_before();
         let extent = Extent::of(&contour);
-        let (contour, left) = without_dark_ends(contour, &self.limits);
-        let mut contour = contour;
+        let (mut contour, left) = without_dark_ends(contour, goes_on, &self.limits);
         self.limit_changes(&mut contour);
-        // Free moves that only lead to a path are left to its approach.
-        if matches!(self.done.last(), Some(Operation { kind: OperationKind::Rapid(_), .. })) {
-            self.done.pop();
+        if is_first {
+            // Free moves that only lead to a path are left to its approach.
+            if matches!(self.done.back(), Some(Operation { kind: OperationKind::Rapid(_), .. })) {
+                self.done.pop_back();
+            }
+            self.leave_row_step(&extent);
         }
-        self.leave_row_step(&extent);
-        self.before = [self.before[1], Some(extent)];
-        self.done.push(Operation { kind: OperationKind::Path(Box::new(contour)), line });
+        self.before = if is_first && !goes_on { [self.before[1], Some(extent)] } else { [None; 2] };
+        self.done.push_back(Operation { kind: OperationKind::Path(Arc::new(contour)), line });
         if let Some(to) = left {
-            self.done.push(Operation { kind: OperationKind::Rapid(to), line });
+            self.done.push_back(Operation { kind: OperationKind::Rapid(to), line });
         }
     }
 
@@ -337,7 +370,7 @@ impl<'a> Operations<'a> {
         }
         let is_path = |operation: &Operation| matches!(operation.kind, OperationKind::Path(_));
         let Some(index) = self.done.iter().rposition(is_path) else { return };
-        let line = self.done.remove(index).line;
+        let Some(Operation { line, .. }) = self.done.remove(index) else { return };
         if !step.is_lit {
             return;
         }
@@ -395,10 +428,16 @@ fn is_row_step(row: &Extent, step: &Extent, next: &Extent) -> bool {
 }
 
 /// A path of one speed without what is dark at its ends, which its run-in and run-out take the place
-/// of, and where it ended.
-fn without_dark_ends(mut contour: Contour, limits: &PathLimits) -> (Contour, Option<Vector3<f64>>) {
+/// of, and where it ended. A path that `goes_on` does not end there.
+fn without_dark_ends(
+    mut contour: Contour,
+    goes_on: bool,
+    limits: &PathLimits,
+) -> (Contour, Option<Vector3<f64>>) {
+    let is_whole = !goes_on && !contour.goes_on_from_before();
     if contour.policy == Policy::Proportional || !contour.is_lit() {
-        let policy = if contour.is_lit() { contour.policy } else { Policy::Proportional };
+        let policy =
+            if contour.is_lit() || !is_whole { contour.policy } else { Policy::Proportional };
         contour.policy = policy;
         return (contour, None);
     }
@@ -410,12 +449,14 @@ fn without_dark_ends(mut contour: Contour, limits: &PathLimits) -> (Contour, Opt
     let (Some((from, _)), Some((_, to))) = (lit.first(), lit.last()) else {
         return (contour, None);
     };
-    if *from <= GAP && contour.length() - to <= GAP {
+    let from = if contour.goes_on_from_before() { 0.0 } else { *from };
+    let to = if goes_on { contour.length() } else { *to };
+    if from <= GAP && contour.length() - to <= GAP {
         return (contour, None);
     }
     let end = contour.end().point;
     let left = (contour.length() - to > GAP).then_some(end);
-    match contour.part(*from, *to, limits) {
+    match contour.part(from, to, limits) {
         Some(part) => (part, left),
         None => (contour, None),
     }

@@ -1,11 +1,13 @@
 //! Straight moves that follow each other, gathered until it is known what they draw: a line in
 //! pieces, a curve in chords, or corners.
 
+use std::ops::RangeInclusive;
+
 use nalgebra::Vector3;
 
 use crate::drawing::Curve;
 use crate::geometry::contour::{CORNER, Demand, GAP};
-use crate::geometry::fit::{Part, fit};
+use crate::geometry::fit::{Fitted, Fitter, Part, fit};
 use crate::geometry::track::Track;
 use crate::light::Policy;
 
@@ -25,11 +27,24 @@ pub(crate) struct Chord {
     pub(crate) is_free: bool,
 }
 
+/// Moves from which on a polyline is handed on before its end is known, and how many more come then
+/// before it is looked at again.
+const LONG: usize = 1 << 15;
+const MORE: usize = 1 << 9;
+
 /// Straight moves from a start on.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Polyline {
     vertices: Vec<Vector3<f64>>,
     chords: Vec<Chord>,
+    policy: Option<Policy>,
+    /// What fits a polyline that is long, and how many vertices it has taken of those that are still
+    /// here.
+    fitter: Option<(Fitter, usize)>,
+    /// The number of the first vertex that is still here.
+    first: usize,
+    /// How many moves there must be before it is looked at whether a part is certain.
+    look: usize,
 }
 
 /// A curve of a polyline, and what is asked for along it.
@@ -45,6 +60,7 @@ impl Polyline {
         if self.vertices.is_empty() {
             self.vertices.push(from);
         }
+        self.policy = chord.policy.or(self.policy);
         self.vertices.push(chord.to);
         self.chords.push(chord);
     }
@@ -62,7 +78,7 @@ impl Polyline {
 
     /// The policy of its light; `None` where all is dark so far.
     pub(crate) fn policy(&self) -> Option<Policy> {
-        self.chords.iter().rev().find_map(|chord| chord.policy)
+        self.policy
     }
 
     /// Whether a move from its end to `to` goes straight on.
@@ -74,18 +90,76 @@ impl Polyline {
     /// The curves that it draws, and empties it. With a `tolerance` [m] curves in chords become
     /// curves again; without, only what lies on one line is put together.
     pub(crate) fn take(&mut self, tolerance: Option<f64>) -> Vec<Drawn> {
+        let mut found = Vec::new();
+        if let Some((fitter, fed)) = &mut self.fitter {
+            self.vertices[*fed..].iter().for_each(|vertex| fitter.push(*vertex));
+            *fed = self.vertices.len();
+            fitter.finish();
+            found = self.certain();
+            (self.fitter, self.first) = (None, 0);
+        }
+        self.look = 0;
+        self.policy = None;
         let vertices = core::mem::take(&mut self.vertices);
         let chords = core::mem::take(&mut self.chords);
         match tolerance {
-            Some(tolerance) if chords.len() > 1 => fit(&vertices, tolerance + rounding(&vertices))
-                .into_iter()
-                .map(|(part, covers)| {
+            _ if chords.is_empty() => {}
+            Some(tolerance) if chords.len() > 1 => {
+                for (part, covers) in fit(&vertices, tolerance + rounding(&vertices)) {
                     let (first, last) = (*covers.start(), *covers.end());
-                    drawn(&part, &vertices[first..=last], &chords[first..last], first)
-                })
-                .collect(),
-            _ => lines(&vertices, &chords),
+                    found.push(drawn(&part, &vertices[first..=last], &chords[first..last], first));
+                }
+            }
+            _ => found.extend(lines(&vertices, &chords)),
         }
+        found
+    }
+
+    /// Of a polyline that is long, the curves that nothing which comes after changes.
+    pub(crate) fn take_certain(&mut self, tolerance: Option<f64>) -> Vec<Drawn> {
+        let is_long = self.fitter.is_some() || self.chords.len() >= LONG;
+        if !is_long || self.chords.len() < self.look {
+            return Vec::new();
+        }
+        self.look = self.chords.len() + MORE;
+        let Some(tolerance) = tolerance else { return self.certain_lines() };
+        let (fitter, fed) = self.fitter.get_or_insert_with(|| {
+            (Fitter::new(tolerance + rounding(&self.vertices)), 0)
+        });
+        // The last move may be taken off again.
+        let known = self.vertices.len() - 1;
+        self.vertices[*fed..known].iter().for_each(|vertex| fitter.push(*vertex));
+        *fed = known;
+        self.certain()
+    }
+
+    /// What the fitter is certain of.
+    fn certain(&mut self) -> Vec<Drawn> {
+        let mut found = Vec::new();
+        while let Some((fitter, fed)) = &mut self.fitter {
+            let Some(Fitted { part, vertices, .. }) = fitter.part() else { break };
+            let [from, to] = [*vertices.start(), *vertices.end()].map(|number| number - self.first);
+            found.push(drawn(&part, &self.vertices[from..=to], &self.chords[from..to], from + self.first));
+            self.vertices.drain(..to);
+            self.chords.drain(..to);
+            self.first += to;
+            *fed -= to;
+            self.look = self.chords.len() + MORE;
+        }
+        found
+    }
+
+    /// The lines that no move to come can lengthen.
+    fn certain_lines(&mut self) -> Vec<Drawn> {
+        let mut runs = straight_runs(&self.vertices);
+        // The last may go on, and its last move may be taken off again.
+        runs.pop();
+        runs.pop();
+        let Some(last) = runs.last().map(|run| *run.end()) else { return Vec::new() };
+        let found = lines(&self.vertices[..=last], &self.chords[..last]);
+        self.vertices.drain(..last);
+        self.chords.drain(..last);
+        found
     }
 }
 
@@ -166,21 +240,27 @@ fn merged(demands: impl Iterator<Item = Demand>) -> Vec<Demand> {
 
 /// The chords as lines, those on one line put together.
 fn lines(vertices: &[Vector3<f64>], chords: &[Chord]) -> Vec<Drawn> {
+    let runs = straight_runs(vertices).into_iter();
+    runs.map(|run| {
+        let (first, last) = (*run.start(), *run.end());
+        let range = first..last;
+        line(vertices[first], vertices[last], &vertices[range.clone()], &chords[range])
+    })
+    .collect()
+}
+
+/// The first and last vertices of what lies on one line.
+fn straight_runs(vertices: &[Vector3<f64>]) -> Vec<RangeInclusive<usize>> {
     let mut found = Vec::new();
     let mut first = 0;
-    for last in 1..=chords.len() {
-        let goes_on = last < chords.len() && {
+    for last in 1..vertices.len() {
+        let goes_on = last + 1 < vertices.len() && {
             let (before, after) =
                 (vertices[last] - vertices[first], vertices[last + 1] - vertices[last]);
             before.dot(&after) >= SAME * before.norm() * after.norm()
         };
         if !goes_on {
-            found.push(line(
-                vertices[first],
-                vertices[last],
-                &vertices[first..last],
-                &chords[first..last],
-            ));
+            found.push(first..=last);
             first = last;
         }
     }

@@ -109,6 +109,15 @@ impl Ellipse {
 }
 
 impl Track {
+    /// How much memory it takes, about, in vertices: 1 for a curve by itself.
+    pub(crate) fn weight(&self) -> usize {
+        match self {
+            Self::Spline { vertices, .. } => vertices.len().max(1),
+            Self::Part { of, .. } => of.weight(),
+            _ => 1,
+        }
+    }
+
     /// Takes `curve` by arc length.
     pub(crate) fn new(curve: &Curve) -> Self {
         match *curve {

@@ -2,6 +2,7 @@
 
 pub mod cloud;
 pub mod cloud_table;
+mod estimate;
 pub mod file;
 pub mod gcode;
 pub mod letters;

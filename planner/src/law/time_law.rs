@@ -144,6 +144,12 @@ impl TimeLaw {
         (first, Self { cells: rest })
     }
 
+    /// The same law along a path that begins `distance` later [m].
+    pub fn moved_back(&self, distance: f64) -> Self {
+        let moved = |cell: &Cell| Cell { place: cell.place - distance, ..*cell };
+        Self { cells: self.cells.iter().map(moved).collect() }
+    }
+
     /// Adds a launch from rest at `place` over `length` [m] to the speed of `square` [m²/s²].
     pub(super) fn launch(&mut self, place: f64, length: f64, square: f64, limit: u16) {
         let speed = square.sqrt();

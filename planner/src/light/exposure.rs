@@ -73,7 +73,7 @@ impl Light {
     ) -> Result<(), TooShort> {
         let places = law.places();
         let follows = follows || contour.policy == Policy::Proportional;
-        for (demand, end) in contour.stretches() {
+        for (demand, end) in contour.stretches_in(&places) {
             let (from, to) = (demand.from.max(places.start), end.min(places.end));
             if to - from <= 0.0 {
                 continue;

@@ -50,6 +50,8 @@ pub(super) struct PathRun<const N: usize> {
     pub(super) begin: End,
     /// How the path ends.
     pub(super) exit: End,
+    /// The speed that its joints were smoothed for [m/s]; `None` for as wide as they may be.
+    pub(super) smoothed_for: Option<f64>,
     /// The one speed of the path, where it has one [m/s].
     pub(super) even: Option<f64>,
     /// Whether the power follows the speed whatever the policy.
@@ -103,7 +105,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
 
     /// That what is drawn lies within the area: told by the tool's place before anything is told by
     /// joints.
-    fn stays_inside(&self, contour: &Contour) -> Result<(), PlanError> {
+    pub(super) fn stays_inside(&self, contour: &Contour) -> Result<(), PlanError> {
         /// How far a chord may lie from the curve [m].
         const CHORD: f64 = 1e-5;
         /// Rounding at the edge [m].
@@ -130,18 +132,20 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     }
 
     /// The speed limits along a contour, stretch by stretch.
-    fn speed_limits(&self, contour: &Contour) -> Vec<SpeedLimit> {
+    pub(super) fn speed_limits(&self, contour: &Contour) -> Vec<SpeedLimit> {
         let path = &self.limits.path;
         let by_source = source_speeds(contour, &self.task.machine.laser);
         let mut limits: Vec<SpeedLimit> = Vec::new();
         for (demand, least) in contour.demands().iter().zip(by_source) {
             let (speed, source) = if demand.power > 0.0 {
-                let asked = self.task.speeds.of(demand.speed);
                 let most = self.task.speeds.most;
+                let asked = (self.task.speeds.of(demand.speed) * self.rate).min(most);
                 (asked, if asked < most { Source::FEED } else { Source::MARKING_SPEED })
             } else {
                 match demand.speed {
-                    Some(speed) if speed < path.rapid => (speed, Source::FEED),
+                    Some(speed) if speed * self.rate < path.rapid => {
+                        (speed * self.rate, Source::FEED)
+                    }
                     _ => (path.rapid, Source::RAPID),
                 }
             };
@@ -174,6 +178,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             at: 0.0,
             begin: End::Rest,
             exit: End::Rest,
+            smoothed_for: None,
             even: None,
             follows: true,
             reach: (fraction * top).max(least_reach),
@@ -229,6 +234,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         );
         draft.notes.push(Note { line: contour.line, text });
         self.front.parts.extend(parts.into_iter().map(Arc::new));
+        self.front.goes_on = false;
         Ok(())
     }
 
@@ -250,7 +256,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             });
         }
         let fastest = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
-        let path = contour.trace(Some(fastest.min(top)), &self.limits.path);
+        let smoothed_for = Some(fastest.min(top));
+        let path = contour.trace(smoothed_for, &self.limits.path);
         let length = path.length();
         let middle = |share: f64| path.at(length * share).motion(1.0, 0.0, 0.0);
         let mut wanted = match self.wanted(&path, &middle) {
@@ -262,8 +269,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             let trail = trail(&self.limits, &wanted, &path)
                 .map_err(|cause| self.refusal(Refused::Kinematics(cause)))?;
             let mut run = self.run(contour.clone(), path.clone(), trail, speeds.clone());
-            run.follows = false;
-            let evenly = speeds.len() == 1 && fastest <= top;
+            (run.follows, run.smoothed_for) = (false, smoothed_for);
+            let evenly = speeds.len() == 1 && fastest <= top && !self.front.goes_on;
             let timed = self
                 .time_constant(&mut run, evenly, &mut ends, draft.shares)
                 .map_err(|cause| self.refusal(cause))?;
@@ -293,7 +300,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
                         come to speed in the dark"
                     .to_owned();
             let told = |notes: &[Note]| notes.iter().any(|note| note.text == text);
-            if !told(&self.notes) && !told(&draft.notes) {
+            if !told(&self.account.notes) && !told(&draft.notes) {
                 draft.notes.push(Note { line: run.contour.line, text });
             }
         }
@@ -380,7 +387,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             });
             (run.begin, run.exit) = (begin, exit);
             run.follows = ends.contains(&false);
-            if ends[1] && !self.can_leave(run, speeds[1], shares) {
+            // What goes on has no end yet.
+            if ends[1] && !self.front.goes_on && !self.can_leave(run, speeds[1], shares) {
                 trials[1] += 2;
                 speeds[1] *= END_SLOWER * END_SLOWER;
                 continue;

@@ -4,8 +4,7 @@
 use std::sync::Arc;
 
 use machine::Mechanism;
-use messages::artwork::Artwork;
-use messages::artwork::Stroke;
+use messages::artwork::{Artwork, ArtworkLine, Stroke};
 use nalgebra::Vector3;
 
 use super::paths::PathRun;
@@ -23,7 +22,7 @@ use crate::limits::tightening::Tightening;
 use crate::trajectory::Motion;
 
 /// The time that a window should take [s].
-const WINDOW: f64 = 1.2;
+pub(super) const WINDOW: f64 = 1.2;
 
 /// The part of a window that is handed on; the rest is planned anew with what follows.
 const HANDED_ON: f64 = 0.6;
@@ -60,7 +59,9 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             return Ok(Ok(Timed { law, next: (to < length).then_some(next), fallback: None }));
         }
         let mut along = AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
-        let is_whole = run.at == 0.0 && run.begin == End::Rest && run.exit == End::Rest;
+        let goes_on = self.front.goes_on;
+        let is_whole =
+            !goes_on && run.at == 0.0 && run.begin == End::Rest && run.exit == End::Rest;
         if is_whole && run.path.is_straight() {
             along.is_exact = true;
             if let Some(law) = straight(&mut along, length) {
@@ -71,7 +72,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         if let Some(timed) = Self::plateau(run, &mut along) {
             return Ok(Ok(timed));
         }
-        let to = if length - run.at <= 1.3 * run.reach { length } else { run.at + run.reach };
+        let ends = !goes_on && length - run.at <= 1.3 * run.reach;
+        let to = if ends { length } else { (run.at + run.reach).min(length) };
         let end = if to < length { End::Rest } else { run.exit };
         if to < length
             && let Some(timed) = Self::onto_plateau(run, &mut along, to)
@@ -100,6 +102,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     /// Goes on along the path that is under way.
     pub(super) fn go_on(&mut self, draft: &mut Draft<'_>) -> Result<(), PlanError> {
         let Some(mut run) = self.front.run.take() else { return Ok(()) };
+        self.lengthen(&mut run, draft)?;
         let timed = self.time(&run, draft.shares).map_err(|cause| self.refusal(cause))?;
         let timed = match timed {
             Ok(timed) => timed,
@@ -149,7 +152,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             before
         };
         if begins {
-            draft.strokes.extend(strokes(&run.contour));
+            draft.strokes.extend(strokes(&run.contour, false));
+            draft.length += run.contour.lit_length();
         }
         self.account(&run, &law, draft);
         let places = law.places();
@@ -235,24 +239,31 @@ fn cut(law: TimeLaw, place: f64) -> Timed {
     Timed { law: first, next: Some(next), fallback: Some(rest) }
 }
 
-/// The lines that a contour marks, each from light to dark.
-fn strokes(contour: &Contour) -> Vec<Stroke> {
+/// A dot of the artwork.
+pub(super) fn dot(at: &Vector3<f64>, line: u64) -> ArtworkLine {
+    ArtworkLine { goes_on: false, stroke: Stroke { points: vec![(*at).into()], line } }
+}
+
+/// The lines that a contour marks, each from light to dark; the first goes on from the contour before if
+/// that `was_lit` at its end.
+pub(super) fn strokes(contour: &Contour, was_lit: bool) -> Vec<ArtworkLine> {
     let mut strokes = Vec::new();
     let mut open: Option<(f64, f64, u64)> = None;
+    let mut close = |(from, to, line): (f64, f64, u64)| {
+        let stroke = Stroke { points: contour.points(from, to, CHORD), line };
+        strokes.push(ArtworkLine { goes_on: was_lit && from == 0.0, stroke });
+    };
     for (demand, to) in contour.stretches() {
-        let is_lit = demand.power > 0.0;
-        open = match open {
-            Some((from, _, line)) if is_lit => Some((from, to, line)),
-            None if is_lit => Some((demand.from, to, demand.line)),
-            Some((from, end, line)) => {
-                strokes.push(Stroke { points: contour.points(from, end, CHORD), line });
+        open = match (open, demand.power > 0.0) {
+            (Some((from, _, line)), true) => Some((from, to, line)),
+            (None, true) => Some((demand.from, to, demand.line)),
+            (Some(line), false) => {
+                close(line);
                 None
             }
-            None => None,
+            (None, false) => None,
         };
     }
-    if let Some((from, end, line)) = open {
-        strokes.push(Stroke { points: contour.points(from, end, CHORD), line });
-    }
+    open.into_iter().for_each(&mut close);
     strokes
 }

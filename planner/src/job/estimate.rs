@@ -1,0 +1,50 @@
+//! How long a job takes, roughly, before it is planned.
+
+use machine::PathLimits;
+
+use super::Job;
+use crate::drawing::{Action, Curve};
+use crate::geometry::track::Track;
+
+impl Job {
+    /// How long the job takes at the speeds asked for, as if the tool started, stopped and turned in no
+    /// time [s]; `marking` gives the speed of a mark that asks for one or none [m/s].
+    pub(crate) fn estimate(
+        &self,
+        limits: &PathLimits,
+        marking: &dyn Fn(Option<f64>) -> f64,
+    ) -> f64 {
+        if let (Some(survey), Some(_)) = (&self.survey, &self.rest) {
+            return survey.time;
+        }
+        let mut place = self.drawing.start;
+        let mut time = 0.0;
+        for step in &self.drawing.steps {
+            time += match &step.action {
+                Action::Mark { curve, speed, .. } => {
+                    place = curve.to();
+                    length(curve) / marking(*speed)
+                }
+                Action::Feed { curve, speed } => {
+                    place = curve.to();
+                    length(curve) / speed.min(limits.rapid)
+                }
+                Action::Rapid { to } => {
+                    let way = (to - place).norm();
+                    place = *to;
+                    way / limits.rapid
+                }
+                Action::Dwell { time, .. } => *time,
+                Action::Output { .. } | Action::Pause | Action::Corners(_) => 0.0,
+            };
+        }
+        time
+    }
+}
+
+fn length(curve: &Curve) -> f64 {
+    match curve {
+        Curve::Line { from, to } => (to - from).norm(),
+        Curve::Arc { .. } => Track::new(curve).length(),
+    }
+}

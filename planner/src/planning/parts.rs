@@ -1,0 +1,227 @@
+//! Paths that are too long to be known whole: the next part of one is put behind what is left of it
+//! before planning looks that far, and what lies behind the tool is let go.
+
+use std::sync::Arc;
+
+use machine::Mechanism;
+
+use super::paths::PathRun;
+use super::windows::{WINDOW, strokes};
+use super::{Draft, Planning, plateau};
+use crate::error::PlanError;
+use crate::geometry::contour::Contour;
+use crate::geometry::path::Path;
+use crate::joint_space::configuration::{Configuration, trail};
+use crate::law::End;
+use crate::law::row::Side;
+use crate::law::windows::even_speed;
+use crate::light::Policy;
+use crate::limits::along::{AlongPath, SpeedLimit};
+use crate::limits::tightening::Tightening;
+
+/// How much slower the end of a path is passed where it cannot be left at its speed, and how often
+/// that is tried.
+const SLOWER: f64 = 0.8;
+const TRIALS: usize = 20;
+
+/// How much longer than it takes at full acceleration a change of speed may take.
+const GENTLE: f64 = 1.5;
+
+impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
+    /// `contour` with as many of its next parts behind it as planning looks ahead.
+    pub(super) fn with_next_parts(
+        &mut self,
+        contour: Arc<Contour>,
+    ) -> Result<Arc<Contour>, PlanError> {
+        let mut contour = contour;
+        self.front.goes_on = true;
+        let needed = self.look_ahead(&self.speed_limits(&contour));
+        while contour.length() < needed {
+            let Some(next) = self.take_next_part()? else { return Ok(contour) };
+            contour = Arc::new(contour.followed_by(0.0, &next).0);
+        }
+        self.front.goes_on = self.operations.next_part(self.front.next)?.is_some();
+        Ok(contour)
+    }
+
+    /// Puts the next parts behind the path under way, so that planning can look far enough ahead.
+    pub(super) fn lengthen(
+        &mut self,
+        run: &mut PathRun<N>,
+        draft: &mut Draft<'_>,
+    ) -> Result<(), PlanError> {
+        while self.front.goes_on && run.path.length() - run.at < self.look_ahead(&run.speeds) {
+            let before = self.front.next;
+            let longer = match self.take_next_part()? {
+                Some(next) => self.longer(run, &next, draft),
+                None => None,
+            };
+            match longer {
+                Some(longer) => *run = longer,
+                // It ends here, and the next part is a path of its own.
+                None => (self.front.goes_on, self.front.next) = (false, before),
+            }
+            if !self.front.goes_on {
+                self.choose_exit(run, draft.shares);
+            }
+        }
+        Ok(())
+    }
+
+    /// How far ahead of the tool a path must be known [m].
+    fn look_ahead(&self, speeds: &[SpeedLimit]) -> f64 {
+        let limits = &self.limits.path;
+        let top = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
+        let stop = top * top / limits.acceleration + top * limits.acceleration / limits.jerk;
+        top * (plateau::LONGEST + 2.0 * WINDOW) + 20.0 * (stop + 1e-5)
+    }
+
+    /// The next part of the path under way, if there is one.
+    fn take_next_part(&mut self) -> Result<Option<Arc<Contour>>, PlanError> {
+        let next = self.operations.next_part(self.front.next)?;
+        match &next {
+            Some(contour) => {
+                self.stays_inside(contour)?;
+                self.front.next += 1;
+                self.front.estimated += self.estimate_of(contour);
+                self.front.goes_on = self.operations.next_part(self.front.next)?.is_some();
+            }
+            None => self.front.goes_on = false,
+        }
+        Ok(next)
+    }
+
+    /// `run` with `next` behind it; `None` where the joints cannot go there without being turned back
+    /// first.
+    fn longer(
+        &self,
+        run: &PathRun<N>,
+        next: &Contour,
+        draft: &mut Draft<'_>,
+    ) -> Option<PathRun<N>> {
+        let (contour, left_out) = run.contour.followed_by(run.at, next);
+        let path = contour.trace(run.smoothed_for, &self.limits.path);
+        let near = run.trail.partition_point(|(at, _)| *at <= left_out).max(1) - 1;
+        let Configuration { joints, mut branch } = run.trail[near].1;
+        let tool = path.at(0.0).motion(1.0, 0.0, 0.0);
+        let first = self.limits.follow(&tool, &mut branch, &joints).ok()?;
+        let start = Configuration { joints: first.position, branch };
+        let trail = trail(&self.limits, &start, &path).ok()?;
+        let within = |(_, now): &(f64, Configuration<N>)| self.is_within_travel(now);
+        if !trail.iter().all(within) || !self.is_within_travel(&self.end_of(&path, &trail)?) {
+            return None;
+        }
+        let was_lit = run.contour.demands().last().is_some_and(|demand| demand.power > 0.0);
+        draft.strokes.extend(strokes(next, was_lit));
+        draft.length += next.lit_length();
+        let speeds = self.speed_limits(&contour);
+        Some(PathRun {
+            at: run.at - left_out,
+            fallback: run.fallback.as_ref().map(|law| law.moved_back(left_out)),
+            contour: Arc::new(contour),
+            path: Arc::new(path),
+            trail: Arc::new(trail),
+            speeds: Arc::new(speeds),
+            even: None,
+            ..run.clone()
+        })
+    }
+
+    fn end_of(&self, path: &Path, trail: &[(f64, Configuration<N>)]) -> Option<Configuration<N>> {
+        let Configuration { joints, mut branch } = trail.last()?.1;
+        let tool = path.at(path.length()).motion(1.0, 0.0, 0.0);
+        let motion = self.limits.follow(&tool, &mut branch, &joints).ok()?;
+        Some(Configuration { joints: motion.position, branch })
+    }
+
+    fn is_within_travel(&self, now: &Configuration<N>) -> bool {
+        self.limits.axes.iter().zip(now.joints.iter()).all(|(axis, joint)| {
+            (axis.limits.position[0]..=axis.limits.position[1]).contains(joint)
+        })
+    }
+
+    /// How a path ends whose end was not known when it began: at its speed where that can be, as the
+    /// policy has it, else at rest.
+    pub(super) fn choose_exit(&self, run: &mut PathRun<N>, shares: &Tightening) {
+        run.exit = End::Rest;
+        if run.contour.policy == Policy::Proportional || !run.contour.is_lit() {
+            return;
+        }
+        let length = run.path.length();
+        let mut along = AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
+        along.is_exact = true;
+        let most = self.limits.path.rapid.max(self.limits.path.speed) * 2.0;
+        let allowed = even_speed(&mut along, length, Side::Before, most);
+        let asked = run.speeds.last().map_or(0.0, |last| shares.speed * last.speed);
+        let mut speed = if allowed >= asked * (1.0 - 1e-9) { asked } else { 0.995 * allowed };
+        for _ in 0..TRIALS {
+            if self.can_leave(run, speed, shares) {
+                run.exit = End::Moving { speed, acceleration: 0.0 };
+                return;
+            }
+            speed *= SLOWER;
+        }
+    }
+
+    /// Marks at `rate` times the speeds asked for from here on, 1 as the job has them.
+    pub(crate) fn set_rate(&mut self, rate: f64) {
+        if rate == self.rate {
+            return;
+        }
+        self.rate = rate;
+        let Some(mut run) = self.front.run.take() else { return };
+        let mut speeds = self.speed_limits(&run.contour);
+        if let End::Moving { speed, .. } = run.begin {
+            let to = run.at + self.way_to_slow_down(speed);
+            keep_up(&mut speeds, run.at, to, speed);
+        }
+        run.speeds = Arc::new(speeds);
+        run.even = None;
+        if !self.front.goes_on && matches!(run.exit, End::Moving { .. }) {
+            self.choose_exit(&mut run, &Tightening::none(N));
+        }
+        self.front.run = Some(run);
+    }
+
+    /// A way on which the tool surely comes from `speed` to any lower one [m].
+    fn way_to_slow_down(&self, speed: f64) -> f64 {
+        let limits = &self.limits.path;
+        let time = speed / limits.acceleration + limits.acceleration / limits.jerk;
+        GENTLE * speed * time
+    }
+}
+
+/// Lets the speeds from `from` to `to` [m] be at least `least` [m/s]: what the tool has it cannot lose at
+/// once.
+fn keep_up(speeds: &mut Vec<SpeedLimit>, from: f64, to: f64, least: f64) {
+    let mut kept = Vec::with_capacity(speeds.len() + 2);
+    for (index, limit) in speeds.iter().enumerate() {
+        let end = speeds.get(index + 1).map_or(f64::INFINITY, |next| next.from);
+        for (start, stop) in [(limit.from, from), (limit.from.max(from), to), (to, end)] {
+            let (start, stop) = (start.max(limit.from), stop.min(end));
+            if stop <= start {
+                continue;
+            }
+            let is_kept = start >= from && stop <= to;
+            let speed = if is_kept { limit.speed.max(least) } else { limit.speed };
+            kept.push(SpeedLimit { from: start, speed, ..*limit });
+        }
+    }
+    *speeds = kept;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::source::Source;
+
+    #[test]
+    fn a_speed_that_the_tool_has_is_kept_for_a_while() {
+        let limit = |from, speed| SpeedLimit { from, speed, source: Source::FEED };
+        let mut speeds = vec![limit(0.0, 1.0), limit(2.0, 3.0)];
+        keep_up(&mut speeds, 1.0, 2.5, 2.0);
+        let expected =
+            [limit(0.0, 1.0), limit(1.0, 2.0), limit(2.0, 3.0), limit(2.5, 3.0)];
+        assert_eq!(speeds, expected);
+    }
+}

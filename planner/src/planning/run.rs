@@ -1,0 +1,246 @@
+//! A job from its first window to its last: as far ahead of whoever takes the windows as they let it
+//! be, and planned anew from where they are when the job shall be faster.
+
+use std::collections::VecDeque;
+
+use machine::kinematics::Joints;
+use machine::{Machine, Mechanism, MechanismVisitor, PathLimits, Pose};
+use messages::AxisArray;
+use messages::axis::axis_array;
+use nalgebra::Vector3;
+
+use super::source::{Source, Steps};
+use super::{Checkpoint, Planning, Task, Window};
+use crate::drawing::{Action, Note, Step};
+use crate::error::PlanError;
+use crate::geometry::operation::{Operation, Operations};
+use crate::job::{Job, MarkingSpeed};
+use crate::law::optimum::Speeds;
+use crate::limits::motion_limits::Scope;
+use crate::plan::PlanFacts;
+
+/// Who takes the windows of a job.
+pub(crate) trait Outlet {
+    /// Whether nobody wants them any more.
+    fn is_abandoned(&self) -> bool;
+
+    /// Takes the next window; gives it back when there is no room for it yet.
+    fn take(&mut self, window: Window) -> Result<(), Window>;
+
+    /// How many setpoints may be planned before they can be taken.
+    fn ahead(&self) -> usize {
+        0
+    }
+
+    /// How much faster than it asks for the job shall be marked, 1 as it asks.
+    fn rate(&self) -> f64 {
+        1.0
+    }
+
+    /// Waits a little for room.
+    fn wait(&mut self) {}
+
+    /// What the plan comes to so far, asked for after each window and, as `is_last`, at the end.
+    fn heed(&mut self, _facts: &dyn Fn() -> PlanFacts, _is_last: bool) {}
+}
+
+/// Plans `job` for `machine` within `scope` and hands each window to `outlet`, checked; its setpoints
+/// belong to `stream`.
+///
+/// # Errors
+/// The first thing in it that no speed can do, with line, stroke, time, axis, value and limit.
+pub(crate) fn plan_windows(
+    machine: &Machine,
+    job: &Job,
+    scope: Scope,
+    stream: u64,
+    outlet: &mut dyn Outlet,
+) -> Result<PlanFacts, PlanError> {
+    if let (Some(reason), Scope::Machine) = (job.ideal_only, scope) {
+        return Err(PlanError::IdealOnly(reason));
+    }
+    let drawing = &job.drawing;
+    let limits = PathLimits {
+        rapid: job.rapid.unwrap_or(machine.path.rapid),
+        tolerance: job.marking.tolerance.unwrap_or(machine.path.tolerance),
+        ..machine.path
+    };
+    let operations =
+        || Operations::new(drawing.start, &limits, machine.corners, job.surface.as_ref());
+    let mut notes = drawing.notes.clone();
+    let open = if leaves_speeds_open(job) {
+        all(Source::new(held(job), operations()))?
+    } else {
+        Vec::new()
+    };
+    let speeds = Speeds::choose(drawing.start, &open, &limits, &job.marking, &mut notes);
+    drop(open);
+    let standing = job
+        .standing
+        .unwrap_or_else(|| machine.mechanism.visit(Start { machine, start: drawing.start }));
+    let estimate = job.estimate(&limits, &|speed| speeds.of(speed));
+    let task = Task {
+        machine,
+        limits,
+        scope,
+        speeds,
+        turns: job.marking.turns,
+        attitude: job.attitude,
+        standing,
+        estimate,
+        start: drawing.start,
+    };
+    let steps: Steps<'_> = Box::new(job.steps().map_err(|error| PlanError::Unreadable {
+        line: 0,
+        message: error.to_string(),
+    })?);
+    let source = Source::new(steps, operations());
+    let facts = Facts { name: &drawing.name, notes };
+    machine.mechanism.visit(Run { task: &task, source, stream, outlet, facts })
+}
+
+/// Whether the speed of some line is for the planner to choose, so that it must know the job before
+/// it begins.
+fn leaves_speeds_open(job: &Job) -> bool {
+    let is_open = |step: &Step| {
+        let Action::Mark { speed, power, .. } = &step.action else { return false };
+        speed.is_none() && !power.follows_speed
+    };
+    match job.marking.speed {
+        Some(MarkingSpeed::Constant(_)) => false,
+        Some(MarkingSpeed::Optimum) => true,
+        None => job.drawing.steps.iter().any(is_open),
+    }
+}
+
+/// The steps by which speeds are chosen: of a program that is too long to be held, its beginning.
+fn held(job: &Job) -> Steps<'_> {
+    match job.steps() {
+        Ok(steps) => Box::new(steps.take(Job::HELD as usize)),
+        Err(_) => Box::new(core::iter::empty()),
+    }
+}
+
+fn all(mut source: Source<'_>) -> Result<Vec<Operation>, PlanError> {
+    let mut operations = Vec::new();
+    while let Some(operation) = source.get(operations.len())? {
+        operations.push(operation.clone());
+    }
+    Ok(operations)
+}
+
+/// Where the joints stand when nobody says: at home, or where the drawing begins on a machine whose
+/// joints follow from that.
+struct Start<'a> {
+    machine: &'a Machine,
+    start: Vector3<f64>,
+}
+
+impl MechanismVisitor for Start<'_> {
+    type Output = AxisArray;
+
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> AxisArray {
+        let home = axis_array(self.machine.home_joints.as_slice());
+        if !mechanism.is_linear() {
+            return home;
+        }
+        let near = Joints::<N>::from_fn(|axis, _| home[axis]);
+        let joints = mechanism.inverse(&Pose::at(self.start), mechanism.branch(), &near);
+        joints.map_or(home, |joints| axis_array(joints.as_slice()))
+    }
+}
+
+/// What of the facts is known beforehand.
+struct Facts<'a> {
+    name: &'a str,
+    notes: Vec<Note>,
+}
+
+impl Facts<'_> {
+    fn of<const N: usize, M: Mechanism<N>>(&self, planning: &Planning<'_, N, M>) -> PlanFacts {
+        let account = &planning.account;
+        PlanFacts {
+            name: self.name.to_owned(),
+            strokes: account.strokes as usize,
+            length: account.length,
+            duration: planning.duration(),
+            samples: planning.samples(),
+            speed: account.speed,
+            notes: [self.notes.clone(), planning.notes()].concat(),
+            uses: planning.utilization().clone(),
+            binding: account.shares.report(&planning.task.machine.axes),
+        }
+    }
+}
+
+/// Plans a job on a mechanism.
+struct Run<'a, 'o> {
+    task: &'a Task<'a>,
+    source: Source<'a>,
+    stream: u64,
+    outlet: &'o mut dyn Outlet,
+    facts: Facts<'a>,
+}
+
+impl MechanismVisitor for Run<'_, '_> {
+    type Output = Result<PlanFacts, PlanError>;
+
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
+        let Self { task, source, stream, outlet, facts } = self;
+        let mut planning = Planning::new(&mechanism, task, source, stream)?;
+        let done = windows(&mut planning, outlet, &facts);
+        outlet.heed(&|| facts.of(&planning), true);
+        done.map(|()| facts.of(&planning))
+    }
+}
+
+/// Plans windows and hands them on until the last is taken.
+fn windows<const N: usize, M: Mechanism<N>>(
+    planning: &mut Planning<'_, N, M>,
+    outlet: &mut dyn Outlet,
+    facts: &Facts<'_>,
+) -> Result<(), PlanError> {
+    let mut waiting: VecDeque<(Checkpoint<N, M>, Window)> = VecDeque::new();
+    let mut setpoints = 0;
+    let mut is_over = false;
+    loop {
+        if outlet.is_abandoned() {
+            return Err(PlanError::Abandoned);
+        }
+        let rate = outlet.rate();
+        if rate != planning.rate() {
+            if let Some((checkpoint, _)) = waiting.pop_front() {
+                planning.restore(checkpoint);
+                waiting.clear();
+                (setpoints, is_over) = (0, false);
+            }
+            planning.set_rate(rate);
+        }
+        while let Some((checkpoint, window)) = waiting.pop_front() {
+            let count = window.setpoints.len();
+            match outlet.take(window) {
+                Ok(()) => setpoints -= count,
+                Err(window) => {
+                    waiting.push_front((checkpoint, window));
+                    break;
+                }
+            }
+        }
+        if !is_over && (waiting.is_empty() || setpoints < outlet.ahead()) {
+            let checkpoint = planning.checkpoint();
+            planning.release(waiting.front().map_or(&checkpoint, |(oldest, _)| oldest));
+            match planning.next_window(&|| outlet.is_abandoned())? {
+                Some(window) => {
+                    setpoints += window.setpoints.len();
+                    waiting.push_back((checkpoint, window));
+                    outlet.heed(&|| facts.of(planning), false);
+                }
+                None => is_over = true,
+            }
+        } else if waiting.is_empty() {
+            return Ok(());
+        } else {
+            outlet.wait();
+        }
+    }
+}
