@@ -16,6 +16,7 @@ use crate::exit::Failure;
 use configuration::Configuration;
 use control::JobControl;
 use machine::Machine;
+use messages::time::CYCLE_TIME;
 use messages::{
     ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorReply, OperatorVerb,
     PlannerReport, Progress,
@@ -65,6 +66,33 @@ pub struct Latest {
     pub drives: DrivesReport,
     /// From the planner.
     pub planner: PlannerReport,
+}
+
+impl Latest {
+    /// Stream time of the job under way at its end, as planned or estimated [s].
+    fn end(&self) -> Option<f64> {
+        let Self { progress, planner, .. } = self;
+        let is_played = progress.stream != 0 && progress.stream == planner.stream;
+        // The plan's own estimate is never less than what it has planned.
+        is_played.then(|| planner.estimate.max(planner.duration))
+    }
+
+    /// How long the job under way still takes at the rate asked for [s].
+    pub fn time_left(&self) -> Option<f64> {
+        let played = self.progress.played as f64 * CYCLE_TIME;
+        self.end().map(|end| (end - played).max(0.0) / self.rate())
+    }
+
+    /// How much of the job under way has been played, 0 to 1.
+    pub fn share(&self) -> f64 {
+        let played = self.progress.played as f64 * CYCLE_TIME;
+        self.end().filter(|end| *end > 0.0).map_or(0.0, |end| (played / end).min(1.0))
+    }
+
+    /// The rate at which setpoints are played, as asked for.
+    fn rate(&self) -> f64 {
+        1.0
+    }
 }
 
 struct Subscriptions {

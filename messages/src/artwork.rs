@@ -1,6 +1,6 @@
 //! What a job wants marked, in the machine frame: the measure of what was marked.
 //!
-//! Not a fixed-size sample, like [`plan`](crate::plan): the planner writes it as `artwork.json`
+//! Not a fixed-size sample, like [`plan`](crate::plan): the planner writes it as `artwork.jsonl`
 //! into the run folder, and whoever judges the marks reads it there.
 
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ pub struct Artwork {
     pub strokes: Vec<Stroke>,
 }
 
-/// A line of `artwork.json`: a stroke, or a part of one. The file grows while the job is planned, and
+/// A line of `artwork.jsonl`: a stroke, or a part of one. The file grows while the job is planned, and
 /// what of it has been written can be read whenever that ends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ArtworkLine {

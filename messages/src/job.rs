@@ -12,9 +12,9 @@ pub enum PlannerPhase {
     /// Nothing to do.
     #[default]
     Idle = 0,
-    /// Reading, planning and checking.
+    /// Reading the job, and planning and checking its first window.
     Planning = 1,
-    /// Sending setpoints.
+    /// Sending setpoints, and planning what follows.
     Streaming = 2,
     /// All setpoints of the stream have been sent.
     Sent = 3,
@@ -69,27 +69,31 @@ impl JobOffer {
 
 sample! {
     /// How planning and streaming go.
-    PlannerReport = "graver.PlannerReport.v1" {
+    PlannerReport = "graver.PlannerReport.v2" {
         /// When it was published.
         published: Nanoseconds,
         /// The stream it speaks of, 0 for none.
         stream: u64,
-        /// Setpoints in the stream, 0 while unknown.
+        /// Setpoints that were planned and handed over to be sent; all of the stream once it is
+        /// complete.
         samples: u64,
         /// Setpoints sent so far.
         sent: u64,
-        /// Strokes to mark, 0 while unknown.
+        /// Strokes in them.
         strokes: u64,
         /// Time from offer to the first setpoint [s].
         plan_time: f64,
-        /// Duration of the planned motion [s].
+        /// Stream time at the end of what was planned [s]; of the whole motion once it is complete.
         duration: f64,
-        /// Length to be marked [m].
+        /// Stream time at the end of the job [s]: an estimate from the first reading, corrected by what
+        /// has been planned.
+        estimate: f64,
+        /// Length to be marked [m], 0 while unknown.
         length: f64,
         /// A [`PlannerPhase`].
         phase: u32,
-        /// Always 0; keeps the sample free of padding.
-        reserved: u32,
+        /// 1 once the plan is complete, else 0.
+        is_complete: u32,
     }
 }
 

@@ -5,8 +5,8 @@
 pub const REQUEST: &str = "request.json";
 /// Why the job was refused, if it was; the planner's.
 pub const REFUSAL: &str = "refused.json";
-/// What is to be marked, an [`Artwork`](crate::artwork::Artwork); the planner's.
-pub const ARTWORK: &str = "artwork.json";
+/// What is to be marked, an [`ArtworkLine`](crate::artwork::ArtworkLine) a line; the planner's.
+pub const ARTWORK: &str = "artwork.jsonl";
 /// What the plan comes to, [`PlanFacts`](crate::plan::PlanFacts); the planner's.
 pub const PLAN: &str = "plan.json";
 /// The recording: every cycle's feedback and command; the monitor's.

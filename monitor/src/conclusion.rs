@@ -4,6 +4,7 @@
 //! that might be wrong is never given. Nor is a run without a summary: what cannot be written is a
 //! warning in it too.
 
+pub mod artwork;
 pub mod verdict;
 
 pub use crate::recording::info::{RecordingInfo, RecordingState};
@@ -59,6 +60,8 @@ pub struct RunOutcome {
     pub wall: f64,
     /// Time from offer to the first setpoint [s].
     pub plan_time: f64,
+    /// What was left of the job when it ended, as planned or estimated [s].
+    pub time_left: f64,
     /// Job time over wall time of the stepping loop, in virtual time.
     pub realtime_factor: Option<f64>,
     /// What a person should know.
@@ -83,6 +86,8 @@ pub fn summarise(
     summary.error = run_outcome.error.clone();
     summary.wall = run_outcome.wall;
     summary.plan_time = run_outcome.plan_time;
+    summary.time_left = run_outcome.time_left;
+    summary.binding = plan.binding.clone();
     summary.realtime_factor = run_outcome.realtime_factor;
     summary.warnings = run_outcome.warnings.clone();
     summary.warnings.extend(plan.notes.iter().map(|note| match note.line {
@@ -210,7 +215,7 @@ pub fn conclude(
 ) -> Summary {
     let began = Instant::now();
     let mut run_outcome = run_outcome.clone();
-    let (mut plan, mut artwork, mut results) = (PlanFacts::default(), Artwork::default(), None);
+    let (mut plan, mut drawn, mut results) = (PlanFacts::default(), Artwork::default(), None);
     // A job that was refused has no plan: one in the folder is that of an earlier job.
     if run_outcome.outcome != Some(Outcome::Refused) {
         let warnings = &mut run_outcome.warnings;
@@ -220,8 +225,8 @@ pub fn conclude(
             warnings.push(format!("the recording was broken off: {}", info.message));
         }
         // Nor was anything marked before there was an artwork.
-        if let Some(planned) = read_json(folder, run_folder::ARTWORK, warnings) {
-            artwork = planned;
+        if let Some(planned) = artwork::read(folder, warnings) {
+            drawn = planned;
             let faults =
                 [run_outcome.latched, run_outcome.drives.map(|it| it.fault).unwrap_or_default()];
             let silenced = faults.iter().any(|fault| fault.code() == FaultCode::DrivesLost);
@@ -230,7 +235,7 @@ pub fn conclude(
                 None if silenced && info.progress == Progress::Complete => StreamEnd::Silenced,
                 None => StreamEnd::Unknown,
             };
-            results = examine(folder, &artwork, plan.speed, end)
+            results = examine(folder, &drawn, plan.speed, end)
                 .map_err(|reason| warnings.push(format!("there is no recording: {reason}")))
                 .ok();
         }
@@ -238,7 +243,7 @@ pub fn conclude(
     let mut summary = summarise(machine, &plan, &run_outcome, results.as_ref(), Clock::Real);
     summary.report_time = began.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
-    write(folder, machine, &artwork, &mut summary, results.as_ref());
+    write(folder, machine, &drawn, &mut summary, results.as_ref());
     summary
 }
 

@@ -60,7 +60,7 @@ impl RunFolder {
         Self::create_named(&below.join("runs"), &format!("{now}-{}", file_name(job)))
     }
 
-    /// LimitUtilization the folder that the user named; it is created where it does not exist.
+    /// Uses the folder that the user named; it is created where it does not exist.
     ///
     /// # Errors
     /// What the operating system reports, with the path.

@@ -10,6 +10,7 @@ pub mod text;
 use crate::latency::HopLatency;
 use crate::marks::Marks;
 use crate::recording::continuity::RecordingSummary;
+use messages::plan::Binding;
 use messages::{ControllerReport, RealtimeFacts};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,6 +67,9 @@ pub struct Summary {
     pub wall: f64,
     /// `time` over the wall time of the stepping loop; null in real time.
     pub realtime_factor: Option<f64>,
+    /// What was left of the job when it ended, as planned or estimated [s]; 0 of one that was completed.
+    #[serde(default)]
+    pub time_left: f64,
     /// Time from job offer to the first setpoint [s].
     pub plan_time: f64,
     /// Time to judge the marks and write the run folder [s].
@@ -78,6 +82,9 @@ pub struct Summary {
     pub following_error: FollowingError,
     /// The largest share of each limit used, as planned.
     pub limits: LimitUse,
+    /// What bound the motion as planned, the limit that ruled longest first.
+    #[serde(default)]
+    pub binding: Vec<Binding>,
     /// Control cycles from the first setpoint to the last.
     pub cycles: u64,
     /// Cycles whose work did not end before the next deadline, slips and skipped cycles included.
@@ -209,12 +216,14 @@ impl Summary {
             time: 0.0,
             wall: 0.0,
             realtime_factor: None,
+            time_left: 0.0,
             plan_time: 0.0,
             report_time: 0.0,
             marks: None,
             recording: None,
             following_error: FollowingError::default(),
             limits: LimitUse::default(),
+            binding: Vec::new(),
             cycles: 0,
             overruns: 0,
             stalls: StallSummary::default(),
@@ -226,7 +235,7 @@ impl Summary {
         }
     }
 
-    /// Takes over what the controller counted: cycles, digest, limits and following error. LimitUtilization
+    /// Takes over what the controller counted: cycles, digest, limits and following error. Uses
     /// the axes of `machine`, which must be set.
     pub fn take_controller(&mut self, report: &ControllerReport) {
         let axes = self.machine.axes.len();

@@ -50,6 +50,9 @@ const PAUSE_REST: f64 = 0.1;
 /// Jobs that last longer are refused, most likely for a wrong number [s].
 const LONGEST: f64 = 7.0 * 86_400.0;
 
+/// The share of a job that counts as done as estimated when its time is told.
+const LITTLE: f64 = 0.05;
+
 /// How often a window that breaks a limit is planned again with less of it, and how often after that
 /// slower as a whole.
 const TRIALS: [usize; 2] = [24, 40];
@@ -298,9 +301,10 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         let ahead = parts.fold(ahead, |sum, part| sum + part);
         let done = estimated - ahead;
         let left = (self.task.estimate - done).max(0.0);
-        // What is still to come is slower than estimated in the same measure as what has been planned.
-        let slower = if done > 0.0 { (time - self.first_rest()) / done } else { 1.0 };
-        time + left * slower
+        // What is still to come is slower than estimated in the same measure as what has been planned, of
+        // which a little says little.
+        let little = LITTLE * self.task.estimate + f64::MIN_POSITIVE;
+        time + left * (time - self.first_rest() + little) / (done + little)
     }
 
     /// How long a path takes at the speeds asked for [s].

@@ -7,7 +7,7 @@ use machine::Machine;
 use machine::document::{DocumentError, Override};
 use miette::Diagnostic;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A job by name, as `request.json` in the run folder.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,6 +46,22 @@ impl JobRequest {
     /// # Errors
     /// What is wrong with it, and where.
     pub fn read(&self, machine: &Machine) -> Result<Job, Refusal> {
+        self.read_by(Job::read, machine)
+    }
+
+    /// Reads the job that is asked for, but leaves the steps of a long program in its file.
+    ///
+    /// # Errors
+    /// As of [`Self::read`].
+    pub fn open(&self, machine: &Machine) -> Result<Job, Refusal> {
+        self.read_by(Job::open, machine)
+    }
+
+    fn read_by(
+        &self,
+        read: impl Fn(&Path, &[Override], &Machine) -> Result<Job, JobError>,
+        machine: &Machine,
+    ) -> Result<Job, Refusal> {
         let overrides: Vec<Override> = self
             .set
             .iter()
@@ -53,7 +69,7 @@ impl JobRequest {
             .collect::<Result<_, _>>()
             .map_err(|error| Refusal::of_diagnostic(&error))?;
         match &self.job {
-            Some(path) => Job::read(path, &overrides, machine),
+            Some(path) => read(path, &overrides, machine),
             None => Job::builtin(&overrides, machine),
         }
         .map_err(|error| Refusal::of_job(&error))

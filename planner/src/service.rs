@@ -1,24 +1,24 @@
 //! The planner service: takes a job offer, plans and checks it, and streams its setpoints as far
 //! ahead as the controller has room for.
 //!
-//! Three threads joined by bounded channels: one plans, one samples the checked plan, and the main
-//! one talks to the domain and never waits for either. Nothing is sent before the whole job has
-//! been checked, and nothing before the controller names the stream: until then its channel may be
-//! emptied unread. A stream that the controller has gone on with without this process, or is done
-//! with, is let go: no part of it is ever sent twice.
+//! One thread plans and checks, window by window; the main one sends, talks to the domain and never waits
+//! for the other. Nothing is sent that was not checked, and nothing before the controller names the
+//! stream: until then its channel may be emptied unread. A stream that the controller has gone on with
+//! without this process, or is done with, is let go: no part of it is ever sent twice.
 
-mod planning_task;
+mod departure;
+mod plan_files;
+mod planning_thread;
 #[cfg(test)]
 mod tests;
 
 use crate::request::Refusal;
-use crate::{Plan, PlanFacts};
-use crossbeam::channel::{Receiver, TryRecvError, bounded};
+use crossbeam::channel::TryRecvError;
 use machine::Machine;
 use messages::{
     ControllerState, JobOffer, PlannerPhase, PlannerReport, Progress, Setpoint, run_folder,
 };
-use planning_task::Abandoned;
+use planning_thread::{Known, Planned, PlanningThread};
 use runtime::peer::{PeerState, Peers};
 use runtime::{Domain, Publisher, Role, Samples, ServiceError, Subscriber, clock, signal};
 use std::path::{Path, PathBuf};
@@ -29,9 +29,6 @@ const LOOK: Duration = Duration::from_millis(2);
 
 /// How often it reports when nothing changes.
 const REPORT_INTERVAL: Duration = Duration::from_millis(100);
-
-/// Setpoints that wait between sampling and sending.
-const SAMPLED_AHEAD: usize = 1024;
 
 /// Runs until it is told to end (SIGTERM) or the supervisor dies.
 ///
@@ -51,23 +48,20 @@ enum Work {
     Idle,
     /// The offer waits for the axes to rest: where they rest, the job begins.
     Waiting(PathBuf),
-    Planning(Planning),
-    Sending(Sending),
+    Streaming(Streaming),
 }
 
-/// A plan in the making, on a thread of its own; dropping this makes that thread give up.
-struct Planning {
+/// A plan that is made, and sent as it is made.
+struct Streaming {
     folder: PathBuf,
     started: Instant,
-    result: Receiver<Result<Plan, Refusal>>,
-    _abandoned: Abandoned,
-}
-
-/// A plan on its way to the controller; dropping this ends the thread that samples it.
-struct Sending {
-    samples: Receiver<Setpoint>,
-    /// Sampled, but the channel was full.
+    thread: PlanningThread,
+    /// Setpoints of the window that is being sent.
+    window: std::vec::IntoIter<Setpoint>,
+    /// Taken from it, but the channel was full.
     waiting: Option<Box<Setpoint>>,
+    /// Whether all windows have come.
+    is_complete: bool,
 }
 
 struct Service {
@@ -114,7 +108,7 @@ impl Service {
         }
         self.let_go()?;
         self.begin_plan()?;
-        self.take_plan()?;
+        self.take_window()?;
         self.send()?;
         self.report_now_and_then()
     }
@@ -163,89 +157,79 @@ impl Service {
             return Ok(());
         }
         let folder = folder.clone();
-        let standing = progress.position;
-        let abandoned = Abandoned::default();
-        let (sender, result) = bounded(1);
-        let (place, machine, watched) = (folder.clone(), self.machine.clone(), abandoned.watch());
-        spawn("plan", move || {
-            // Nobody listens any more when the offer was withdrawn.
-            let _ = sender.send(planning_task::plan_request(&place, &machine, &standing, &watched));
-        })?;
-        let started = Instant::now();
-        self.work = Work::Planning(Planning { folder, started, result, _abandoned: abandoned });
+        let stream = self.report.stream;
+        let thread = PlanningThread::start(&folder, &self.machine, &progress.position, stream)?;
+        self.work = Work::Streaming(Streaming {
+            folder,
+            started: Instant::now(),
+            thread,
+            window: Vec::new().into_iter(),
+            waiting: None,
+            is_complete: false,
+        });
         Ok(())
     }
 
-    fn take_plan(&mut self) -> Result<(), ServiceError> {
-        let Work::Planning(Planning { folder, started, result, .. }) = &self.work else {
+    /// Takes the next window once the one before has been sent.
+    fn take_window(&mut self) -> Result<(), ServiceError> {
+        let Work::Streaming(streaming) = &mut self.work else { return Ok(()) };
+        streaming.thread.set_rate(1.0);
+        if streaming.is_complete || streaming.waiting.is_some() || streaming.window.len() > 0 {
             return Ok(());
-        };
-        let planned = match result.try_recv() {
-            Ok(planned) => planned,
-            Err(TryRecvError::Empty) => return Ok(()),
-            Err(TryRecvError::Disconnected) => {
-                Err(Refusal::internal("planning ended without a result: a fault of the planner"))
+        }
+        match streaming.thread.planned().try_recv() {
+            Err(TryRecvError::Empty) => Ok(()),
+            Ok(Planned::Window(setpoints, known)) => {
+                self.report.samples += setpoints.len() as u64;
+                streaming.window = setpoints.into_iter();
+                let plan_time = streaming.started.elapsed().as_secs_f64();
+                self.note(&known);
+                if self.report.phase == PlannerPhase::Planning as u32 {
+                    self.report.plan_time = plan_time;
+                    return self.enter(PlannerPhase::Streaming);
+                }
+                Ok(())
             }
-        };
-        match planned {
-            Ok(plan) => {
-                let plan_time = started.elapsed().as_secs_f64();
-                self.begin_stream(plan, plan_time)
+            Ok(Planned::Complete(facts)) => {
+                streaming.is_complete = true;
+                self.report.length = facts.length;
+                (self.report.duration, self.report.is_complete) = (facts.duration, 1);
+                self.publish_report()
             }
-            Err(refusal) => {
-                planning_task::write_refusal(folder, &self.spare, &refusal);
-                self.work = Work::Idle;
-                self.enter(PlannerPhase::Refused)
-            }
+            Ok(Planned::Refused(refusal)) => self.refuse(&refusal),
+            Err(TryRecvError::Disconnected) => self.refuse(&Refusal::internal(
+                "planning ended without a result: a fault of the planner",
+            )),
         }
     }
 
-    fn begin_stream(&mut self, plan: Plan, plan_time: f64) -> Result<(), ServiceError> {
-        let stream = self.report.stream;
-        let PlanFacts { samples, strokes, duration, length, .. } = plan.facts;
-        self.report = PlannerReport {
-            samples,
-            strokes: strokes as u64,
-            plan_time,
-            duration,
-            length,
-            ..self.report
-        };
-        let setpoints = plan.setpoints(stream);
-        // The stream holds what it needs; the rest of the plan can be large.
-        drop(plan);
-        let (sender, samples) = bounded(SAMPLED_AHEAD);
-        spawn("sample", move || {
-            for setpoint in setpoints {
-                if sender.send(setpoint).is_err() {
-                    return;
-                }
-            }
-        })?;
-        self.work = Work::Sending(Sending { samples, waiting: None });
-        self.enter(PlannerPhase::Streaming)
+    fn note(&mut self, known: &Known) {
+        self.report.strokes = known.strokes;
+        (self.report.duration, self.report.estimate) = (known.end, known.estimate);
+    }
+
+    fn refuse(&mut self, refusal: &Refusal) -> Result<(), ServiceError> {
+        if let Work::Streaming(Streaming { folder, .. }) = &self.work {
+            plan_files::write_refusal(folder, &self.spare, refusal);
+        }
+        self.work = Work::Idle;
+        self.enter(PlannerPhase::Refused)
     }
 
     /// Sends as many setpoints as the controller has room for, less those still under way.
     fn send(&mut self) -> Result<(), ServiceError> {
-        let Work::Sending(Sending { samples, waiting }) = &mut self.work else { return Ok(()) };
+        let Work::Streaming(Streaming { window, waiting, is_complete, .. }) = &mut self.work else {
+            return Ok(());
+        };
         let progress = &self.newest_progress;
         if progress.stream != self.report.stream {
             return Ok(());
         }
         let under_way = self.report.sent.saturating_sub(progress.accepted);
         let mut licence = progress.room.saturating_sub(under_way);
-        while licence > 0 && self.report.sent < self.report.samples {
-            let mut setpoint =
-                match waiting.take().map_or_else(|| samples.try_recv(), |setpoint| Ok(*setpoint)) {
-                    Ok(setpoint) => setpoint,
-                    Err(TryRecvError::Empty) => return Ok(()),
-                    Err(TryRecvError::Disconnected) => {
-                        let (sent, all) = (self.report.sent, self.report.samples);
-                        let message = format!("sampling ended after {sent} of {all} setpoints");
-                        return Err(ServiceError::Work(message));
-                    }
-                };
+        while licence > 0 {
+            let next = waiting.take().map(|setpoint| *setpoint).or_else(|| window.next());
+            let Some(mut setpoint) = next else { break };
             setpoint.published = clock::now();
             if !self.setpoints.publish(&setpoint)? {
                 *waiting = Some(Box::new(setpoint));
@@ -254,7 +238,7 @@ impl Service {
             self.report.sent += 1;
             licence -= 1;
         }
-        if self.report.sent == self.report.samples {
+        if *is_complete && waiting.is_none() && window.len() == 0 {
             self.work = Work::Idle;
             return self.enter(PlannerPhase::Sent);
         }
@@ -276,10 +260,4 @@ impl Service {
         self.reported = Instant::now();
         Ok(())
     }
-}
-
-/// Starts a thread that ends by itself when nobody listens to it.
-fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> Result<(), ServiceError> {
-    let thread = std::thread::Builder::new().name(name.to_owned()).spawn(work);
-    thread.map(drop).map_err(|source| ServiceError::thread(name, source))
 }

@@ -108,6 +108,9 @@ pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
     say!("job        {}", text("job"));
     say!("planner    {}", text("planner"));
     say!("played     {} of {} setpoints", status["played"], status["samples"]);
+    if let Some(left) = status["time_left"].as_f64() {
+        say!("time left  {}", monitor::summary::text::duration(left));
+    }
     say!("stroke     {}", status["stroke"]);
     say!("rate       {:.0} %", status["rate"].as_f64().unwrap_or(0.0) * 100.0);
     say!("fault      {}", text("fault"));

@@ -69,7 +69,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     summary.report_time = examining.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
     if let Some(folder) = &folder {
-        if let Err(error) = folder.write_json(run_folder::ARTWORK, &plan.artwork) {
+        if let Err(error) = conclusion::artwork::write(folder, &plan.artwork) {
             summary.warnings.push(format!("cannot write {error}"));
         }
         conclusion::write(folder, &input.machine, &plan.artwork, &mut summary, Some(&results));

@@ -10,6 +10,7 @@ use crate::output::ProgressLine;
 use messages::{Cycle, DrivesReport, Fault, FaultCode, OperatorVerb, PlannerPhase, run_folder};
 use monitor::conclusion::{self, RecordingState, RunOutcome};
 use monitor::run_folder::RunFolder;
+use monitor::summary::text::duration;
 use monitor::summary::{ErrorSummary, Outcome, Summary};
 use planner::request::{JobRequest, Refusal};
 use runtime::domain::Role;
@@ -70,6 +71,8 @@ pub struct JobRun<'a> {
     refused: Option<Instant>,
     /// Since when nothing can move any more, whatever the controller says.
     quiet: Option<Instant>,
+    /// What was left of the job when it was last played [s].
+    time_left: f64,
     /// The newest cycle of drives that was heard of, and when.
     drives_heard: (Cycle, Instant),
     started: Instant,
@@ -105,6 +108,7 @@ impl<'a> JobRun<'a> {
             played: false,
             refused: None,
             quiet: None,
+            time_left: 0.0,
             drives_heard: (Cycle::default(), Instant::now()),
             started,
             run_outcome,
@@ -140,6 +144,7 @@ impl<'a> JobRun<'a> {
             if self.heed_people() {
                 break;
             }
+            self.time_left = self.pipeline.latest.time_left().unwrap_or(self.time_left);
             let (share, text) = self.progress();
             line.draw(share, &text);
             if let Some(submission) = &self.submission {
@@ -169,6 +174,7 @@ impl<'a> JobRun<'a> {
                 self.fail(self.latched());
             }
             Stage::Planning => return self.heed_planner(),
+            Stage::Ready(_) | Stage::Playing if self.is_refused_late() => self.give_up(),
             Stage::Ready(since) => self.play(since),
             Stage::Playing | Stage::Resting(_) => return Ok(self.is_over()),
         }
@@ -203,6 +209,23 @@ impl<'a> JobRun<'a> {
             _ => {}
         }
         Ok(false)
+    }
+
+    /// Whether the planner found only while the job was played that it cannot be done.
+    fn is_refused_late(&self) -> bool {
+        let report = self.pipeline.latest.planner;
+        Some(report.stream) == self.stream
+            && PlannerPhase::from_wire(report.phase) == PlannerPhase::Refused
+    }
+
+    /// Stops a job that is played and cannot be done to its end.
+    fn give_up(&mut self) {
+        self.refuse();
+        self.run_outcome.outcome = Some(Outcome::Aborted);
+        self.rest();
+        if self.played {
+            self.pipeline.ask(OperatorVerb::Stop, 0.0);
+        }
     }
 
     /// Hands the job to the controller as soon as it is recorded, or nobody is there to record it,
@@ -294,17 +317,22 @@ impl<'a> JobRun<'a> {
             Stage::Planning => "planning".to_owned(),
             Stage::Ready(_) if self.control.is_held() => "held".to_owned(),
             Stage::Ready(_) => "starting".to_owned(),
-            Stage::Playing => format!(
-                "stroke {} of {}, rate {:.0} %",
-                latest.progress.stroke,
-                latest.planner.strokes,
-                latest.progress.rate * 100.0
-            ),
+            Stage::Playing => {
+                let strokes = match latest.planner.is_complete {
+                    0 => String::new(),
+                    _ => format!(" of {}", latest.planner.strokes),
+                };
+                let left = match latest.time_left() {
+                    Some(left) => format!(", {} left", duration(left)),
+                    None => String::new(),
+                };
+                let rate = latest.progress.rate * 100.0;
+                format!("stroke {}{strokes}, rate {rate:.0} %{left}", latest.progress.stroke)
+            }
             Stage::Resting(_) => "coming to rest".to_owned(),
         };
         let is_ours = Some(latest.progress.stream) == self.stream;
-        let played = if is_ours { latest.progress.played } else { 0 };
-        let share = played as f64 / latest.planner.samples.max(1) as f64;
+        let share = if is_ours { latest.share() } else { 0.0 };
         (share, format!("{}: {what}", self.name))
     }
 
@@ -420,6 +448,10 @@ impl<'a> JobRun<'a> {
             self.await_recording();
         }
         self.run_outcome.drives = Some(self.drives_with_cause());
+        let is_completed = self.run_outcome.controller.is_some_and(|it| it.completed == 1);
+        if !is_completed && self.played {
+            self.run_outcome.time_left = self.time_left;
+        }
         if !self.run_outcome.latched.is_some() {
             self.run_outcome.latched = self.pipeline.latest.progress.fault;
         }

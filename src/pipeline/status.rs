@@ -25,8 +25,11 @@ pub struct Status {
     pub job: Option<String>,
     /// Setpoints played so far.
     pub played: u64,
-    /// Setpoints in the stream.
+    /// Setpoints of the stream that were planned so far; all of them once the plan is complete.
     pub samples: u64,
+    /// How long the job still takes at the present rate, an estimate until its plan is complete; null
+    /// without a job under way [s].
+    pub time_left: Option<f64>,
     /// Stroke being marked, from 1; 0 for none.
     pub stroke: u64,
     /// Rate at which the stream is played.
@@ -62,6 +65,7 @@ impl StatusBoard {
         status.stream = progress.stream;
         status.played = progress.played;
         status.samples = if planner.stream == progress.stream { planner.samples } else { 0 };
+        status.time_left = latest.time_left();
         status.stroke = progress.stroke;
         status.rate = progress.rate;
         status.tool = progress.tool;

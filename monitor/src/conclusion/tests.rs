@@ -282,7 +282,7 @@ fn real_time_is_claimed_and_missed_only_as_reported() {
 /// A run folder as planner and monitor leave it.
 fn folder(below: &tempfile::TempDir, records: &[CycleRecord]) -> RunFolder {
     let folder = RunFolder::create_at(below.path()).unwrap();
-    folder.write(run_folder::ARTWORK, serde_json::to_vec(&artwork()).unwrap()).unwrap();
+    super::artwork::write(&folder, &artwork()).unwrap();
     let notes = vec![Note { line: 7, text: "here".into() }];
     let plan = serde_json::to_vec(&PlanFacts { notes, ..plan() }).unwrap();
     folder.write(run_folder::PLAN, plan).unwrap();
@@ -375,7 +375,7 @@ fn what_cannot_be_read_is_a_warning_and_not_a_figure() {
         assert!(said, "{name}: {:?}", summary.warnings);
         summary
     };
-    assert_eq!(check(run_folder::ARTWORK, "{", "artwork.json: EOF").marks, None);
+    assert_eq!(check(run_folder::ARTWORK, "{\n", "artwork.jsonl: EOF").marks, None);
     let summary = check(run_folder::SAMPLES, "GRAVE", "samples.bin: not a recording");
     assert_eq!(summary.marks, None);
     // The marks need no plan.

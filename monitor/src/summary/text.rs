@@ -3,6 +3,7 @@
 use super::{Realtime, Summary};
 use crate::marks::Marks;
 use crate::recording::continuity::RecordingSummary;
+use messages::plan::Binding;
 use std::fmt::Write;
 
 /// Width of the column of names.
@@ -14,6 +15,16 @@ pub fn length(metres: f64) -> String {
         format!("{:.1} µm", metres * 1e6)
     } else {
         format!("{:.3} mm", metres * 1e3)
+    }
+}
+
+/// A duration as a person says it [s].
+pub fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..60 => format!("{seconds:.0} s"),
+        60..3600 => format!("{} min {} s", whole / 60, whole % 60),
+        _ => format!("{} h {} min", whole / 3600, whole / 60 % 60),
     }
 }
 
@@ -29,6 +40,7 @@ pub fn rows(summary: &Summary) -> Vec<(String, String)> {
     rows.run_outcome(summary);
     rows.job(summary);
     rows.times(summary);
+    rows.binding(&summary.binding);
     rows.marks(summary.marks.as_ref());
     rows.axes(summary);
     rows.cycles(summary);
@@ -72,7 +84,11 @@ impl Rows {
             .realtime_factor
             .map(|factor| format!(", {factor:.0} × real time"))
             .unwrap_or_default();
-        self.add("time", format!("{:.3} s{factor}", summary.time));
+        let left = match summary.time_left {
+            left if left > 0.0 => format!(", {} left", duration(left)),
+            _ => String::new(),
+        };
+        self.add("time", format!("{:.3} s{factor}{left}", summary.time));
         let Summary { wall, plan_time, report_time, .. } = summary;
         self.add(
             "wall time",
@@ -104,6 +120,18 @@ impl Rows {
         if marks.strokes_lost > 0 {
             self.add("strokes lost", marks.strokes_lost.to_string());
         }
+    }
+
+    /// What the job was bound by most of its time.
+    fn binding(&mut self, binding: &[Binding]) {
+        /// How many limits are told, and the least share of the time of one.
+        const MOST: usize = 3;
+        const LEAST: f64 = 0.01;
+        let told = binding.iter().take(MOST).filter(|limit| limit.share >= LEAST).map(|limit| {
+            let axis = limit.axis.as_ref().map(|axis| format!(" of {axis}")).unwrap_or_default();
+            format!("{}{axis} {:.0} %", limit.limit, limit.share * 100.0)
+        });
+        self.add("bound by", told.collect::<Vec<_>>().join(", "));
     }
 
     fn axes(&mut self, summary: &Summary) {

@@ -123,9 +123,9 @@ impl Polyline {
         }
         self.look = self.chords.len() + MORE;
         let Some(tolerance) = tolerance else { return self.certain_lines() };
-        let (fitter, fed) = self.fitter.get_or_insert_with(|| {
-            (Fitter::new(tolerance + rounding(&self.vertices)), 0)
-        });
+        let (fitter, fed) = self
+            .fitter
+            .get_or_insert_with(|| (Fitter::new(tolerance + rounding(&self.vertices)), 0));
         // The last move may be taken off again.
         let known = self.vertices.len() - 1;
         self.vertices[*fed..known].iter().for_each(|vertex| fitter.push(*vertex));
@@ -139,7 +139,12 @@ impl Polyline {
         while let Some((fitter, fed)) = &mut self.fitter {
             let Some(Fitted { part, vertices, .. }) = fitter.part() else { break };
             let [from, to] = [*vertices.start(), *vertices.end()].map(|number| number - self.first);
-            found.push(drawn(&part, &self.vertices[from..=to], &self.chords[from..to], from + self.first));
+            found.push(drawn(
+                &part,
+                &self.vertices[from..=to],
+                &self.chords[from..to],
+                from + self.first,
+            ));
             self.vertices.drain(..to);
             self.chords.drain(..to);
             self.first += to;

@@ -8,6 +8,7 @@ pub mod gcode;
 pub mod letters;
 pub mod path_table;
 pub mod points;
+mod reach;
 pub mod workpiece_table;
 
 use std::path::{Path, PathBuf};

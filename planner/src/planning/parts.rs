@@ -220,8 +220,7 @@ mod tests {
         let limit = |from, speed| SpeedLimit { from, speed, source: Source::FEED };
         let mut speeds = vec![limit(0.0, 1.0), limit(2.0, 3.0)];
         keep_up(&mut speeds, 1.0, 2.5, 2.0);
-        let expected =
-            [limit(0.0, 1.0), limit(1.0, 2.0), limit(2.0, 3.0), limit(2.5, 3.0)];
+        let expected = [limit(0.0, 1.0), limit(1.0, 2.0), limit(2.0, 3.0), limit(2.5, 3.0)];
         assert_eq!(speeds, expected);
     }
 }

@@ -14,10 +14,12 @@ use super::{Checkpoint, Planning, Task, Window};
 use crate::drawing::{Action, Note, Step};
 use crate::error::PlanError;
 use crate::geometry::operation::{Operation, Operations};
+use crate::geometry::track::Track;
 use crate::job::{Job, MarkingSpeed};
 use crate::law::optimum::Speeds;
 use crate::limits::motion_limits::Scope;
 use crate::plan::PlanFacts;
+use crate::verify::checker::{LimitViolation, Quantity};
 
 /// Who takes the windows of a job.
 pub(crate) trait Outlet {
@@ -90,13 +92,43 @@ pub(crate) fn plan_windows(
         estimate,
         start: drawing.start,
     };
-    let steps: Steps<'_> = Box::new(job.steps().map_err(|error| PlanError::Unreadable {
-        line: 0,
-        message: error.to_string(),
-    })?);
+    let steps: Steps<'_> = Box::new(
+        job.steps()
+            .map_err(|error| PlanError::Unreadable { line: 0, message: error.to_string() })?,
+    );
     let source = Source::new(steps, operations());
     let facts = Facts { name: &drawing.name, notes };
-    machine.mechanism.visit(Run { task: &task, source, stream, outlet, facts })
+    let done = machine.mechanism.visit(Run { task: &task, source, stream, outlet, facts });
+    done.map_err(|error| at_its_step(error, job))
+}
+
+/// `error` with the line of the very step that leaves the area, of all that are gone in one go.
+fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
+    /// How far a chord may lie from the curve [m].
+    const CHORD: f64 = 1e-5;
+    let PlanError::Limit { line, violation, .. } = &mut error else { return error };
+    let LimitViolation { quantity: Quantity::ToolPosition(row), value, limit, .. } = *violation
+    else {
+        return error;
+    };
+    if job.surface.is_some() {
+        return error;
+    }
+    let leaves = |step: &Step| {
+        let (Action::Mark { curve, .. } | Action::Feed { curve, .. }) = &step.action else {
+            return false;
+        };
+        let mut points = vec![curve.from().into()];
+        Track::new(curve).sample(CHORD, &mut points);
+        // By less than a fitted curve strays it does not.
+        let beyond = |point: &[f64; 3]| (point[row] - limit) * (value - limit).signum();
+        points.iter().any(|point| beyond(point) > (value - limit).abs() / 2.0)
+    };
+    let steps = job.steps().into_iter().flatten().map_while(Result::ok);
+    if let Some(step) = steps.skip_while(|step| step.line < *line).find(leaves) {
+        *line = step.line;
+    }
+    error
 }
 
 /// Whether the speed of some line is for the planner to choose, so that it must know the job before

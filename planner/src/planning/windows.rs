@@ -60,8 +60,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         }
         let mut along = AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
         let goes_on = self.front.goes_on;
-        let is_whole =
-            !goes_on && run.at == 0.0 && run.begin == End::Rest && run.exit == End::Rest;
+        let is_whole = !goes_on && run.at == 0.0 && run.begin == End::Rest && run.exit == End::Rest;
         if is_whole && run.path.is_straight() {
             along.is_exact = true;
             if let Some(law) = straight(&mut along, length) {

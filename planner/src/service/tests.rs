@@ -5,12 +5,14 @@
 use super::{Service, Work};
 use crate::request::{JobRequest, Refusal};
 use machine::Machine;
+use messages::artwork::Artwork;
 use messages::setpoint::flags;
 use messages::{
-    AxisArray, ControllerState, JobOffer, Nanoseconds, PlannerPhase, Progress, Setpoint,
-    axis::axis_array, run_folder,
+    AxisArray, ControllerState, JobOffer, Nanoseconds, PlannerPhase, PlannerReport, Progress,
+    Setpoint, axis::axis_array, run_folder,
 };
 use runtime::{Domain, Instance, Publisher, Role, Samples, Subscriber};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
@@ -94,6 +96,35 @@ impl Bench {
         }
     }
 
+    /// Offers the G-code program `text`.
+    fn offer_program(&mut self, stream: u64, text: &str) -> PathBuf {
+        let program = self.folder.path().join("program.nc");
+        std::fs::write(&program, text).unwrap();
+        let request = JobRequest { job: Some(program.clone()), set: Vec::new() };
+        let path = self.folder.path().join(run_folder::REQUEST);
+        std::fs::write(path, serde_json::to_vec(&request).unwrap()).unwrap();
+        let folder = self.folder.path().to_str().unwrap();
+        self.offers.publish(&JobOffer::new(stream, folder).unwrap()).unwrap();
+        program
+    }
+
+    /// Takes all that is still to come, 300 at most at a time.
+    fn send_rest(&mut self, all: &mut Vec<Setpoint>) {
+        let started = Instant::now();
+        while self.phase() == PlannerPhase::Streaming {
+            assert!(started.elapsed() < PATIENCE, "{} came", all.len());
+            let accepted = all.len() as u64;
+            self.say(|progress| (progress.accepted, progress.room) = (accepted, 300));
+            for _ in 0..20 {
+                self.service.turn().unwrap();
+                all.extend(self.arrived());
+            }
+            let new = all.len() as u64 - accepted;
+            assert!(new <= 300, "{new}");
+        }
+        assert_eq!(self.phase(), PlannerPhase::Sent);
+    }
+
     fn arrived(&mut self) -> Vec<Setpoint> {
         std::iter::from_fn(|| self.setpoints.receive().unwrap()).collect()
     }
@@ -137,15 +168,8 @@ fn a_stream_waits_for_its_name_and_never_exceeds_its_licence() {
     all.extend(bench.collect(2));
     assert_eq!(all.len(), 11);
     // All taken, and room again.
-    let samples = bench.service.report.samples;
-    while (all.len() as u64) < samples {
-        let accepted = all.len() as u64;
-        bench.say(|progress| (progress.accepted, progress.room) = (accepted, 300));
-        let new = bench.collect(300.min((samples - accepted) as usize));
-        assert!((1..=300).contains(&new.len()), "{}", new.len());
-        all.extend(new);
-    }
-    assert_eq!(bench.phase(), PlannerPhase::Sent);
+    bench.send_rest(&mut all);
+    assert_eq!(bench.service.report.samples, all.len() as u64);
     assert!(all.iter().enumerate().all(|(index, setpoint)| {
         setpoint.stream == 1 && setpoint.sequence == index as u64 && setpoint.published.0 > 0
     }));
@@ -290,6 +314,66 @@ fn a_planner_restarted_in_the_middle_of_a_stream_sends_none_of_it() {
     bench.offer(1, &SMALL);
     assert_eq!(bench.collect(1), []);
     assert_eq!(bench.phase(), PlannerPhase::Idle);
+}
+
+/// Rounds of a circle of 30 mm in chords of 0.3 mm, 50 mm/s.
+fn rounds(count: usize) -> String {
+    let mut text = String::from("G21 G90\nM4 S500\nG0 X30 Y0\nG1 F3000\n");
+    for index in 1..=count * 628 {
+        let (sine, cosine) = messages::math::sin_cos(0.01 * index as f64);
+        text.push_str(&format!("X{:.3} Y{:.3}\n", 30.0 * cosine, 30.0 * sine));
+    }
+    text
+}
+
+#[test]
+fn a_long_job_is_sent_while_it_is_planned() {
+    let mut bench = Bench::new();
+    bench.offer_program(1, &rounds(40));
+    bench.turn_until(PlannerPhase::Streaming);
+    bench.say(|progress| (progress.stream, progress.room) = (1, 300));
+    let mut all = bench.collect(300);
+    assert_eq!(all.len(), 300);
+    let PlannerReport { is_complete, samples, estimate, .. } = bench.service.report;
+    assert_eq!(is_complete, 0, "{samples} setpoints planned");
+    bench.send_rest(&mut all);
+    let whole = all.len() as f64 * 1e-3;
+    assert!((estimate - whole).abs() < 0.02 * whole, "{estimate} s estimated of {whole} s");
+    assert!(all.iter().enumerate().all(|(index, it)| it.sequence == index as u64));
+    assert!(all.last().unwrap().has(flags::LAST));
+    // All of it is one line, never stopped on.
+    let text = std::fs::read_to_string(bench.folder.path().join(run_folder::ARTWORK)).unwrap();
+    let mut artwork = Artwork::default();
+    text.lines().for_each(|line| artwork.add(serde_json::from_str(line).unwrap()));
+    assert_eq!(artwork.strokes.len(), 1);
+    let length = 40.0 * 0.03 * messages::math::TURN;
+    assert!((artwork.length() - length).abs() < 1e-3 * length, "{}", artwork.length());
+    let lit: Vec<&Setpoint> = all.iter().filter(|it| it.laser.is_lit()).collect();
+    let slow = lit.iter().filter(|it| it.path_velocity < 0.0499).count();
+    assert!(slow < 50, "{slow} samples below the speed of {}", lit.len());
+}
+
+#[test]
+fn a_long_job_is_withdrawn_while_it_is_planned() {
+    let mut bench = Bench::new();
+    bench.offer_program(1, &rounds(40));
+    bench.turn_until(PlannerPhase::Streaming);
+    assert_eq!(bench.service.report.is_complete, 0);
+    bench.withdraw(1);
+    bench.service.turn().unwrap();
+    assert_eq!(bench.phase(), PlannerPhase::Idle);
+}
+
+#[test]
+fn a_place_out_of_reach_far_down_refuses_all_of_a_long_job() {
+    let mut bench = Bench::new();
+    bench.offer_program(1, &(rounds(40) + "X900 Y100\n"));
+    bench.say(|progress| (progress.stream, progress.room) = (1, 300));
+    bench.turn_until(PlannerPhase::Refused);
+    assert_eq!(bench.arrived(), []);
+    let text = std::fs::read(bench.folder.path().join(run_folder::REFUSAL)).unwrap();
+    let refusal: Refusal = serde_json::from_slice(&text).unwrap();
+    assert_eq!(refusal.line, Some(40 * 628 + 5), "{}", refusal.message);
 }
 
 #[test]

@@ -1,0 +1,184 @@
+//! Whether a job stays where the machine can go, told before it is planned.
+//!
+//! What is found here is no refusal: a job that is not surely within reach is planned as a whole before
+//! any of it is sent, and that tells what is wrong, and where.
+
+use machine::kinematics::Joints;
+use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea, ZMeaning};
+use messages::math;
+use nalgebra::Vector3;
+
+use super::Job;
+use crate::drawing::{Action, Curve, Step};
+use crate::geometry::attitude::AttitudeLaw;
+use crate::geometry::track::Track;
+use crate::joint_space::configuration::branches;
+
+/// How far apart points of a path are looked at [m].
+const STEP: f64 = 1e-3;
+
+/// Jobs that are estimated to last longer may be too long to be planned [s].
+const LONG: f64 = 86_400.0;
+
+impl Job {
+    /// Whether everything in it lies within the area and within the joints' travel, and no light is too
+    /// short for the source.
+    pub(crate) fn is_surely_within_reach(&self, machine: &Machine) -> bool {
+        let is_plain = self.surface.is_none() && self.attitude == AttitudeLaw::Level;
+        let laser = &machine.laser;
+        let may_be_too_short = laser.off_delay > laser.on_delay;
+        let time = self.survey.as_ref().map_or(0.0, |survey| survey.time);
+        is_plain
+            && !may_be_too_short
+            && time < LONG
+            && machine.mechanism.visit(Within { job: self, machine })
+    }
+}
+
+struct Within<'a> {
+    job: &'a Job,
+    machine: &'a Machine,
+}
+
+impl MechanismVisitor for Within<'_> {
+    type Output = bool;
+
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> bool {
+        let Self { job, machine } = self;
+        let mut reach = Reach::new(mechanism, machine);
+        let mut extent = Extent::at(job.drawing.start);
+        if let (true, Some(survey)) = (reach.is_linear, &job.survey) {
+            // The first reading of a program has found its extent.
+            let facts = &survey.facts;
+            for mut corner in [facts.lower, facts.upper] {
+                if machine.gcode.z == ZMeaning::Ignored {
+                    corner[2] = extent.place.z;
+                }
+                extent.add(corner.into());
+            }
+            return extent.corners().all(|corner| reach.holds_point(&corner));
+        }
+        let Ok(steps) = job.steps() else { return false };
+        for step in steps {
+            let Ok(step) = step else { return false };
+            if !reach.holds(&step, &mut extent) {
+                return false;
+            }
+        }
+        // Where the joints go straight with the tool, they are farthest out at the corners.
+        !reach.is_linear || extent.corners().all(|corner| reach.holds_point(&corner))
+    }
+}
+
+/// The box around what is drawn.
+struct Extent {
+    lower: Vector3<f64>,
+    upper: Vector3<f64>,
+    place: Vector3<f64>,
+}
+
+impl Extent {
+    fn at(place: Vector3<f64>) -> Self {
+        Self { lower: place, upper: place, place }
+    }
+
+    fn add(&mut self, point: Vector3<f64>) {
+        self.lower = self.lower.inf(&point);
+        self.upper = self.upper.sup(&point);
+    }
+
+    fn corners(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        (0..8_usize).map(|corner| {
+            Vector3::from_fn(
+                |row, _| {
+                    if corner >> row & 1 == 0 { self.lower[row] } else { self.upper[row] }
+                },
+            )
+        })
+    }
+}
+
+/// What the joints of a machine can reach.
+struct Reach<'a, const N: usize, M: Mechanism<N>> {
+    branches: Vec<M::Branch>,
+    mechanism: M,
+    area: &'a WorkArea,
+    axes: &'a [Axis],
+    is_linear: bool,
+    /// The joints at the last point.
+    near: Joints<N>,
+}
+
+impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
+    fn new(mechanism: M, machine: &'a Machine) -> Self {
+        let home = Joints::<N>::from_fn(|axis, _| machine.home_joints[axis]);
+        Self {
+            branches: branches(&mechanism, &home),
+            is_linear: mechanism.is_linear(),
+            mechanism,
+            area: &machine.area,
+            axes: &machine.axes,
+            near: home,
+        }
+    }
+
+    fn holds(&mut self, step: &Step, extent: &mut Extent) -> bool {
+        let curve = match &step.action {
+            Action::Mark { curve, .. } | Action::Feed { curve, .. } => *curve,
+            Action::Rapid { to } => Curve::Line { from: extent.place, to: *to },
+            _ => return true,
+        };
+        let to = curve.to();
+        let is_straight = matches!(curve, Curve::Line { .. });
+        let holds = if self.is_linear && is_straight {
+            extent.add(curve.from());
+            extent.add(to);
+            true
+        } else {
+            let length = match curve {
+                Curve::Line { from, to } => (to - from).norm(),
+                Curve::Arc { .. } => Track::new(&curve).length(),
+            };
+            let count = (length / STEP).ceil().max(1.0) as u64;
+            // How far the curve may go beyond its points.
+            let beyond = match curve {
+                Curve::Line { .. } => 0.0,
+                Curve::Arc { major, minor, sweep, .. } => {
+                    let half = sweep / count as f64 / 2.0;
+                    major.norm().max(minor.norm()) * (1.0 - math::cos(half))
+                }
+            };
+            // A dense polyline's chords are looked at by their ends.
+            (1..=count).all(|index| {
+                let point = curve.point(index as f64 / count as f64);
+                let flat = Vector3::new(beyond, beyond, 0.0);
+                extent.add(point - flat);
+                extent.add(point + flat);
+                self.is_linear || self.holds_point(&point)
+            })
+        };
+        extent.place = to;
+        holds
+    }
+
+    fn holds_point(&mut self, point: &Vector3<f64>) -> bool {
+        let inside =
+            (0..3).all(|row| (self.area.lower[row]..=self.area.upper[row]).contains(&point[row]));
+        inside
+            && (0..self.branches.len()).any(|branch| {
+                let pose = Pose::at(*point);
+                let Ok(joints) = self.mechanism.inverse(&pose, self.branches[branch], &self.near)
+                else {
+                    return false;
+                };
+                let within = |(axis, joint): (&Axis, &f64)| {
+                    (axis.limits.position[0]..=axis.limits.position[1]).contains(joint)
+                };
+                let holds = self.axes.iter().zip(joints.iter()).all(within);
+                if holds {
+                    self.near = joints;
+                }
+                holds
+            })
+    }
+}

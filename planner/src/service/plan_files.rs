@@ -1,0 +1,95 @@
+//! What others read of a plan, in the run folder: it is written while the job is planned, and can be
+//! read whenever that ends.
+
+use crate::PlanFacts;
+use crate::request::Refusal;
+use messages::artwork::ArtworkLine;
+use messages::finite::first_not_finite;
+use messages::run_folder;
+use runtime::{ServiceError, message};
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How often the facts are written anew.
+const INTERVAL: Duration = Duration::from_secs(1);
+
+/// The files of a plan in a run folder.
+pub(super) struct PlanFiles {
+    artwork: BufWriter<File>,
+    folder: PathBuf,
+    noted: Option<Instant>,
+}
+
+impl PlanFiles {
+    /// Begins them in `folder`.
+    pub(super) fn create(folder: &Path) -> Result<Self, Refusal> {
+        let path = folder.join(run_folder::ARTWORK);
+        let artwork = File::create(&path).map_err(|source| failed(path, source))?;
+        Ok(Self { artwork: BufWriter::new(artwork), folder: folder.to_owned(), noted: None })
+    }
+
+    /// Adds what is to be marked next.
+    pub(super) fn add(&mut self, lines: &[ArtworkLine]) -> Result<(), Refusal> {
+        for line in lines {
+            finite(line)?;
+        }
+        let mut write = || -> io::Result<()> {
+            for line in lines {
+                serde_json::to_writer(&mut self.artwork, line)?;
+                self.artwork.write_all(b"\n")?;
+            }
+            self.artwork.flush()
+        };
+        write().map_err(|source| failed(self.folder.join(run_folder::ARTWORK), source))
+    }
+
+    /// Writes what the plan comes to so far, now and then and as `is_last`.
+    pub(super) fn note(
+        &mut self,
+        facts: &dyn Fn() -> PlanFacts,
+        is_last: bool,
+    ) -> Result<(), Refusal> {
+        if !is_last && self.noted.is_some_and(|noted| noted.elapsed() < INTERVAL) {
+            return Ok(());
+        }
+        self.noted = Some(Instant::now());
+        let facts = facts();
+        finite(&facts)?;
+        let path = self.folder.join(run_folder::PLAN);
+        let unfinished = self.folder.join(format!(".{}.unfinished", run_folder::PLAN));
+        // A reader sees the old content or the new.
+        let write = || -> io::Result<()> {
+            fs::write(&unfinished, serde_json::to_vec_pretty(&facts)?)?;
+            fs::rename(&unfinished, &path)
+        };
+        write().map_err(|source| {
+            // Half a file on a full disk would only make it fuller.
+            let _ = fs::remove_file(&unfinished);
+            failed(path, source)
+        })
+    }
+}
+
+/// Whoever reads the plan would find null where a number is due.
+fn finite(value: &impl serde::Serialize) -> Result<(), Refusal> {
+    match first_not_finite(value) {
+        Some(place) => Err(Refusal::internal(format!("the plan has no finite number at {place}"))),
+        None => Ok(()),
+    }
+}
+
+fn failed(path: PathBuf, source: io::Error) -> Refusal {
+    Refusal::internal(ServiceError::io(path, source))
+}
+
+/// Says in the run folder why the job was refused. Where that cannot be written, such as on a full
+/// disk, it is said in `spare`, and where that cannot be written either, on standard error.
+pub(super) fn write_refusal(folder: &Path, spare: &Path, refusal: &Refusal) {
+    let text = serde_json::to_vec_pretty(refusal).unwrap_or_default();
+    let places = [folder.join(run_folder::REFUSAL), spare.join(run_folder::REFUSAL)];
+    if !places.iter().any(|place| fs::write(place, &text).is_ok()) {
+        message::tell(refusal.text.trim());
+    }
+}
