@@ -1,7 +1,8 @@
 //! Job readers, paths, the time law, laser timing, sampling.
 //!
 //! [`job::Job::read`] turns a file into a drawing, [`plan()`] times it and checks every sample of
-//! it, [`Plan::setpoints`] hands the samples out. Nothing here waits, locks or reads a clock.
+//! it, [`Plan::setpoints`] hands the samples out; [`plan_through`] does both as it goes, and keeps
+//! nothing. Nothing here but [`service`] waits, locks or reads a clock.
 
 pub mod drawing;
 pub mod error;
@@ -23,4 +24,4 @@ pub mod verify;
 
 pub use error::PlanError;
 pub use job::{Job, Marking, MarkingSpeed};
-pub use plan::{Plan, PlanFacts, plan, plan_ideal};
+pub use plan::{Plan, PlanFacts, plan, plan_ideal, plan_through};

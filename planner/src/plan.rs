@@ -56,6 +56,32 @@ pub fn plan_ideal(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
     plan_within(machine, job, Scope::PathAlone, &|| false)
 }
 
+/// Plans `job` and hands its setpoints to `take`, checked, window by window, without keeping them: memory
+/// does not grow with the job.
+///
+/// # Errors
+/// As [`plan`]; what came before it has been handed over.
+pub fn plan_through(
+    machine: &Machine,
+    job: &Job,
+    take: impl FnMut(&[Setpoint]),
+) -> Result<PlanFacts, PlanError> {
+    plan_windows(machine, job, Scope::Machine, 1, &mut Through(take))
+}
+
+struct Through<F>(F);
+
+impl<F: FnMut(&[Setpoint])> Outlet for Through<F> {
+    fn is_abandoned(&self) -> bool {
+        false
+    }
+
+    fn take(&mut self, window: Window) -> Result<(), Window> {
+        (self.0)(&window.setpoints);
+        Ok(())
+    }
+}
+
 fn plan_within(
     machine: &Machine,
     job: &Job,

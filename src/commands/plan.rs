@@ -9,7 +9,7 @@ use crate::{inputs, output};
 use machine::Machine;
 use messages::Setpoint;
 use messages::time::CYCLE_TIME;
-use planner::{Plan, PlanFacts};
+use planner::{Plan, PlanError, PlanFacts};
 use runtime::message;
 use serde::Serialize;
 use std::fs::File;
@@ -33,6 +33,12 @@ pub struct PlanReport {
     pub program: Option<planner::job::gcode::ProgramFacts>,
 }
 
+/// A plan, or what it comes to where nothing else of it is asked for.
+enum Planned {
+    Whole(Plan),
+    Facts(PlanFacts),
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -46,36 +52,47 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         &input.job_overrides,
     );
     let started = Instant::now();
-    let job = request.read(&input.machine)?;
-    let plan = if arguments.ideal { planner::plan_ideal } else { planner::plan };
-    let plan = plan(&input.machine, &job).map_err(|error| request.refuse(&error))?;
+    let job = request.open(&input.machine)?;
+    let refuse = |error: PlanError| request.refuse(&error);
+    let is_listed = arguments.samples.is_some() || arguments.pulses.is_some();
+    let planned = if arguments.ideal {
+        Planned::Whole(planner::plan_ideal(&input.machine, &job).map_err(refuse)?)
+    } else if is_listed {
+        Planned::Whole(planner::plan(&input.machine, &job).map_err(refuse)?)
+    } else {
+        Planned::Facts(planner::plan_through(&input.machine, &job, |_| ()).map_err(refuse)?)
+    };
     let plan_time = started.elapsed().as_secs_f64();
     let mut sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
     let written = |path: &Path, result: io::Result<()>| {
         result.map_err(|error| Failure::output(format!("{}: {error}", path.display())))
     };
-    if let Some(path) = &arguments.samples {
+    if let (Some(path), Planned::Whole(plan)) = (&arguments.samples, &planned) {
         let file = sources.create("--samples", path)?;
-        written(path, write_samples(file, &input.machine, &plan))?;
+        written(path, write_samples(file, &input.machine, plan))?;
     }
-    if let Some(path) = &arguments.pulses {
+    if let (Some(path), Planned::Whole(plan)) = (&arguments.pulses, &planned) {
         if !pulses::has_steppers(&input.machine) {
             let name = &input.machine.name;
             let message = format!("--pulses: {name} has no steppers, and DC motors take no pulses");
             return Err(Failure::bad_input(message));
         }
         let file = sources.create("--pulses", path)?;
-        written(path, pulses::write(file, &input.machine, &plan))?;
+        written(path, pulses::write(file, &input.machine, plan))?;
     }
     for warning in input.machine.job_warnings() {
         message::tell(&format!("warning: {warning}"));
     }
+    let facts = match planned {
+        Planned::Whole(plan) => plan.facts,
+        Planned::Facts(facts) => facts,
+    };
     let report = PlanReport {
         machine: input.machine.name.clone(),
-        time: plan.facts.duration,
+        time: facts.duration,
         plan_time,
         program: job.program,
-        facts: plan.facts,
+        facts,
     };
     if arguments.json {
         output::json(&report)?;

@@ -14,7 +14,7 @@ use crate::geometry::path::Path;
 use crate::joint_space::configuration::{Configuration, trail};
 use crate::law::End;
 use crate::law::row::Side;
-use crate::law::windows::even_speed;
+use crate::law::windows::{even_speed, keeps_even};
 use crate::light::Policy;
 use crate::limits::along::{AlongPath, SpeedLimit};
 use crate::limits::tightening::Tightening;
@@ -115,16 +115,33 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         draft.strokes.extend(strokes(next, was_lit));
         draft.length += next.lit_length();
         let speeds = self.speed_limits(&contour);
-        Some(PathRun {
+        let known = run.path.length() - left_out;
+        let mut longer = PathRun {
             at: run.at - left_out,
             fallback: run.fallback.as_ref().map(|law| law.moved_back(left_out)),
             contour: Arc::new(contour),
             path: Arc::new(path),
             trail: Arc::new(trail),
             speeds: Arc::new(speeds),
-            even: None,
             ..run.clone()
-        })
+        };
+        longer.even = longer.even.filter(|speed| {
+            longer.speeds.iter().all(|limit| limit.speed == *speed)
+                && self.goes_evenly(
+                    &longer,
+                    longer.at.max(known - run.contour.last_length()),
+                    draft.shares,
+                )
+        });
+        Some(longer)
+    }
+
+    /// Whether `run` can be gone from `place` on at its one speed.
+    fn goes_evenly(&self, run: &PathRun<N>, place: f64, shares: &Tightening) -> bool {
+        let Some(speed) = run.even else { return false };
+        let mut along = AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
+        along.is_tool_free = true;
+        keeps_even(&mut along, place, run.path.length(), shares.speed * speed)
     }
 
     fn end_of(&self, path: &Path, trail: &[(f64, Configuration<N>)]) -> Option<Configuration<N>> {
@@ -144,6 +161,13 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     /// policy has it, else at rest.
     pub(super) fn choose_exit(&self, run: &mut PathRun<N>, shares: &Tightening) {
         run.exit = End::Rest;
+        if let Some(speed) = run.even.map(|speed| speed * shares.speed)
+            && self.can_leave(run, speed, shares)
+        {
+            run.exit = End::Moving { speed, acceleration: 0.0 };
+            return;
+        }
+        run.even = None;
         if run.contour.policy == Policy::Proportional || !run.contour.is_lit() {
             return;
         }

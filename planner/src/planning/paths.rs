@@ -270,7 +270,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
                 .map_err(|cause| self.refusal(Refused::Kinematics(cause)))?;
             let mut run = self.run(contour.clone(), path.clone(), trail, speeds.clone());
             (run.follows, run.smoothed_for) = (false, smoothed_for);
-            let evenly = speeds.len() == 1 && fastest <= top && !self.front.goes_on;
+            let evenly = speeds.len() == 1 && fastest <= top;
             let timed = self
                 .time_constant(&mut run, evenly, &mut ends, draft.shares)
                 .map_err(|cause| self.refusal(cause))?;
@@ -371,7 +371,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             run.begin = End::Moving { speed: fastest * shares.speed, acceleration: 0.0 };
             run.exit = run.begin;
             // The way to rest is there from the end of the path at this speed, or else from rest.
-            if self.can_leave(run, fastest * shares.speed, shares) {
+            if self.front.goes_on || self.can_leave(run, fastest * shares.speed, shares) {
                 return self.time(run, shares)?.map_err(|_| Refused::NoConfiguration { tried: 1 });
             }
             run.even = None;

@@ -66,6 +66,11 @@ impl Contour {
         self.weight
     }
 
+    /// Length of its last curve, within which another part changes it [m].
+    pub(crate) fn last_length(&self) -> f64 {
+        self.last().length()
+    }
+
     /// Takes its last curve off as the next part, which goes on from this one as the two did together.
     pub(crate) fn split_last(&mut self) -> Option<Self> {
         let joint = self.blends.pop()?;
