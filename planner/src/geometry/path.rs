@@ -7,12 +7,20 @@ use crate::drawing::Curve;
 use crate::geometry::blend::BlendSegment;
 use crate::geometry::jet::Jet;
 use crate::geometry::track::Track;
+use crate::search::partition_near;
 
 /// The path of a contour. It is never empty once it is planned.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Path {
     spans: Vec<Span>,
     length: f64,
+}
+
+/// Where on a path it was looked last.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct PathCursor {
+    span: usize,
+    piece: usize,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -63,6 +71,19 @@ impl Path {
     /// The point and its derivatives at `distance` from the start [m].
     pub fn at(&self, distance: f64) -> Jet {
         self.on_side(distance, false)
+    }
+
+    /// As [`Self::at`], looked for from the place of `near` on.
+    #[inline]
+    pub(crate) fn at_near(&self, distance: f64, near: &mut PathCursor) -> Jet {
+        let after = partition_near(&self.spans, &mut near.span, |span| span.start <= distance);
+        let span = &self.spans[after.max(1) - 1];
+        match &span.shape {
+            Shape::Track(track, from) => {
+                track.at_near(from + (distance - span.start), &mut near.piece)
+            }
+            Shape::BlendSegment(segment) => segment.at(distance - span.start),
+        }
     }
 
     /// The same, from the shape that ends at `distance` where one does and `before` says so.

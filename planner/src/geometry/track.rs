@@ -161,6 +161,12 @@ impl Track {
 
     /// The point and its derivatives at `distance` from the start [m].
     pub(crate) fn at(&self, distance: f64) -> Jet {
+        self.at_near(distance, &mut 0)
+    }
+
+    /// The same, with the number of a spline's piece looked for from `near` on.
+    #[inline]
+    pub(crate) fn at_near(&self, distance: f64, near: &mut usize) -> Jet {
         match self {
             Self::Line { from, direction, .. } => Jet {
                 point: from + direction * distance,
@@ -180,8 +186,8 @@ impl Track {
             }
             Self::Ellipse(table) => table.at(distance),
             Self::Projected(table) => table.at(distance),
-            Self::Spline { spline, .. } => spline.at(distance),
-            Self::Part { of, from, .. } => of.at(from + distance),
+            Self::Spline { spline, .. } => spline.at_near(distance, near),
+            Self::Part { of, from, .. } => of.at_near(from + distance, near),
         }
     }
 
