@@ -49,8 +49,8 @@ impl Spline {
     }
 
     /// As [`Self::at`], from the piece that ends at `u` where one does [m].
-    pub(crate) fn before(&self, u: f64) -> Jet {
-        let piece = self.knots.partition_point(|&knot| knot < u).saturating_sub(1);
+    pub(crate) fn before(&self, u: f64, near: &mut usize) -> Jet {
+        let piece = partition_near(&self.knots, near, |&knot| knot < u).saturating_sub(1);
         let piece = piece.min(self.jets.len() - 2);
         taylor(&self.jets[piece], (u - self.knots[piece]).max(0.0))
     }

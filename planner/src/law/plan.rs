@@ -113,8 +113,9 @@ impl Planner {
         settings: &Settings,
     ) -> Result<Stretch, Infeasible> {
         self.borders.clear();
-        let inside = limits.borders().iter().map(|border| border - from);
-        self.borders.extend(inside.filter(|border| *border > 0.0 && *border < length));
+        limits.borders(from, from + length, &mut self.borders);
+        self.borders.iter_mut().for_each(|border| *border -= from);
+        self.borders.retain(|border| *border > 0.0 && *border < length);
         self.borders.dedup();
         let problem = &mut self.problem;
         problem.rows.clear();

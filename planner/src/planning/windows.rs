@@ -174,7 +174,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
 
     /// Ends a path: the joints are where it ends, at rest or moving.
     fn leave(&mut self, run: &PathRun<N>, shares: &Tightening) -> Result<(), PlanError> {
-        let end = run.path.on_side(run.path.length(), true);
+        let end = run.path.end();
         let tool = end.motion(1.0, 0.0, 0.0);
         let Configuration { joints, mut branch } = run.trail[run.trail.len() - 1].1;
         let motion = self.limits.follow(&tool, &mut branch, &joints);
