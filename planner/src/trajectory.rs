@@ -135,12 +135,12 @@ impl Trajectory {
         let piece = &self.pieces[index];
         let since = time - piece.start;
         if index == last && since >= piece.duration {
-            return match piece.motion.at(piece.duration, cursor) {
+            return match piece.motion.at_near(piece.duration, cursor) {
                 Reference::Tool(tool) => Reference::Tool(ToolMotion::rest(&tool.pose())),
                 joints @ Reference::Joints(..) => joints,
             };
         }
-        piece.motion.at(since.max(0.0), cursor)
+        piece.motion.at_near(since.max(0.0), cursor)
     }
 
     /// The piece at `time` [s].
@@ -161,9 +161,14 @@ impl Reference {
 }
 
 impl Motion {
-    /// The motion at `time` since the start of the piece [s], looked for near `cursor`.
+    /// The motion at `time` since the start of the piece [s].
+    pub fn at(&self, time: f64) -> Reference {
+        self.at_near(time, &mut Cursor::default())
+    }
+
+    /// The same, looked for near `cursor`.
     #[inline]
-    pub fn at(&self, time: f64, cursor: &mut Cursor) -> Reference {
+    fn at_near(&self, time: f64, cursor: &mut Cursor) -> Reference {
         match self {
             Self::Rest(joints) | Self::Joints(joints) => Reference::Joints(joints.at(time)),
             Self::Path { path, law, .. } => {

@@ -119,6 +119,20 @@ impl TimeLaw {
         cell.time + cell.time_at(distance, cell.duration)
     }
 
+    /// The speed at `place` [m/s], looked for near the cell `near`.
+    pub(super) fn speed_at(&self, place: f64, near: &mut usize) -> f64 {
+        let above = partition_near(&self.cells, near, |cell| cell.place <= place);
+        let Some(cell) = self.cells.get(above.saturating_sub(1)) else { return 0.0 };
+        let distance = (place - cell.place).clamp(0.0, cell.length);
+        match cell.motion {
+            Motion::Slope(slope) => {
+                let change = distance * (2.0 * cell.acceleration + slope * distance);
+                (cell.speed * cell.speed + change).max(0.0).sqrt()
+            }
+            Motion::Jerk(_) => cell.at(cell.time_at(distance, cell.duration)).velocity,
+        }
+    }
+
     /// Which limit is the nearest, part by part.
     pub fn binding(&self) -> impl Iterator<Item = Binding> + '_ {
         self.cells.iter().map(|cell| Binding {

@@ -20,10 +20,11 @@ pub(crate) fn time_law(limits: &mut impl Limits, length: f64) -> TimeLaw {
     if let Some(law) = straight(limits, length) {
         return law;
     }
-    between(limits, 0.0, length, [End::Rest; 2]).unwrap_or_default()
+    between(limits, 0.0, length, [End::Rest; 2], None).unwrap_or_default()
 }
 
-/// The law between two places, at rest or in motion.
+/// The law between two places, at rest or in motion. `way` is a law within the limits that begins as it
+/// does, where one is known.
 ///
 /// # Errors
 /// Where an end in motion cannot be met.
@@ -32,8 +33,9 @@ pub(crate) fn between(
     from: f64,
     to: f64,
     ends: [End; 2],
+    way: Option<&TimeLaw>,
 ) -> Result<TimeLaw, Infeasible> {
-    let mut planner = Planner::default();
+    let mut planner = Planner::along(way);
     let mut best: Option<TimeLaw> = None;
     for cell_time in CELL_TIMES {
         let settings = Settings { cell_time, ..Settings::default() };
