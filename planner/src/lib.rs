@@ -18,6 +18,7 @@ pub(crate) mod planning;
 mod random;
 pub mod request;
 pub mod sampling;
+mod search;
 pub mod service;
 pub mod trajectory;
 pub mod verify;

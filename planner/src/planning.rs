@@ -503,24 +503,24 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     /// Samples as far as the motion is known, and checks each sample.
     fn sample(&mut self, abandoned: &dyn Fn() -> bool) -> Result<Vec<Setpoint>, PlanError> {
         let mut setpoints = Vec::new();
-        while let Some(setpoint) = self.front.sampler.next() {
+        while self.front.sampler.push_to(&mut setpoints) {
+            let Some(setpoint) = setpoints.last() else { break };
             self.front.samples += 1;
             if self.front.samples.is_multiple_of(ASK) && abandoned() {
                 return Err(PlanError::Abandoned);
             }
             let front = &mut self.front;
-            if let Err(violation) = front.checker.check(&setpoint, self.limits.axes, self.area) {
+            if let Err(violation) = front.checker.check(setpoint, self.limits.axes, self.area) {
                 return Err(self.limit(violation));
             }
             if let Some(interpolation) = &mut front.interpolation {
                 let time = setpoint.sequence as f64 * CYCLE_TIME;
-                match interpolation.check(&setpoint, &front.sampler) {
+                match interpolation.check(setpoint, &front.sampler) {
                     Ok(None) => {}
                     Ok(Some(violation)) => return Err(self.limit(violation)),
                     Err(cause) => return Err(self.unreachable(Unreachable { time, cause })),
                 }
             }
-            setpoints.push(setpoint);
         }
         match self.front.sampler.broken() {
             Some(found) => Err(self.unreachable(found)),

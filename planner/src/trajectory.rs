@@ -11,7 +11,7 @@ use messages::Nanoseconds;
 use messages::time::CYCLE_TIME;
 
 use crate::geometry::attitude::AttitudeLaw;
-use crate::geometry::path::Path;
+use crate::geometry::path::{Path, PathCursor};
 use crate::joint_space::joint_move::{JointMove, JointsAt};
 use crate::law::flight::Flight;
 use crate::law::time_law::TimeLaw;
@@ -52,6 +52,15 @@ pub enum Motion {
     Flight(Arc<Flight>),
     /// The joints together from rest to rest.
     Joints(JointMove),
+}
+
+/// Where a trajectory was looked at last, to look near it next.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Cursor {
+    /// The piece.
+    pub(crate) piece: usize,
+    cell: usize,
+    path: PathCursor,
 }
 
 /// What a piece of motion says at one instant.
@@ -112,25 +121,26 @@ impl Trajectory {
 
     /// The motion at `time` [s]; at rest before the start and after the end. `cursor` is the piece to
     /// begin with: searching goes on from there in either direction.
-    pub fn at(&self, time: f64, cursor: &mut usize) -> Reference {
+    #[inline]
+    pub fn at(&self, time: f64, cursor: &mut Cursor) -> Reference {
         let last = self.pieces.len() - 1;
-        let mut index = (*cursor).min(last);
+        let mut index = cursor.piece.min(last);
         while index > 0 && time < self.pieces[index].start {
             index -= 1;
         }
         while index < last && time >= self.pieces[index + 1].start {
             index += 1;
         }
-        *cursor = index;
+        cursor.piece = index;
         let piece = &self.pieces[index];
         let since = time - piece.start;
         if index == last && since >= piece.duration {
-            return match piece.motion.at(piece.duration) {
+            return match piece.motion.at_near(piece.duration, cursor) {
                 Reference::Tool(tool) => Reference::Tool(ToolMotion::rest(&tool.pose())),
                 joints @ Reference::Joints(..) => joints,
             };
         }
-        piece.motion.at(since.max(0.0))
+        piece.motion.at_near(since.max(0.0), cursor)
     }
 
     /// The piece at `time` [s].
@@ -153,11 +163,17 @@ impl Reference {
 impl Motion {
     /// The motion at `time` since the start of the piece [s].
     pub fn at(&self, time: f64) -> Reference {
+        self.at_near(time, &mut Cursor::default())
+    }
+
+    /// The same, looked for near `cursor`.
+    #[inline]
+    fn at_near(&self, time: f64, cursor: &mut Cursor) -> Reference {
         match self {
             Self::Rest(joints) | Self::Joints(joints) => Reference::Joints(joints.at(time)),
             Self::Path { path, law, .. } => {
-                let along = law.at(time);
-                let jet = path.at(along.position);
+                let along = law.at_near(time, &mut cursor.cell);
+                let jet = path.at_near(along.position, &mut cursor.path);
                 Reference::Tool(jet.motion(along.velocity, along.acceleration, along.jerk))
             }
             Self::Flight(flight) => {

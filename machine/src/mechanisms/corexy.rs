@@ -94,6 +94,7 @@ impl Mechanism<2> for CoreXy {
         jacobian
     }
 
+    #[inline]
     fn joint_motion(
         &self,
         tool: &ToolMotion,

@@ -33,6 +33,7 @@ impl AttitudeLaw {
     ///
     /// # Errors
     /// Where the surface has no normal, such as in the axis of a cone.
+    #[inline]
     pub fn apply(&self, tool: &ToolMotion) -> Result<ToolMotion, KinematicsError> {
         match self {
             Self::Level => Ok(*tool),

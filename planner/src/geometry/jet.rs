@@ -53,6 +53,7 @@ impl Jet {
 
     /// The tool's motion along a curve taken by arc length, when it is here with `velocity`,
     /// `acceleration` and `jerk` along the curve.
+    #[inline]
     pub fn motion(&self, velocity: f64, acceleration: f64, jerk: f64) -> ToolMotion {
         ToolMotion {
             position: self.point,

@@ -7,12 +7,20 @@ use crate::drawing::Curve;
 use crate::geometry::blend::BlendSegment;
 use crate::geometry::jet::Jet;
 use crate::geometry::track::Track;
+use crate::search::partition_near;
 
 /// The path of a contour. It is never empty once it is planned.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Path {
     spans: Vec<Span>,
     length: f64,
+}
+
+/// Where on a path it was looked last.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct PathCursor {
+    span: usize,
+    piece: usize,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -62,19 +70,40 @@ impl Path {
 
     /// The point and its derivatives at `distance` from the start [m].
     pub fn at(&self, distance: f64) -> Jet {
-        self.on_side(distance, false)
+        self.at_near(distance, &mut PathCursor::default())
+    }
+
+    /// As [`Self::at`], looked for from the place of `near` on.
+    #[inline]
+    pub(crate) fn at_near(&self, distance: f64, near: &mut PathCursor) -> Jet {
+        let after = partition_near(&self.spans, &mut near.span, |span| span.start <= distance);
+        let span = &self.spans[after.max(1) - 1];
+        match &span.shape {
+            Shape::Track(track, from) => {
+                track.at_near(from + (distance - span.start), &mut near.piece)
+            }
+            Shape::BlendSegment(segment) => segment.at(distance - span.start),
+        }
     }
 
     /// The same, from the shape that ends at `distance` where one does and `before` says so.
-    pub(crate) fn on_side(&self, distance: f64, before: bool) -> Jet {
-        if before {
-            let after = self.spans.partition_point(|span| span.start < distance);
-            let span = &self.spans[after.max(1) - 1];
-            return span.before(distance - span.start);
+    pub(crate) fn on_side(&self, distance: f64, before: bool, near: &mut PathCursor) -> Jet {
+        if !before {
+            return self.at_near(distance, near);
         }
-        let after = self.spans.partition_point(|span| span.start <= distance);
+        let after = partition_near(&self.spans, &mut near.span, |span| span.start < distance);
         let span = &self.spans[after.max(1) - 1];
-        span.at(distance - span.start)
+        match &span.shape {
+            Shape::Track(track, from) => {
+                track.before(from + (distance - span.start), &mut near.piece)
+            }
+            Shape::BlendSegment(segment) => segment.at(distance - span.start),
+        }
+    }
+
+    /// The last point, as its shape ends.
+    pub(crate) fn end(&self) -> Jet {
+        self.on_side(self.length, true, &mut PathCursor::default())
     }
 
     /// Distances at which the path goes over from one shape into the next [m].
@@ -82,41 +111,29 @@ impl Path {
         self.spans.iter().skip(1).map(|span| span.start)
     }
 
-    /// Where its third derivative may jump: seams, and the knots of splines [m], growing.
-    pub(crate) fn borders(&self) -> Vec<f64> {
-        let mut borders = Vec::new();
-        let ends = self.spans.iter().skip(1).map(|span| span.start).chain([self.length]);
-        for (span, end) in self.spans.iter().zip(ends) {
-            if span.start > 0.0 {
+    /// Appends where its third derivative may jump from `from` to `to`: seams, and the knots of splines
+    /// [m], growing.
+    pub(crate) fn borders(&self, from: f64, to: f64, borders: &mut Vec<f64>) {
+        let first = self.spans.partition_point(|span| span.start <= from).max(1) - 1;
+        for (index, span) in self.spans.iter().enumerate().skip(first) {
+            if span.start > to {
+                break;
+            }
+            if span.start > 0.0 && span.start >= from {
                 borders.push(span.start);
             }
-            if let Shape::Track(track, from) = &span.shape {
-                let inside = |knot: &f64| *knot > span.start && *knot < end;
-                borders.extend(track.knots().map(|knot| knot - from + span.start).filter(inside));
+            if let Shape::Track(track, offset) = &span.shape {
+                let end = self.spans.get(index + 1).map_or(self.length, |next| next.start);
+                let knots = track.knots(from - span.start + offset);
+                let inside = |knot: &f64| *knot > span.start && *knot < end && *knot >= from;
+                let knots = knots.map(|knot| knot - offset + span.start);
+                borders.extend(knots.take_while(|knot| *knot <= to).filter(inside));
             }
         }
-        borders
     }
 
     /// Whether it is one straight line.
     pub(crate) fn is_straight(&self) -> bool {
         matches!(&*self.spans, [Span { shape: Shape::Track(Track::Line { .. }, _), .. }])
-    }
-}
-
-impl Span {
-    /// As [`Self::at`], just before `distance`.
-    fn before(&self, distance: f64) -> Jet {
-        match &self.shape {
-            Shape::Track(track, from) => track.before(from + distance),
-            Shape::BlendSegment(segment) => segment.at(distance),
-        }
-    }
-
-    fn at(&self, distance: f64) -> Jet {
-        match &self.shape {
-            Shape::Track(track, from) => track.at(from + distance),
-            Shape::BlendSegment(segment) => segment.at(distance),
-        }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::geometry::fit::basis::taylor;
 use crate::geometry::jet::Jet;
+use crate::search::partition_near;
 
 /// A curve of cubic pieces that runs through, or within tolerance of, a run of vertices. Its parameter is
 /// near the arc length; value, first and second derivative are continuous.
@@ -33,7 +34,13 @@ impl Spline {
 
     /// Point and derivatives at parameter `u` [m], taken into the curve's range.
     pub(crate) fn at(&self, u: f64) -> Jet {
-        let piece = self.knots.partition_point(|&knot| knot <= u).saturating_sub(1);
+        self.at_near(u, &mut 0)
+    }
+
+    /// The same, with the number of the piece looked for from `near` on.
+    #[inline]
+    pub(crate) fn at_near(&self, u: f64, near: &mut usize) -> Jet {
+        let piece = partition_near(&self.knots, near, |&knot| knot <= u).saturating_sub(1);
         let start = &self.jets[piece];
         if piece + 1 == self.jets.len() {
             return *start;
@@ -42,8 +49,8 @@ impl Spline {
     }
 
     /// As [`Self::at`], from the piece that ends at `u` where one does [m].
-    pub(crate) fn before(&self, u: f64) -> Jet {
-        let piece = self.knots.partition_point(|&knot| knot < u).saturating_sub(1);
+    pub(crate) fn before(&self, u: f64, near: &mut usize) -> Jet {
+        let piece = partition_near(&self.knots, near, |&knot| knot < u).saturating_sub(1);
         let piece = piece.min(self.jets.len() - 2);
         taylor(&self.jets[piece], (u - self.knots[piece]).max(0.0))
     }

@@ -170,6 +170,12 @@ impl Track {
 
     /// The point and its derivatives at `distance` from the start [m].
     pub(crate) fn at(&self, distance: f64) -> Jet {
+        self.at_near(distance, &mut 0)
+    }
+
+    /// The same, with the number of a spline's piece looked for from `near` on.
+    #[inline]
+    pub(crate) fn at_near(&self, distance: f64, near: &mut usize) -> Jet {
         match self {
             Self::Line { from, direction, .. } => Jet {
                 point: from + direction * distance,
@@ -189,25 +195,32 @@ impl Track {
             }
             Self::Ellipse(table) => table.at(distance),
             Self::Projected(table) => table.at(distance),
-            Self::Spline { spline, .. } => spline.at(distance),
-            Self::Part { of, from, .. } => of.at(from + distance),
+            Self::Spline { spline, .. } => spline.at_near(distance, near),
+            Self::Part { of, from, .. } => of.at_near(from + distance, near),
         }
     }
 
     /// As [`Self::at`], just before `distance`, where the third derivative may jump.
-    pub(crate) fn before(&self, distance: f64) -> Jet {
+    pub(crate) fn before(&self, distance: f64, near: &mut usize) -> Jet {
         match self {
-            Self::Spline { spline, .. } => spline.before(distance),
-            Self::Part { of, from, .. } => of.before(from + distance),
+            Self::Spline { spline, .. } => spline.before(distance, near),
+            Self::Part { of, from, .. } => of.before(from + distance, near),
             _ => self.at(distance),
         }
     }
 
-    /// Where its third derivative jumps inside it [m], growing.
-    pub(crate) fn knots(&self) -> Box<dyn Iterator<Item = f64> + '_> {
+    /// Where its third derivative jumps, from a little before `start` on [m], growing.
+    pub(crate) fn knots(&self, start: f64) -> Box<dyn Iterator<Item = f64> + '_> {
+        /// More than rounding makes of a place on a path [m].
+        const ROUNDING: f64 = 1e-9;
         match self {
-            Self::Spline { spline, .. } => Box::new(spline.knots().iter().copied()),
-            Self::Part { of, from, .. } => Box::new(of.knots().map(move |knot| knot - from)),
+            Self::Spline { spline, .. } => {
+                let first = spline.knots().partition_point(|knot| *knot < start - ROUNDING);
+                Box::new(spline.knots()[first..].iter().copied())
+            }
+            Self::Part { of, from, .. } => {
+                Box::new(of.knots(from + start).map(move |knot| knot - from))
+            }
             _ => Box::new(core::iter::empty()),
         }
     }

@@ -199,7 +199,7 @@ fn straight_move<const N: usize, M: Mechanism<N>>(
         Some(law) => law,
         None => {
             along.is_exact = false;
-            between(&mut along, 0.0, path.length(), [End::Rest; 2]).unwrap_or_default()
+            between(&mut along, 0.0, path.length(), [End::Rest; 2], None).unwrap_or_default()
         }
     };
     if let Some(cause) = along.error {

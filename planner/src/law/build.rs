@@ -107,6 +107,8 @@ pub(super) struct Problem {
     pub(super) held: Vec<Held>,
     pub(super) rows: Vec<Row>,
     pub(super) launches: [Option<Launch>; 2],
+    /// Whether a row of the pool is in the programme: most are far from what they allow.
+    pub(super) is_held: Vec<bool>,
     pub(super) tightenings: Vec<Tightening>,
     /// How much the limits of the third order are loosened; 1 is not at all.
     pub(super) loosened: f64,
@@ -146,23 +148,113 @@ impl Problem {
         let weights = self.spline.weights(cell, part);
         let mut local = Local::new(ties, cell, first, weights);
         let mut top = held.speed;
-        for row in &self.rows[held.rows.clone()] {
-            let part = room * self.part(cell, row.limit);
-            if row.third_order() {
-                let (weights, top) = row.about(held.about, self.loosened * part);
-                local.add(weights, top, program);
-            } else if row.mixed() {
+        for index in held.rows.clone() {
+            let row = &self.rows[index];
+            if row.mixed() {
                 top = top.min(held.bound);
-                let (weights, top) = row.at(held.bound.min(held.speed));
-                local.add(weights, self.loosened * part * top, program);
-                local.add(row.base, part * row.at(0.0).1, program);
-            } else {
-                local.add(row.base, part * row.top, program);
+            }
+            if self.is_held[index] {
+                let part = room * self.part(cell, row.limit);
+                for (weights, top) in self.lines(held, row, part).into_iter().flatten() {
+                    local.add(weights, top, program);
+                }
             }
         }
         let square = top * top * room.min(SPEED_ROOM) * self.part(cell, held.speed_limit);
         local.add([0.0, 0.0, 1.0], square, program);
         program.term(local.term(share * self.spline.length(cell)));
+    }
+
+    /// What a row of `held` is in the programme, `part` of it being there to be used: one or two rows of
+    /// weights of (ü′, ü, u̇²), and their tops.
+    fn lines(&self, held: &Held, row: &Row, part: f64) -> [Option<([f64; 3], f64)>; 2] {
+        if row.third_order() {
+            [Some(row.about(held.about, self.loosened * part)), None]
+        } else if row.mixed() {
+            let (weights, top) = row.at(held.bound.min(held.speed));
+            let slow = (row.base, part * row.at(0.0).1);
+            [Some((weights, self.loosened * part * top)), Some(slow)]
+        } else {
+            [Some((row.base, part * row.top)), None]
+        }
+    }
+
+    /// Holds all rows.
+    pub(super) fn hold_all(&mut self) {
+        self.is_held.clear();
+        self.is_held.resize(self.rows.len(), true);
+    }
+
+    /// Holds the rows that a law about the estimate may come near, and leaves out the others.
+    pub(super) fn hold_likely(&mut self) {
+        /// The part of a limit from which on it is held.
+        const NEAR: f64 = 0.85;
+        self.is_held.clear();
+        self.is_held.resize(self.rows.len(), false);
+        for held in &self.held {
+            let rows = &self.rows[held.rows.clone()];
+            let speed = held.about;
+            let square = speed * speed;
+            let most = |of: fn(&Row) -> f64| {
+                let rows = rows.iter().filter(|row| of(row) != 0.0);
+                rows.map(|row| row.top / of(row).abs()).fold(f64::INFINITY, f64::min)
+            };
+            let acceleration = most(|row| row.base[1]);
+            let third = most(|row| row.by_speed[0]);
+            for (index, row) in held.rows.clone().zip(rows) {
+                let used = row.base[1].abs() * acceleration
+                    + (row.base[2] * square).max(0.0)
+                    + row.by_speed[0].abs() * third
+                    + speed * (row.by_speed[2] * square).max(0.0);
+                self.is_held[index] = used > NEAR * (row.top + row.top_by_speed * speed);
+            }
+        }
+    }
+
+    /// Holds the rows of which the law of `coefficients` uses more than a part, and leaves out the others.
+    pub(super) fn hold_near(&mut self, coefficients: &[f64]) {
+        /// The part of a limit from which on it is held.
+        const NEAR: f64 = 0.6;
+        for cell in 0..self.spline.cells() {
+            for (which, part) in PARTS.iter().enumerate() {
+                let state = self.spline.state(coefficients, cell, *part);
+                let speed = state[2].max(0.0).sqrt();
+                for index in self.held[3 * cell + which].rows.clone() {
+                    self.is_held[index] = self.rows[index].used(state, speed) > NEAR;
+                }
+            }
+        }
+    }
+
+    /// Holds the rows that were left out and are broken by the law of `coefficients`. Says whether there
+    /// are any.
+    pub(super) fn hold_broken(&mut self, ends: [Tie; 2], coefficients: &[f64]) -> bool {
+        /// A row may be broken by this part of its top.
+        const BROKEN: f64 = 1e-5;
+        let mut any = false;
+        for cell in 0..self.spline.cells() {
+            let room = self.room(ends, cell);
+            for (which, part) in PARTS.iter().enumerate() {
+                let state = self.spline.state(coefficients, cell, *part);
+                let held = &self.held[3 * cell + which];
+                for index in held.rows.clone() {
+                    if self.is_held[index] {
+                        continue;
+                    }
+                    let row = &self.rows[index];
+                    let part = room * self.part(cell, row.limit);
+                    let lines = self.lines(held, row, part).into_iter().flatten();
+                    let is_broken = |(weights, top): ([f64; 3], f64)| {
+                        dot(weights, state) > top * (1.0 + BROKEN)
+                    };
+                    if lines.into_iter().any(is_broken) {
+                        self.is_held[index] = true;
+                        any = true;
+                    }
+                }
+            }
+        }
+        any
     }
 
     /// Adds the rows of a launch.

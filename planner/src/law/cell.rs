@@ -38,6 +38,7 @@ const MOST_TERMS: usize = 60;
 
 impl Cell {
     /// The motion at `time` after the begin of the cell [s], the position from its begin.
+    #[inline]
     pub(super) fn at(&self, time: f64) -> Along {
         match self.motion {
             Motion::Slope(slope) => series(self.speed, self.acceleration, slope, time),

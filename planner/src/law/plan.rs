@@ -30,6 +30,8 @@ const MET: f64 = 0.98;
 const LOOSENED: f64 = 1.3;
 /// The part of the estimated speed about which the first round's limits of the third order are exact.
 const BEGIN_ABOUT: f64 = 0.85;
+/// How much less precise the first programme may be.
+const ROUGH: f64 = 100.0;
 /// The unknowns a first and a later programme begin with.
 const BEGIN: [f64; 2] = [0.3, 0.95];
 
@@ -46,10 +48,14 @@ pub(crate) struct Planner {
     columns: Vec<f64>,
     unknowns: Vec<f64>,
     coefficients: Vec<f64>,
+    /// The coefficients of the programme solved last.
+    found: Vec<f64>,
     /// The coefficients of the fastest law of the rounds.
     best: Vec<f64>,
     limits: Vec<u16>,
     effort: Effort,
+    /// A law within the limits that begins as the next does, where one is known.
+    way: Option<TimeLaw>,
     /// Whether the first programme of the last stretch found no answer.
     has_failed: bool,
 }
@@ -67,6 +73,11 @@ pub(crate) fn plan(
 }
 
 impl Planner {
+    /// With a law that begins as the stretch does and is within its limits, where one is known.
+    pub(crate) fn along(way: Option<&TimeLaw>) -> Self {
+        Self { way: way.cloned(), ..Self::default() }
+    }
+
     /// The fastest law within `limits` from `from` to `to` [m]. A stretch between rests always has
     /// one; an end in motion may be out of reach.
     pub(crate) fn plan(
@@ -113,8 +124,9 @@ impl Planner {
         settings: &Settings,
     ) -> Result<Stretch, Infeasible> {
         self.borders.clear();
-        let inside = limits.borders().iter().map(|border| border - from);
-        self.borders.extend(inside.filter(|border| *border > 0.0 && *border < length));
+        limits.borders(from, from + length, &mut self.borders);
+        self.borders.iter_mut().for_each(|border| *border -= from);
+        self.borders.retain(|border| *border > 0.0 && *border < length);
         self.borders.dedup();
         let problem = &mut self.problem;
         problem.rows.clear();
@@ -170,6 +182,8 @@ impl Planner {
         problem.held.clear();
         problem.rows.clear();
         let about = if stretch.fixed() { 1.0 / MARGIN } else { BEGIN_ABOUT };
+        let way = Way::new(self.way.as_ref(), stretch);
+        let mut near = 0;
         for cell in 0..problem.spline.cells() {
             for (part, side) in PARTS.into_iter().zip([Side::After, Side::At, Side::Before]) {
                 let place = problem.spline.place(cell, part);
@@ -181,10 +195,11 @@ impl Planner {
                     rows: site.rows,
                     estimate,
                     bound: estimate,
-                    about: about * estimate,
+                    about: way.about(place, about * estimate, &mut near),
                 });
             }
         }
+        problem.hold_likely();
         for end in 0..2 {
             problem.launches[end] = None;
             if let Tie::Launch(launch) = stretch.ties[end] {
@@ -212,15 +227,24 @@ impl Planner {
             self.columns.push(speed * speed);
         }
         let (mut before, mut least) = (f64::INFINITY, f64::INFINITY);
+        // Whether the first law breaks rows that were left out: only the next is one to keep.
+        let mut is_rough = false;
         for round in 0..settings.rounds.max(1) {
-            if !self.round(stretch, settings, round == 0) {
-                if round > 0 {
+            if round == 0 {
+                is_rough = self.first_round(stretch, settings)?;
+            } else if !self.round(stretch, settings, false) {
+                if is_rough && !self.round(stretch, settings, true) {
+                    self.first_way(stretch, settings)?;
+                } else if !is_rough {
                     break;
                 }
-                self.has_failed = true;
-                self.first_way(stretch, settings)?;
             }
             let time = self.time(stretch);
+            if round == 0 && is_rough {
+                self.bound(GROWTH[0]);
+                continue;
+            }
+            is_rough = false;
             if time < least {
                 least = time;
                 self.best.clone_from(&self.coefficients);
@@ -239,23 +263,56 @@ impl Planner {
         Ok(())
     }
 
+    /// The first programme. Says whether its law breaks rows that were left out of it.
+    fn first_round(&mut self, stretch: &Stretch, settings: &Settings) -> Result<bool, Infeasible> {
+        self.effort.rounds += 1;
+        self.ties.tie(&self.problem.spline, stretch.ties, &self.columns);
+        if self.solve(stretch, settings, true) {
+            self.ties.coefficients(&self.unknowns, &mut self.coefficients);
+            return Ok(
+                settings.rounds > 1 && self.problem.hold_broken(stretch.ties, &self.coefficients)
+            );
+        }
+        self.problem.hold_all();
+        // By way of loosened limits the law is as good as any.
+        self.has_failed = !stretch.fixed();
+        self.first_way(stretch, settings)?;
+        Ok(false)
+    }
+
     /// A programme within the speed bounds as they are. Where it fails the law stays as it was.
     fn round(&mut self, stretch: &Stretch, settings: &Settings, first: bool) -> bool {
         self.effort.rounds += 1;
         self.ties.tie(&self.problem.spline, stretch.ties, &self.columns);
+        // Rows that should be far from the law are left out until they are broken.
+        let mut first = first;
+        loop {
+            if !self.solve(stretch, settings, first) {
+                return false;
+            }
+            self.ties.coefficients(&self.unknowns, &mut self.found);
+            if !self.problem.hold_broken(stretch.ties, &self.found) {
+                core::mem::swap(&mut self.coefficients, &mut self.found);
+                return true;
+            }
+            take_as_units(&mut self.columns, &self.found);
+            self.ties.tie(&self.problem.spline, stretch.ties, &self.columns);
+            first = false;
+        }
+    }
+
+    /// Solves the programme of the rows that are held. Says whether an answer was found.
+    fn solve(&mut self, stretch: &Stretch, settings: &Settings, first: bool) -> bool {
         self.problem.build(&self.ties, stretch.ties, &mut self.program);
         self.effort.rows = self.program.rows();
         self.unknowns.clear();
         self.unknowns.resize(self.program.unknowns(), BEGIN[usize::from(!first)]);
-        let weight = if first { 0.1 } else { 0.03 };
-        let outcome =
-            self.solver.solve(&mut self.program, &mut self.unknowns, weight, settings.precision);
+        // The first law only says about which speed the limits are exact in the next.
+        let (weight, precision) =
+            if first { (0.1, ROUGH * settings.precision) } else { (0.03, settings.precision) };
+        let outcome = self.solver.solve(&mut self.program, &mut self.unknowns, weight, precision);
         let sound = self.unknowns.iter().all(|value| value.is_finite() && *value > 0.0);
-        if outcome == Outcome::Failed || !sound {
-            return false;
-        }
-        self.ties.coefficients(&self.unknowns, &mut self.coefficients);
-        true
+        outcome != Outcome::Failed && sound
     }
 
     /// A first law where the first programme failed: between rests the estimate, slow enough for
@@ -291,6 +348,7 @@ impl Planner {
     /// unknowns.
     fn bound(&mut self, growth: f64) {
         let problem = &mut self.problem;
+        problem.hold_near(&self.coefficients);
         for cell in 0..problem.spline.cells() {
             for (which, part) in PARTS.into_iter().enumerate() {
                 let square = problem.spline.state(&self.coefficients, cell, part)[2];
@@ -299,9 +357,7 @@ impl Planner {
                 held.bound = held.estimate.min(growth * held.about);
             }
         }
-        for (column, coefficient) in self.columns.iter_mut().zip(&self.coefficients) {
-            *column = coefficient.max(1e-9 * *column);
-        }
+        take_as_units(&mut self.columns, &self.coefficients);
     }
 
     /// The time of the law, near enough to compare [s].
@@ -385,5 +441,38 @@ impl Planner {
             law.land(place, length, self.coefficients[last].max(1e-24), launch_limit(1));
         }
         law
+    }
+}
+
+/// Makes the coefficients of a law the units of the unknowns.
+fn take_as_units(columns: &mut [f64], coefficients: &[f64]) {
+    for (column, coefficient) in columns.iter_mut().zip(coefficients) {
+        *column = coefficient.max(1e-9 * *column);
+    }
+}
+
+/// A law known to be within the limits, as a first guess of the speed where the new one begins.
+struct Way<'a> {
+    law: Option<&'a TimeLaw>,
+    from: f64,
+    /// How far it is followed [m].
+    length: f64,
+}
+
+impl<'a> Way<'a> {
+    /// The part of the law that is followed: the rest of it only comes to rest.
+    const FOLLOWED: f64 = 0.5;
+
+    fn new(law: Option<&'a TimeLaw>, stretch: &Stretch) -> Self {
+        let places = law.map_or(0.0..0.0, TimeLaw::places);
+        let length = Self::FOLLOWED * (places.end - places.start).min(stretch.length);
+        Self { law: law.filter(|_| length > 0.0), from: stretch.from, length }
+    }
+
+    /// The speed to be exact about at `place` from the start [m/s], `speed` where nothing else is known.
+    fn about(&self, place: f64, speed: f64, near: &mut usize) -> f64 {
+        let Some(law) = self.law.filter(|_| place < self.length) else { return speed };
+        let known = law.speed_at(self.from + place, near).min(speed);
+        known + (speed - known) * place / self.length
     }
 }

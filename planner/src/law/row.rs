@@ -113,8 +113,9 @@ pub(crate) struct Site {
 
 /// The limits along a stretch of a path.
 pub(crate) trait Limits {
-    /// Where the limits may jump or bend sharply: the borders of the path's spans [m], growing.
-    fn borders(&self) -> &[f64];
+    /// Appends where the limits may jump or bend sharply: the borders of the path's spans at `from`, at
+    /// `to` and between [m], growing.
+    fn borders(&self, from: f64, to: f64, borders: &mut Vec<f64>);
 
     /// The limits at `place` [m], taken on `side`; the rows are appended to `rows`.
     fn site(&mut self, place: f64, side: Side, rows: &mut Vec<Row>) -> Site;

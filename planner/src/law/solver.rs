@@ -191,9 +191,10 @@ impl Solver {
             let y = [unknowns[first], unknowns[first + 1], unknowns[first + 2]];
             for term in &program.terms[block.terms.0..block.terms.1] {
                 let square = term.square(y).max(1e-300);
-                let part = self.unit * term.length / square.sqrt();
-                let slope = 0.5 * part / square;
-                let curvature = 1.5 * slope / square;
+                let inverse = 1.0 / square;
+                let part = self.unit * term.length * square.sqrt() * inverse;
+                let slope = 0.5 * part * inverse;
+                let curvature = 1.5 * slope * inverse;
                 let weights = term.weights;
                 time += part;
                 for (k, weight) in weights.into_iter().enumerate() {

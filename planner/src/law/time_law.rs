@@ -6,6 +6,7 @@ use super::{
     cell::{Along, Cell, Motion},
     spline::Spline,
 };
+use crate::search::partition_near;
 
 /// What binds a part of a law.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,7 +90,13 @@ impl TimeLaw {
     /// Where along the path it is at `time` [s] after the start; before the start and after the
     /// end the law stands at its ends.
     pub fn at(&self, time: f64) -> Along {
-        let above = self.cells.partition_point(|cell| cell.time <= time);
+        self.at_near(time, &mut 0)
+    }
+
+    /// The same, with the number of the cell looked for from `near` on.
+    #[inline]
+    pub(crate) fn at_near(&self, time: f64, near: &mut usize) -> Along {
+        let above = partition_near(&self.cells, near, |cell| cell.time <= time);
         let Some(cell) = self.cells.get(above.saturating_sub(1)) else {
             return Along::default();
         };
@@ -110,6 +117,20 @@ impl TimeLaw {
             return cell.time + cell.duration;
         }
         cell.time + cell.time_at(distance, cell.duration)
+    }
+
+    /// The speed at `place` [m/s], looked for near the cell `near`.
+    pub(super) fn speed_at(&self, place: f64, near: &mut usize) -> f64 {
+        let above = partition_near(&self.cells, near, |cell| cell.place <= place);
+        let Some(cell) = self.cells.get(above.saturating_sub(1)) else { return 0.0 };
+        let distance = (place - cell.place).clamp(0.0, cell.length);
+        match cell.motion {
+            Motion::Slope(slope) => {
+                let change = distance * (2.0 * cell.acceleration + slope * distance);
+                (cell.speed * cell.speed + change).max(0.0).sqrt()
+            }
+            Motion::Jerk(_) => cell.at(cell.time_at(distance, cell.duration)).velocity,
+        }
     }
 
     /// Which limit is the nearest, part by part.

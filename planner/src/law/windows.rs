@@ -20,10 +20,11 @@ pub(crate) fn time_law(limits: &mut impl Limits, length: f64) -> TimeLaw {
     if let Some(law) = straight(limits, length) {
         return law;
     }
-    between(limits, 0.0, length, [End::Rest; 2]).unwrap_or_default()
+    between(limits, 0.0, length, [End::Rest; 2], None).unwrap_or_default()
 }
 
-/// The law between two places, at rest or in motion.
+/// The law between two places, at rest or in motion. `way` is a law within the limits that begins as it
+/// does, where one is known.
 ///
 /// # Errors
 /// Where an end in motion cannot be met.
@@ -32,8 +33,9 @@ pub(crate) fn between(
     from: f64,
     to: f64,
     ends: [End; 2],
+    way: Option<&TimeLaw>,
 ) -> Result<TimeLaw, Infeasible> {
-    let mut planner = Planner::default();
+    let mut planner = Planner::along(way);
     let mut best: Option<TimeLaw> = None;
     for cell_time in CELL_TIMES {
         let settings = Settings { cell_time, ..Settings::default() };
@@ -50,7 +52,9 @@ pub(crate) fn between(
 
 /// Seven phases where limits are the same everywhere and nothing bends.
 pub(crate) fn straight(limits: &mut impl Limits, length: f64) -> Option<TimeLaw> {
-    if limits.borders().iter().any(|border| *border > 0.0 && *border < length) {
+    let mut borders = Vec::new();
+    limits.borders(0.0, length, &mut borders);
+    if borders.iter().any(|border| *border > 0.0 && *border < length) {
         return None;
     }
     let mut rows = Vec::new();
@@ -164,10 +168,8 @@ pub(crate) fn keeps_even(limits: &mut impl Limits, from: f64, to: f64, speed: f6
     let mut rows = Vec::new();
     let count = ((to - from) / (speed * APART)).ceil().max(1.0) as usize;
     let inside = (0..=count).map(|index| from + (to - from) * index as f64 / count as f64);
-    let borders = limits.borders();
-    let first = borders.partition_point(|border| *border < from);
-    let borders: Vec<f64> =
-        borders[first..].iter().copied().take_while(|border| *border <= to).collect();
+    let mut borders = Vec::new();
+    limits.borders(from, to, &mut borders);
     let mut fits = |place: f64, side: Side| {
         rows.clear();
         let site = limits.site(place, side, &mut rows);

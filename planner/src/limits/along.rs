@@ -3,7 +3,7 @@
 use machine::Mechanism;
 use machine::kinematics::KinematicsError;
 
-use crate::geometry::path::Path;
+use crate::geometry::path::{Path, PathCursor};
 use crate::joint_space::configuration::Configuration;
 use crate::joint_space::joint_move::JointLine;
 use crate::law::profile::Along;
@@ -34,7 +34,8 @@ pub(crate) struct AlongPath<'a, 'm, const N: usize, M: Mechanism<N>> {
     /// Configurations on the way, by place [m]: the joints nearby follow from them.
     trail: &'a [(f64, Configuration<N>)],
     shares: &'a Tightening,
-    borders: Vec<f64>,
+    /// Where the path was looked at last.
+    near: PathCursor,
     /// Whether the tool's own limits are left out.
     pub(crate) is_tool_free: bool,
     /// Whether the law keeps its rows everywhere, as a closed form does, and not at places only.
@@ -51,12 +52,8 @@ impl<'a, 'm, const N: usize, M: Mechanism<N>> AlongPath<'a, 'm, N, M> {
         trail: &'a [(f64, Configuration<N>)],
         shares: &'a Tightening,
     ) -> Self {
-        let mut borders = path.borders();
-        borders.extend(speeds.iter().map(|speed| speed.from));
-        borders.sort_by(f64::total_cmp);
-        borders.dedup();
-        let (is_tool_free, is_exact) = (false, false);
-        Self { limits, path, speeds, trail, shares, borders, is_tool_free, is_exact, error: None }
+        let (is_tool_free, is_exact, near) = (false, false, PathCursor::default());
+        Self { limits, path, speeds, trail, shares, near, is_tool_free, is_exact, error: None }
     }
 
     fn speed(&self, place: f64, before: bool) -> SpeedLimit {
@@ -67,12 +64,12 @@ impl<'a, 'm, const N: usize, M: Mechanism<N>> AlongPath<'a, 'm, N, M> {
     }
 
     fn look(
-        &self,
+        &mut self,
         place: f64,
         before: bool,
         rows: &mut Vec<Row>,
     ) -> Result<Local, KinematicsError> {
-        let jet = self.path.on_side(place, before);
+        let jet = self.path.on_side(place, before, &mut self.near);
         let tool = jet.motion(1.0, 0.0, 0.0);
         let limit = self.speed(place, before);
         let (path, shares) = (&self.limits.path, self.shares);
@@ -98,8 +95,14 @@ impl<'a, 'm, const N: usize, M: Mechanism<N>> AlongPath<'a, 'm, N, M> {
 }
 
 impl<const N: usize, M: Mechanism<N>> Limits for AlongPath<'_, '_, N, M> {
-    fn borders(&self) -> &[f64] {
-        &self.borders
+    fn borders(&self, from: f64, to: f64, borders: &mut Vec<f64>) {
+        let first = borders.len();
+        self.path.borders(from, to, borders);
+        let after = self.speeds.partition_point(|speed| speed.from < from);
+        let speeds = self.speeds[after..].iter().map(|speed| speed.from);
+        borders.extend(speeds.take_while(|border| *border <= to));
+        borders[first..].sort_by(f64::total_cmp);
+        borders.dedup();
     }
 
     fn site(&mut self, place: f64, side: Side, rows: &mut Vec<Row>) -> Site {
@@ -153,9 +156,7 @@ impl<const N: usize, M: Mechanism<N>> AlongJointLine<'_, '_, N, M> {
 }
 
 impl<const N: usize, M: Mechanism<N>> Limits for AlongJointLine<'_, '_, N, M> {
-    fn borders(&self) -> &[f64] {
-        &[]
-    }
+    fn borders(&self, _from: f64, _to: f64, _borders: &mut Vec<f64>) {}
 
     fn site(&mut self, place: f64, _side: Side, rows: &mut Vec<Row>) -> Site {
         let start = rows.len();

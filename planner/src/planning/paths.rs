@@ -71,6 +71,11 @@ impl<const N: usize> PathRun<N> {
         demands.get(after.max(1) - 1).map_or(0, |demand| demand.line)
     }
 
+    /// What a stop surely takes [m].
+    pub(super) fn stopping_room(&self) -> f64 {
+        10.0 * self.least_reach
+    }
+
     /// The speed that is asked for at a place that is marked [m/s]; `None` in the dark.
     pub(super) fn lit_speed_at(&self, place: f64) -> Option<f64> {
         let demands = self.contour.demands();

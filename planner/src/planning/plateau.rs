@@ -60,7 +60,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         }
         let next = End::Moving { speed, acceleration: 0.0 };
         let fallback = rest_from(run, along, to, next)?;
-        let law = between(along, run.at, to, [run.begin, next]).ok()?;
+        let law = between(along, run.at, to, [run.begin, next], run.fallback.as_ref()).ok()?;
         Some(Timed { law, next: Some(next), fallback: Some(fallback) })
     }
 }
@@ -81,12 +81,7 @@ fn asked<const N: usize, M: Mechanism<N>>(
 fn farthest<const N: usize>(run: &PathRun<N>, place: f64) -> f64 {
     let after = run.speeds.partition_point(|speed| speed.from <= place);
     let changes = run.speeds.get(after).map_or(f64::INFINITY, |speed| speed.from);
-    changes.min(run.path.length() - 1.01 * stopping_room(run))
-}
-
-/// What a stop surely takes [m].
-fn stopping_room<const N: usize>(run: &PathRun<N>) -> f64 {
-    10.0 * run.least_reach
+    changes.min(run.path.length() - 1.01 * run.stopping_room())
 }
 
 /// The way to rest from `place`; `None` where the limits leave none.
@@ -96,5 +91,5 @@ fn rest_from<const N: usize, M: Mechanism<N>>(
     place: f64,
     begin: End,
 ) -> Option<TimeLaw> {
-    between(along, place, place + stopping_room(run), [begin, End::Rest]).ok()
+    between(along, place, place + run.stopping_room(), [begin, End::Rest], None).ok()
 }

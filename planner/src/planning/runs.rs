@@ -37,7 +37,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         if self.limits.scope == Scope::PathAlone {
             return true;
         }
-        let end = run.path.on_side(run.path.length(), true);
+        let end = run.path.end();
         let tool = end.motion(1.0, 0.0, 0.0);
         let Configuration { joints, mut branch } = run.trail[run.trail.len() - 1].1;
         let Ok(motion) = self.limits.follow(&tool, &mut branch, &joints) else { return false };

@@ -24,8 +24,9 @@ use crate::trajectory::Motion;
 /// The time that a window should take [s].
 pub(super) const WINDOW: f64 = 1.2;
 
-/// The part of a window that is handed on; the rest is planned anew with what follows.
-const HANDED_ON: f64 = 0.6;
+/// The part of a window that is handed on, at least and at most; the rest, in which it comes to rest, is
+/// planned anew with what follows.
+const HANDED_ON: [f64; 2] = [0.6, 0.85];
 
 /// A line that is marked at less than this share of the speed asked for is told.
 const SLOW: f64 = 0.99;
@@ -79,7 +80,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         {
             return Ok(Ok(timed));
         }
-        let law = between(&mut along, run.at, to, [run.begin, end]);
+        let way = run.fallback.as_ref();
+        let law = between(&mut along, run.at, to, [run.begin, end], way);
         if let Some(cause) = along.error {
             return Err(Refused::Kinematics(cause));
         }
@@ -95,7 +97,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         if to >= length {
             return Ok(Ok(Timed { law, next: None, fallback: None }));
         }
-        Ok(Ok(cut(law, run.at + HANDED_ON * (to - run.at))))
+        let part = 1.0 - run.stopping_room() / (to - run.at);
+        Ok(Ok(cut(law, run.at + part.clamp(HANDED_ON[0], HANDED_ON[1]) * (to - run.at))))
     }
 
     /// Goes on along the path that is under way.
@@ -177,7 +180,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
 
     /// Ends a path: the joints are where it ends, at rest or moving.
     fn leave(&mut self, run: &PathRun<N>, shares: &Tightening) -> Result<(), PlanError> {
-        let end = run.path.on_side(run.path.length(), true);
+        let end = run.path.end();
         let tool = end.motion(1.0, 0.0, 0.0);
         let Configuration { joints, mut branch } = run.trail[run.trail.len() - 1].1;
         let motion = self.limits.follow(&tool, &mut branch, &joints);

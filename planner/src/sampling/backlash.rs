@@ -66,6 +66,7 @@ impl<const N: usize> BacklashCompensation<N> {
     }
 
     /// Goes on by one step to an instant with `effort` on the joints [N or N·m], moving or not.
+    #[inline]
     pub(crate) fn advance(&mut self, axes: &[Axis], effort: &Joints<N>, is_moving: bool) {
         for index in 0..N {
             if self.half[index] == 0.0 {

@@ -47,12 +47,13 @@ impl<const N: usize> Deflection<N> {
 
     /// Goes on by one step to an instant with `effort` on the load side, which changes at
     /// `effort_rate` there.
-    pub(crate) fn advance(&mut self, effort: &Joints<N>, effort_rate: &Joints<N>) {
+    #[inline]
+    pub(crate) fn advance(&mut self, effort: &Joints<N>, effort_rate: impl FnOnce() -> Joints<N>) {
         match &self.law {
             Law::Rigid => {}
             Law::Spring { compliance } => {
                 self.value = compliance * effort;
-                self.rate = compliance * effort_rate;
+                self.rate = compliance * effort_rate();
             }
             Law::SpringAndDamper { stiffness, mobility, keep, take, .. } => {
                 self.value = keep * self.value + take * (self.effort + effort) * 0.5;
@@ -130,7 +131,7 @@ mod tests {
                 let time = f64::from(index) * STEP;
                 let (force, force_rate) =
                     if time < rise { (mass * jerk * time, mass * jerk) } else { (10.6, 0.0) };
-                lead.advance(&(unit * force), &(unit * force_rate));
+                lead.advance(&(unit * force), || unit * force_rate);
                 // Exact: a ramp's answer, and minus the same ramp once it has ended.
                 let ramp = |t: f64| {
                     let slope = mass * jerk / stiffness;

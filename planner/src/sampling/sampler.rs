@@ -10,7 +10,7 @@ use std::sync::Arc;
 use machine::kinematics::{JointMotion, Joints, KinematicsError, ToolMotion};
 use machine::{Axis, Friction, Mechanism, StepperMotor};
 use messages::time::CYCLE_TIME;
-use messages::{GateEdge, LaserCycle, Setpoint, axis::axis_array, setpoint::flags};
+use messages::{AxisArray, GateEdge, Setpoint, setpoint::flags};
 use nalgebra::Vector3;
 
 use crate::geometry::attitude::AttitudeLaw;
@@ -18,7 +18,7 @@ use crate::joint_space::configuration::{branches, follow, keeps_margins};
 use crate::joint_space::joint_move::{JointLine, JointMove, JointsAt};
 use crate::sampling::backlash::BacklashCompensation;
 use crate::sampling::deflection::Deflection;
-use crate::trajectory::{Piece, Reference, Trajectory};
+use crate::trajectory::{Cursor, Piece, Reference, Trajectory};
 
 /// Looks at the trajectory in a cycle; even, so that a sample lies on one.
 const STEPS: usize = 4;
@@ -47,7 +47,9 @@ pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
     sequence: u64,
     /// Index of the next look, in steps of [`STEP`] from the first sample.
     look: i64,
-    cursor: usize,
+    cursor: Cursor,
+    /// Whether the joints go straight with a tool that is not turned, so that there is nothing to choose.
+    is_plain: bool,
     /// Of a mechanism whose joints do not go straight with the tool: its branches, and the number of
     /// the one that the joints are on.
     branches: Vec<M::Branch>,
@@ -118,14 +120,6 @@ struct Gate {
     stroke: u64,
 }
 
-/// The joints at one look.
-struct Look<const N: usize, A> {
-    reference: Reference,
-    motion: JointMotion<N>,
-    assembly: A,
-    effort: Joints<N>,
-}
-
 /// Why sampling stopped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Unreachable {
@@ -148,6 +142,8 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         let effort = mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
         let lead = Deflection::new(&mechanism, effort, STEP);
         let gaps = BacklashCompensation::new(axes, &effort, STEP);
+        let is_plain =
+            mechanism.is_linear() && branches.len() == 1 && attitude == AttitudeLaw::Level;
         Ok(Self {
             mechanism,
             drives: std::array::from_fn(|axis| Drive {
@@ -161,7 +157,8 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             stream,
             sequence: 0,
             look: -(STEPS as i64) / 2,
-            cursor: 0,
+            cursor: Cursor::default(),
+            is_plain,
             branches,
             branch,
             joints: motion.position,
@@ -203,7 +200,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         let count = self.trajectory.pieces.iter().take_while(|piece| past(piece)).count();
         let count = count.min(self.trajectory.pieces.len().saturating_sub(1));
         self.trajectory.pieces.drain(..count);
-        self.cursor = self.cursor.saturating_sub(count);
+        self.cursor.piece = self.cursor.piece.saturating_sub(count);
         self.trajectory.laser.drain(..self.laser.next);
         self.laser.next = 0;
         self.trajectory.outputs.drain(..self.next_output);
@@ -257,10 +254,14 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     }
 
     /// Goes on to the next look.
-    fn advance(&mut self) -> Result<Look<N, M::ChainState>, KinematicsError> {
+    #[inline(always)]
+    fn advance(&mut self) -> Result<(Reference, JointMotion<N>), KinematicsError> {
         self.look += 1;
         let reference = self.trajectory.at(self.look as f64 * STEP, &mut self.cursor);
         let motion = match &reference {
+            Reference::Tool(tool) if self.is_plain => {
+                self.mechanism.joint_motion(tool, self.branches[self.branch], &self.joints)?
+            }
             Reference::Tool(tool) => {
                 let tool = &self.trajectory.attitude.apply(tool)?;
                 follow(&self.mechanism, &self.branches, tool, &mut self.branch, &self.joints)?
@@ -276,14 +277,13 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             self.mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
         // Inertia changes slowly beside the jerk: its own rate is left out where only a spring
         // without damper asks for it.
-        let effort_rate = self.mechanism.mass_matrix(&assembly) * motion.jerk;
-        self.lead.advance(&effort, &effort_rate);
+        self.lead.advance(&effort, || self.mechanism.mass_matrix(&assembly) * motion.jerk);
         self.gaps.advance(&self.axes, &effort, motion.velocity.amax() > 0.0);
         self.joints = motion.position;
         self.assembly = assembly;
         self.effort = effort;
         self.motor_velocity = motion.velocity + self.lead.rate() + self.gaps.speed();
-        Ok(Look { reference, motion, assembly, effort })
+        Ok((reference, motion))
     }
 
     /// The tool's motion while the joints lead.
@@ -294,76 +294,81 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         Ok(tool)
     }
 
-    fn setpoint(&mut self) -> Result<Setpoint, KinematicsError> {
+    /// Puts the motion of the next cycle into `setpoint`, which is zero.
+    fn take(&mut self, setpoint: &mut Setpoint) -> Result<(), KinematicsError> {
         let before = self.motor_velocity;
+        let mut at_sample = before;
         let mut mean = self.effort / 2.0;
-        let mut add = |effort: &Joints<N>, weight: f64| mean += effort * weight;
-        for _ in 1..STEPS / 2 {
-            let look = self.advance()?;
-            add(&look.effort, 1.0);
+        for step in 1..=STEPS {
+            let (reference, motion) = self.advance()?;
+            mean += self.effort * if step == STEPS { 0.5 } else { 1.0 };
+            if step == STEPS / 2 {
+                at_sample = self.motor_velocity;
+                self.put(&reference, &motion, setpoint)?;
+            }
         }
-        let Look { reference, motion, assembly, effort } = self.advance()?;
-        let tool = match reference {
-            Reference::Tool(tool) => tool,
-            Reference::Joints(at) => self.tool(&at, &assembly)?,
-        };
-        keeps_margins(&self.mechanism, &assembly)?;
-        add(&effort, 1.0);
-        let in_gap = *self.gaps.value();
-        let lead = self.lead.value() + in_gap;
-        let motor_velocity = self.motor_velocity;
-        for _ in 1..STEPS / 2 {
-            let look = self.advance()?;
-            add(&look.effort, 1.0);
-        }
-        let look = self.advance()?;
-        add(&look.effort, 0.5);
         mean /= STEPS as f64;
         let acceleration = (self.motor_velocity - before) / CYCLE_TIME;
-
-        let gravity = self.mechanism.gravity(&assembly);
-        let impulse = self.mechanism.mass_matrix(&assembly) * motion.velocity;
-        let per_axis = |value: &dyn Fn(usize, &Drive) -> f64| {
-            let values: [f64; N] = std::array::from_fn(|axis| value(axis, &self.drives[axis]));
-            axis_array(&values)
-        };
-        let mut setpoint = Setpoint {
-            tool: tool.position.into(),
-            path_velocity: tool.velocity.norm(),
-            path_acceleration: tool.acceleration.norm(),
-            path_jerk: tool.jerk.norm(),
-            position: axis_array(motion.position.as_slice()),
-            velocity: axis_array(motion.velocity.as_slice()),
-            acceleration: axis_array(motion.acceleration.as_slice()),
-            jerk: axis_array(motion.jerk.as_slice()),
-            lead: axis_array(lead.as_slice()),
-            static_lead: axis_array((self.lead.settled(&gravity) + in_gap).as_slice()),
-            effort: per_axis(&|axis, drive| {
-                drive.inertia * acceleration[axis] / drive.ratio + drive.ratio * mean[axis]
-            }),
-            static_effort: per_axis(&|axis, drive| drive.ratio * gravity[axis]),
-            lead_momentum: axis_array(self.lead.settled(&impulse).as_slice()),
-            momentum: per_axis(&|axis, drive| {
-                drive.inertia * motion.velocity[axis] / drive.ratio + drive.ratio * impulse[axis]
-            }),
-            ..Setpoint::default()
-        };
         for (axis, drive) in self.drives.iter().enumerate() {
-            drive.lead_rotor(axis, motor_velocity[axis], &mut setpoint);
+            setpoint.effort[axis] =
+                drive.inertia * acceleration[axis] / drive.ratio + drive.ratio * mean[axis];
+            drive.lead_rotor(axis, at_sample[axis], setpoint);
         }
-        Ok(setpoint)
+        Ok(())
     }
 
-    /// The laser in the cycle that starts with sample `sequence`, and the stroke it lights. A change
-    /// that the cycle cannot hold is left to the next one; the checker refuses such a stream.
-    fn laser(&mut self) -> (LaserCycle, u64) {
-        let start = self.sequence as i64 * CYCLE;
-        let mut cycle = LaserCycle {
-            gate: gate(self.laser.power, self.laser.stroke),
-            power: self.laser.power,
-            ..LaserCycle::OFF
+    /// Puts the motion at the last look into `setpoint`.
+    #[inline]
+    fn put(
+        &self,
+        reference: &Reference,
+        motion: &JointMotion<N>,
+        setpoint: &mut Setpoint,
+    ) -> Result<(), KinematicsError> {
+        let assembly = &self.assembly;
+        let led;
+        let tool = match reference {
+            Reference::Tool(tool) => tool,
+            Reference::Joints(at) => {
+                led = self.tool(at, assembly)?;
+                &led
+            }
         };
-        let mut stroke = self.laser.stroke;
+        keeps_margins(&self.mechanism, assembly)?;
+        let in_gap = self.gaps.value();
+        let gravity = self.mechanism.gravity(assembly);
+        let impulse = self.mechanism.mass_matrix(assembly) * motion.velocity;
+        setpoint.tool = tool.position.into();
+        setpoint.path_velocity = tool.velocity.norm();
+        setpoint.path_acceleration = tool.acceleration.norm();
+        setpoint.path_jerk = tool.jerk.norm();
+        let copy = |array: &mut AxisArray, joints: &Joints<N>| {
+            array[..N].copy_from_slice(joints.as_slice());
+        };
+        copy(&mut setpoint.position, &motion.position);
+        copy(&mut setpoint.velocity, &motion.velocity);
+        copy(&mut setpoint.acceleration, &motion.acceleration);
+        copy(&mut setpoint.jerk, &motion.jerk);
+        copy(&mut setpoint.lead, &(self.lead.value() + in_gap));
+        copy(&mut setpoint.static_lead, &(self.lead.settled(&gravity) + in_gap));
+        copy(&mut setpoint.lead_momentum, &self.lead.settled(&impulse));
+        for (axis, drive) in self.drives.iter().enumerate() {
+            setpoint.static_effort[axis] = drive.ratio * gravity[axis];
+            setpoint.momentum[axis] =
+                drive.inertia * motion.velocity[axis] / drive.ratio + drive.ratio * impulse[axis];
+        }
+        Ok(())
+    }
+
+    /// Puts the laser in the cycle that starts with this sample, and the stroke it lights, into
+    /// `setpoint`. A change that the cycle cannot hold is left to the next one; the checker refuses such
+    /// a stream.
+    fn light(&mut self, setpoint: &mut Setpoint) {
+        let start = self.sequence as i64 * CYCLE;
+        let cycle = &mut setpoint.laser;
+        cycle.gate = gate(self.laser.power, self.laser.stroke);
+        cycle.power = self.laser.power;
+        setpoint.stroke = self.laser.stroke;
         while let Some(change) = self.trajectory.laser.get(self.laser.next) {
             let offset = change.time.0 - start;
             if offset >= CYCLE {
@@ -380,10 +385,9 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             self.laser =
                 Gate { next: self.laser.next + 1, power: change.power, stroke: change.stroke };
             if change.stroke != 0 {
-                stroke = change.stroke;
+                setpoint.stroke = change.stroke;
             }
         }
-        (cycle, stroke)
     }
 
     /// Outputs and flags of the sample at `time`.
@@ -410,30 +414,48 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     }
 }
 
-impl<const N: usize, M: Mechanism<N>> Iterator for Sampler<N, M> {
-    type Item = Setpoint;
-
-    fn next(&mut self) -> Option<Setpoint> {
-        if self.state != Stream::Running || !self.is_known() {
-            return None;
+impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
+    /// Makes the next setpoint as the last of `setpoints`. Says whether there is one.
+    pub(crate) fn push_to(&mut self, setpoints: &mut Vec<Setpoint>) -> bool {
+        if !self.is_due() {
+            return false;
         }
-        let mut setpoint = match self.setpoint() {
-            Ok(setpoint) => setpoint,
-            Err(cause) => {
-                self.state = Stream::Broken(cause);
-                return None;
-            }
-        };
+        let count = setpoints.len();
+        setpoints.push(Setpoint::default());
+        let is_made = self.make(&mut setpoints[count]);
+        setpoints.truncate(count + usize::from(is_made));
+        is_made
+    }
+
+    fn is_due(&self) -> bool {
+        self.state == Stream::Running && self.is_known()
+    }
+
+    /// Makes the next setpoint in `setpoint`, which is zero. Says whether it could be made.
+    fn make(&mut self, setpoint: &mut Setpoint) -> bool {
+        if let Err(cause) = self.take(setpoint) {
+            self.state = Stream::Broken(cause);
+            return false;
+        }
         setpoint.stream = self.stream;
         setpoint.sequence = self.sequence;
-        (setpoint.laser, setpoint.stroke) = self.laser();
-        self.switch(&mut setpoint, self.sequence as f64 * CYCLE_TIME);
+        self.light(setpoint);
+        self.switch(setpoint, self.sequence as f64 * CYCLE_TIME);
         if self.is_settled() {
             setpoint.flags |= flags::LAST;
             self.state = Stream::Ended;
         }
         self.sequence += 1;
-        Some(setpoint)
+        true
+    }
+}
+
+impl<const N: usize, M: Mechanism<N>> Iterator for Sampler<N, M> {
+    type Item = Setpoint;
+
+    fn next(&mut self) -> Option<Setpoint> {
+        let mut setpoint = Setpoint::default();
+        (self.is_due() && self.make(&mut setpoint)).then_some(setpoint)
     }
 }
 

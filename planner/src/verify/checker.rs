@@ -4,7 +4,7 @@ use machine::trip::Limit;
 use machine::trip::following::DISCONTINUITY;
 use machine::{Axis, DcMotor, Friction, Machine, Motor, PathLimits, WorkArea};
 use messages::time::CYCLE_TIME;
-use messages::{AxisArray, Setpoint};
+use messages::{AxisArray, MAX_AXES, Setpoint};
 
 use messages::plan::LimitUtilization;
 
@@ -114,18 +114,77 @@ pub struct LimitViolation {
     pub unit: &'static str,
 }
 
+/// The largest value so far of a quantity whose limit stays the same. Only a value beyond it needs to be
+/// held to the limit again.
+#[derive(Debug, Clone, Copy, Default)]
+struct Most(f64);
+
+/// Whose quantity it is that is held to a limit, and when.
+#[derive(Debug, Clone, Copy)]
+struct Named<'a> {
+    time: f64,
+    axis: Option<&'a str>,
+    quantity: Quantity,
+    unit: &'static str,
+}
+
+impl Most {
+    /// Holds `value` to `allowance` times `limit`, and keeps in `used` the largest share of the limit.
+    #[inline]
+    fn hold(
+        &mut self,
+        value: f64,
+        [limit, allowance]: [f64; 2],
+        used: &mut f64,
+        named: Named<'_>,
+    ) -> Result<(), LimitViolation> {
+        if value <= self.0 {
+            return Ok(());
+        }
+        *used = used.max(named.below(value, limit, allowance)?);
+        self.0 = value;
+        Ok(())
+    }
+}
+
+/// The largest values of an axis.
+#[derive(Debug, Clone, Copy, Default)]
+struct AxisMost {
+    velocity: Most,
+    acceleration: Most,
+    jerk: Most,
+    current: Most,
+    voltage: Most,
+    /// Mean square of the current [A²].
+    heating: Most,
+    /// Torque of a DC motor by the efficiency of its gear [N·m].
+    sizing: f64,
+}
+
+/// A motor at a sample.
+#[derive(Debug, Clone, Copy, Default)]
+struct MotorState {
+    /// [rad].
+    angle: f64,
+    /// Of a DC motor [A].
+    current: f64,
+}
+
 /// Holds samples to limits, one after the other.
 #[derive(Debug, Clone)]
 pub(crate) struct Checker {
     path: PathLimits,
     dark: f64,
     scope: Scope,
-    /// The motors at the sample before: angle [rad] and current [A].
-    before: Option<Vec<(f64, f64)>>,
+    /// The motors at the sample before.
+    before: Option<[MotorState; MAX_AXES]>,
     /// The joints at the sample before: position and velocity.
     joints_before: Option<(AxisArray, AxisArray)>,
     /// Mean square of each motor's current, as the controller's watch averages it [A²].
-    heating: Vec<f64>,
+    heating: AxisArray,
+    /// The tool's speed in the dark and lit, its acceleration and its jerk.
+    most: [Most; 4],
+    axes: [AxisMost; MAX_AXES],
     uses: LimitUtilization,
 }
 
@@ -140,7 +199,9 @@ impl Checker {
             scope,
             before: None,
             joints_before: None,
-            heating: none(),
+            heating: [0.0; MAX_AXES],
+            most: [Most::default(); 4],
+            axes: [AxisMost::default(); MAX_AXES],
             uses: LimitUtilization {
                 velocity: none(),
                 acceleration: none(),
@@ -174,7 +235,8 @@ impl Checker {
         for index in 0..3 {
             let value = setpoint.tool[index];
             let limit = value.clamp(area.lower[index], area.upper[index]);
-            within(value, limit, time, None, Quantity::ToolPosition(index), "m")?;
+            let quantity = Quantity::ToolPosition(index);
+            within(value, limit, Named { time, axis: None, quantity, unit: "m" })?;
         }
         self.joints(setpoint, axes, time)?;
         self.motors(setpoint, axes, time)
@@ -182,22 +244,21 @@ impl Checker {
 
     fn path(&mut self, setpoint: &Setpoint, time: f64) -> Result<(), LimitViolation> {
         let (path, uses) = (&self.path, &mut self.uses);
-        let (speed, allowance) = if setpoint.laser.is_lit() {
-            (path.speed, ALLOWANCE)
+        let [dark, lit, acceleration, jerk] = &mut self.most;
+        let named = |quantity, unit| Named { time, axis: None, quantity, unit };
+        let (speed, most) = if setpoint.laser.is_lit() {
+            ([path.speed, ALLOWANCE], lit)
         } else {
-            (self.dark, DARK_ALLOWANCE)
+            ([self.dark, DARK_ALLOWANCE], dark)
         };
-        let value = setpoint.path_velocity;
-        let share = below(value, speed, allowance, time, None, Quantity::ToolSpeed, "m/s")?;
-        uses.path_speed = uses.path_speed.max(share);
-        let (value, limit) = (setpoint.path_acceleration, path.acceleration);
-        let quantity = Quantity::ToolAcceleration;
-        let share = below(value, limit, ALLOWANCE, time, None, quantity, "m/s²")?;
-        uses.path_acceleration = uses.path_acceleration.max(share);
-        let (value, limit) = (setpoint.path_jerk, path.jerk);
-        let share = below(value, limit, ALLOWANCE, time, None, Quantity::ToolJerk, "m/s³")?;
-        uses.path_jerk = uses.path_jerk.max(share);
-        Ok(())
+        let name = named(Quantity::ToolSpeed, "m/s");
+        most.hold(setpoint.path_velocity, speed, &mut uses.path_speed, name)?;
+        let limit = [path.acceleration, ALLOWANCE];
+        let name = named(Quantity::ToolAcceleration, "m/s²");
+        acceleration.hold(setpoint.path_acceleration, limit, &mut uses.path_acceleration, name)?;
+        let limit = [path.jerk, ALLOWANCE];
+        let name = named(Quantity::ToolJerk, "m/s³");
+        jerk.hold(setpoint.path_jerk, limit, &mut uses.path_jerk, name)
     }
 
     fn joints(
@@ -209,40 +270,39 @@ impl Checker {
         let uses = &mut self.uses;
         for (index, axis) in axes.iter().enumerate() {
             let limits = &axis.limits;
-            let name = Some(axis.name.as_str());
+            let name = axis.name.as_str();
+            let named = |quantity, unit| Named { time, axis: Some(name), quantity, unit };
             let position = setpoint.position[index];
             let nearest = position.clamp(limits.position[0], limits.position[1]);
             let [place, speed, acceleration, jerk] = axis.unit.names();
-            within(position, nearest, time, name, Quantity::JointPosition, place)?;
+            within(position, nearest, named(Quantity::JointPosition, place))?;
             if let Some((positions, velocities)) = &self.joints_before {
                 let mean = (velocities[index] + setpoint.velocity[index]) / 2.0;
                 let jump = (position - positions[index] - mean * CYCLE_TIME).abs();
                 // What supervision forgives, and what a change of acceleration in the cycle makes.
                 let most = DISCONTINUITY * limits.following_error
                     + setpoint.acceleration[index].abs() * CYCLE_TIME * CYCLE_TIME;
-                below(jump, most, 1.0, time, name, Quantity::JointJump, place)?;
+                named(Quantity::JointJump, place).below(jump, most, 1.0)?;
             }
-            let demands = [
-                (
-                    setpoint.velocity[index],
-                    axis.velocity_limit().plan,
-                    Quantity::JointVelocity,
-                    speed,
-                ),
-                (
-                    setpoint.acceleration[index],
-                    axis.acceleration_limit().plan,
-                    Quantity::JointAcceleration,
-                    acceleration,
-                ),
-                (setpoint.jerk[index], axis.jerk_limit().plan, Quantity::JointJerk, jerk),
-            ];
-            let most =
-                [&mut uses.velocity[index], &mut uses.acceleration[index], &mut uses.jerk[index]];
-            for ((value, limit, quantity, unit), most) in demands.into_iter().zip(most) {
-                let share = below(value.abs(), limit, 1.0, time, name, quantity, unit)?;
-                *most = most.max(share);
-            }
+            let most = &mut self.axes[index];
+            most.velocity.hold(
+                setpoint.velocity[index].abs(),
+                [axis.velocity_limit().plan, 1.0],
+                &mut uses.velocity[index],
+                named(Quantity::JointVelocity, speed),
+            )?;
+            most.acceleration.hold(
+                setpoint.acceleration[index].abs(),
+                [axis.acceleration_limit().plan, 1.0],
+                &mut uses.acceleration[index],
+                named(Quantity::JointAcceleration, acceleration),
+            )?;
+            most.jerk.hold(
+                setpoint.jerk[index].abs(),
+                [axis.jerk_limit().plan, 1.0],
+                &mut uses.jerk[index],
+                named(Quantity::JointJerk, jerk),
+            )?;
         }
         self.joints_before = Some((setpoint.position, setpoint.velocity));
         Ok(())
@@ -258,98 +318,97 @@ impl Checker {
         axes: &[Axis],
         time: f64,
     ) -> Result<(), LimitViolation> {
-        let mut now = Vec::with_capacity(axes.len());
+        let mut now = [MotorState::default(); MAX_AXES];
         for (index, axis) in axes.iter().enumerate() {
             let angle = (setpoint.position[index] + setpoint.lead[index]) / axis.ratio;
             let before = self.before.as_ref().map(|motors| motors[index]);
-            let speed = before.map_or(0.0, |(earlier, _)| (angle - earlier) / CYCLE_TIME);
-            let torque = setpoint.effort[index] + axis.friction.torque(speed);
-            let size = sizing(axis, setpoint.effort[index], setpoint.acceleration[index], speed);
-            self.uses.sizing[index] = self.uses.sizing[index].max(size);
-            let name = Some(axis.name.as_str());
+            let speed = before.map_or(0.0, |before| (angle - before.angle) / CYCLE_TIME);
+            let effort = setpoint.effort[index];
+            let torque = effort + axis.friction.torque(speed);
+            let sizing = sizing(axis, effort, setpoint.acceleration[index], speed);
+            let name = axis.name.as_str();
+            let named = |quantity, unit| Named { time, axis: Some(name), quantity, unit };
+            let (uses, most) = (&mut self.uses, &mut self.axes[index]);
             let motor = match &axis.motor {
                 Motor::Dc(motor) => motor,
                 Motor::Stepper(motor) => {
+                    let size = sizing / motor.pull_out_torque(standing(speed));
+                    uses.sizing[index] = uses.sizing[index].max(size);
                     let (torque, most) = (torque.abs(), motor.pull_out_torque(speed));
-                    let share = below(torque, most, 1.0, time, name, Quantity::MotorTorque, "N·m")?;
-                    self.uses.current[index] = self.uses.current[index].max(share);
+                    let name = named(Quantity::MotorTorque, "N·m");
+                    let share = name.below(torque, most, 1.0)?;
+                    uses.current[index] = uses.current[index].max(share);
                     let (rate, most) = (speed.abs() * motor.pulses_per_radian(), motor.pulse_rate);
-                    let share = below(rate, most, 1.0, time, name, Quantity::PulseRate, "1/s")?;
-                    self.uses.voltage[index] = self.uses.voltage[index].max(share);
-                    now.push((angle, 0.0));
+                    let share = named(Quantity::PulseRate, "1/s").below(rate, most, 1.0)?;
+                    uses.voltage[index] = uses.voltage[index].max(share);
+                    now[index].angle = angle;
                     continue;
                 }
             };
+            if sizing > most.sizing {
+                most.sizing = sizing;
+                uses.sizing[index] = sizing / (motor.current * motor.torque_constant);
+            }
             let current = torque / motor.torque_constant;
-            let earlier = before.map_or(current, |(_, current)| current);
+            let earlier = before.map_or(current, |before| before.current);
             let voltage = motor.resistance * (current + earlier) / 2.0
                 + motor.inductance * (current - earlier) / CYCLE_TIME
                 + motor.torque_constant * speed;
-            let most = motor.current_limit();
-            let share =
-                below(current.abs(), most.plan, 1.0, time, name, Quantity::MotorCurrent, "A")?;
-            self.uses.current[index] = self.uses.current[index].max(share);
-            let most = motor.voltage_limit();
-            let share =
-                below(voltage.abs(), most.plan, 1.0, time, name, Quantity::MotorVoltage, "V")?;
-            self.uses.voltage[index] = self.uses.voltage[index].max(share);
+            let limit = [motor.current_limit().plan, 1.0];
+            let name = named(Quantity::MotorCurrent, "A");
+            most.current.hold(current.abs(), limit, &mut uses.current[index], name)?;
+            let limit = [motor.voltage_limit().plan, 1.0];
+            let name = named(Quantity::MotorVoltage, "V");
+            most.voltage.hold(voltage.abs(), limit, &mut uses.voltage[index], name)?;
             if let Some(limit) = motor.heating_limit() {
                 let heating = &mut self.heating[index];
                 *heating = DcMotor::heated(*heating, current, CYCLE_TIME, DcMotor::HEATING_TIME);
-                let value = heating.sqrt();
-                let share =
-                    below(value, limit.plan, 1.0, time, name, Quantity::HeatingCurrent, "A")?;
-                self.uses.heat[index] = self.uses.heat[index].max(share);
+                let heating = *heating;
+                // The root grows with what it is taken of, so that it is needed for the largest only.
+                if !(heating <= most.heating.0) {
+                    let name = named(Quantity::HeatingCurrent, "A");
+                    let share = name.below(heating.sqrt(), limit.plan, 1.0)?;
+                    uses.heat[index] = uses.heat[index].max(share);
+                    most.heating.0 = heating;
+                }
             }
-            now.push((angle, current));
+            now[index] = MotorState { angle, current };
         }
         self.before = Some(now);
         Ok(())
     }
 }
 
-/// The share of its torque that the motor of `axis` needs at `speed` [rad/s] by the efficiencies of
-/// its gear, which data sheets give in place of friction: its rotor's part of `effort` [N·m],
-/// taken from the joint's acceleration, reaches no gear. Whatever stands is taken to be starting.
+/// The torque that the motor of `axis` needs at `speed` [rad/s] by the efficiencies of its gear, which
+/// data sheets give in place of friction [N·m]: its rotor's part of `effort` [N·m], taken from the
+/// joint's acceleration, reaches no gear.
 fn sizing(axis: &Axis, effort: f64, acceleration: f64, speed: f64) -> f64 {
     let rotor = axis.motor.rotor_inertia() * acceleration / axis.ratio;
-    let speed = if Friction::is_standing(speed) { 0.0 } else { speed };
-    let torque = rotor + axis.efficiency.torque(effort - rotor, speed);
-    let most = match &axis.motor {
-        Motor::Dc(motor) => motor.current * motor.torque_constant,
-        Motor::Stepper(motor) => motor.pull_out_torque(speed),
-    };
-    torque.abs() / most
+    (rotor + axis.efficiency.torque(effort - rotor, standing(speed))).abs()
 }
 
-fn within(
-    value: f64,
-    limit: f64,
-    time: f64,
-    axis: Option<&str>,
-    quantity: Quantity,
-    unit: &'static str,
-) -> Result<(), LimitViolation> {
-    if (value - limit).abs() <= ROUNDING {
-        return Ok(());
-    }
-    Err(LimitViolation { time, axis: axis.map(str::to_owned), quantity, value, limit, unit })
+/// `speed`, or 0 of a motor that stands: whatever stands is taken to be starting.
+fn standing(speed: f64) -> f64 {
+    if Friction::is_standing(speed) { 0.0 } else { speed }
 }
 
-/// The share of `limit` that `value` uses, at most `allowance`.
-fn below(
-    value: f64,
-    limit: f64,
-    allowance: f64,
-    time: f64,
-    axis: Option<&str>,
-    quantity: Quantity,
-    unit: &'static str,
-) -> Result<f64, LimitViolation> {
-    let share = value / limit;
-    // Put this way a value that is no number breaks the limit.
-    if share <= allowance {
-        return Ok(share);
+#[inline]
+fn within(value: f64, limit: f64, named: Named<'_>) -> Result<(), LimitViolation> {
+    if (value - limit).abs() <= ROUNDING { Ok(()) } else { Err(named.broken(value, limit)) }
+}
+
+impl Named<'_> {
+    /// The share of `limit` that `value` uses, at most `allowance`.
+    #[inline]
+    fn below(&self, value: f64, limit: f64, allowance: f64) -> Result<f64, LimitViolation> {
+        let share = value / limit;
+        // Put this way a value that is no number breaks the limit.
+        if share <= allowance { Ok(share) } else { Err(self.broken(value, limit)) }
     }
-    Err(LimitViolation { time, axis: axis.map(str::to_owned), quantity, value, limit, unit })
+
+    #[cold]
+    fn broken(&self, value: f64, limit: f64) -> LimitViolation {
+        let Self { time, axis, quantity, unit } = *self;
+        LimitViolation { time, axis: axis.map(str::to_owned), quantity, value, limit, unit }
+    }
 }

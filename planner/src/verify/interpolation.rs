@@ -8,8 +8,8 @@
 
 use machine::Mechanism;
 use machine::kinematics::{Joints, KinematicsError};
-use messages::Setpoint;
 use messages::time::CYCLE_TIME;
+use messages::{AxisArray, Setpoint};
 
 use crate::sampling::sampler::Sampler;
 use crate::trajectory::{Motion, Piece, Reference};
@@ -21,7 +21,15 @@ use crate::verify::checker::{LimitViolation, Quantity};
 pub(crate) struct InterpolationCheck {
     /// How far the tool may stray [m].
     tolerance: f64,
-    before: Option<Setpoint>,
+    before: Option<Ends>,
+}
+
+/// What the cubic between two setpoints needs of each.
+#[derive(Debug, Clone, Copy)]
+struct Ends {
+    sequence: u64,
+    position: AxisArray,
+    velocity: AxisArray,
 }
 
 impl InterpolationCheck {
@@ -40,7 +48,9 @@ impl InterpolationCheck {
         setpoint: &Setpoint,
         sampler: &Sampler<N, M>,
     ) -> Result<Option<LimitViolation>, KinematicsError> {
-        let Some(before) = self.before.replace(*setpoint) else { return Ok(None) };
+        let Setpoint { sequence, position, velocity, .. } = *setpoint;
+        let now = Ends { sequence, position, velocity };
+        let Some(before) = self.before.replace(now) else { return Ok(None) };
         let time = (before.sequence as f64 + 0.5) * CYCLE_TIME;
         // Where light falls, and not where the source is told to begin and to end.
         let marks = |piece: &Piece| matches!(piece.motion, Motion::Path { is_lit: true, .. });
@@ -50,7 +60,7 @@ impl InterpolationCheck {
         let Reference::Tool(tool) = sampler.reference_at(time) else {
             return Ok(None);
         };
-        let there = sampler.locate(&middle(&before, setpoint))?;
+        let there = sampler.locate(&middle(&before, &now))?;
         // From where it should be at that time: never less than from the path.
         let value = (there - tool.position).norm();
         if value <= self.tolerance {
@@ -63,7 +73,7 @@ impl InterpolationCheck {
 }
 
 /// The joints in the middle of the cubic that has the positions and velocities of both ends.
-fn middle<const N: usize>(from: &Setpoint, to: &Setpoint) -> Joints<N> {
+fn middle<const N: usize>(from: &Ends, to: &Ends) -> Joints<N> {
     Joints::from_fn(|axis, _| {
         (from.position[axis] + to.position[axis]) / 2.0
             + (from.velocity[axis] - to.velocity[axis]) * (CYCLE_TIME / 8.0)

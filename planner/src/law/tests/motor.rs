@@ -15,8 +15,8 @@ struct Motor {
 }
 
 impl Limits for Motor {
-    fn borders(&self) -> &[f64] {
-        self.path.borders()
+    fn borders(&self, from: f64, to: f64, borders: &mut Vec<f64>) {
+        self.path.borders(from, to, borders);
     }
 
     fn site(&mut self, place: f64, side: Side, rows: &mut Vec<Row>) -> Site {

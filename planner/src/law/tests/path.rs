@@ -131,8 +131,8 @@ impl Path {
 }
 
 impl Limits for Path {
-    fn borders(&self) -> &[f64] {
-        &self.borders
+    fn borders(&self, from: f64, to: f64, borders: &mut Vec<f64>) {
+        borders.extend(self.borders.iter().filter(|border| (from..=to).contains(*border)));
     }
 
     fn site(&mut self, place: f64, _side: Side, rows: &mut Vec<Row>) -> Site {
