@@ -502,7 +502,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
 
     /// Samples as far as the motion is known, and checks each sample.
     fn sample(&mut self, abandoned: &dyn Fn() -> bool) -> Result<Vec<Setpoint>, PlanError> {
-        let mut setpoints = Vec::new();
+        let mut setpoints = Vec::with_capacity(self.front.sampler.due());
         while self.front.sampler.push_to(&mut setpoints) {
             let Some(setpoint) = setpoints.last() else { break };
             self.front.samples += 1;

@@ -121,7 +121,7 @@ impl Trajectory {
 
     /// The motion at `time` [s]; at rest before the start and after the end. `cursor` is the piece to
     /// begin with: searching goes on from there in either direction.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, time: f64, cursor: &mut Cursor) -> Reference {
         let last = self.pieces.len() - 1;
         let mut index = cursor.piece.min(last);
@@ -167,7 +167,7 @@ impl Motion {
     }
 
     /// The same, looked for near `cursor`.
-    #[inline]
+    #[inline(always)]
     fn at_near(&self, time: f64, cursor: &mut Cursor) -> Reference {
         match self {
             Self::Rest(joints) | Self::Joints(joints) => Reference::Joints(joints.at(time)),

@@ -70,6 +70,8 @@ pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
     told_ahead: f64,
     end: i64,
     state: Stream,
+    /// What a setpoint is before it is made.
+    blank: Setpoint,
 }
 
 /// Where the stream is.
@@ -175,6 +177,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             told_ahead: 0.0,
             end: 0,
             state: Stream::Running,
+            blank: Setpoint::default(),
         })
     }
 
@@ -421,10 +424,16 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             return false;
         }
         let count = setpoints.len();
-        setpoints.push(Setpoint::default());
+        setpoints.push(self.blank);
         let is_made = self.make(&mut setpoints[count]);
         setpoints.truncate(count + usize::from(is_made));
         is_made
+    }
+
+    /// About how many setpoints can be made of the motion that is known.
+    pub(crate) fn due(&self) -> usize {
+        let known = (self.trajectory.end() / CYCLE_TIME - self.told_ahead).ceil();
+        (known as u64).saturating_sub(self.sequence) as usize
     }
 
     fn is_due(&self) -> bool {
@@ -454,8 +463,11 @@ impl<const N: usize, M: Mechanism<N>> Iterator for Sampler<N, M> {
     type Item = Setpoint;
 
     fn next(&mut self) -> Option<Setpoint> {
-        let mut setpoint = Setpoint::default();
-        (self.is_due() && self.make(&mut setpoint)).then_some(setpoint)
+        if !self.is_due() {
+            return None;
+        }
+        let mut setpoint = self.blank;
+        if self.make(&mut setpoint) { Some(setpoint) } else { None }
     }
 }
 

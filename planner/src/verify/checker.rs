@@ -365,7 +365,7 @@ impl Checker {
                 *heating = DcMotor::heated(*heating, current, CYCLE_TIME, DcMotor::HEATING_TIME);
                 let heating = *heating;
                 // The root grows with what it is taken of, so that it is needed for the largest only.
-                if !(heating <= most.heating.0) {
+                if heating > most.heating.0 || heating.is_nan() {
                     let name = named(Quantity::HeatingCurrent, "A");
                     let share = name.below(heating.sqrt(), limit.plan, 1.0)?;
                     uses.heat[index] = uses.heat[index].max(share);
