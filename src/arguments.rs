@@ -306,8 +306,8 @@ pub struct ExportArguments {
 pub enum BenchCommand {
     /// Latency of every hop between the processes.
     Latency(LatencyArguments),
-    /// Planning speed.
-    Plan(BenchArguments),
+    /// Planning speed, on programs that it makes itself, on one core.
+    Plan(PlanBenchArguments),
     /// Simulation speed.
     Simulate(BenchArguments),
 }
@@ -332,7 +332,23 @@ pub struct LatencyArguments {
     pub json: bool,
 }
 
-/// Arguments of the other benchmarks.
+/// Arguments of `bench plan`.
+#[derive(Debug, Clone, Args)]
+pub struct PlanBenchArguments {
+    /// G-code program; without it some that are made for this.
+    pub job: Option<PathBuf>,
+    /// Lines of the longest of these.
+    #[arg(long, value_name = "COUNT", default_value_t = 1_000_000)]
+    pub lines: u64,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub machine: MachineArguments,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `bench simulate`.
 #[derive(Debug, Clone, Args)]
 pub struct BenchArguments {
     /// Job; without it the machine's sample job.

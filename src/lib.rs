@@ -45,7 +45,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Kinematics(arguments) => kinematics::run(arguments),
         Command::Export(arguments) => export::run(arguments),
         Command::Bench(BenchCommand::Latency(arguments)) => bench::latency(arguments),
-        Command::Bench(BenchCommand::Plan(arguments)) => bench::plan(arguments),
+        Command::Bench(BenchCommand::Plan(arguments)) => bench::planning::run(arguments),
         Command::Bench(BenchCommand::Simulate(arguments)) => bench::simulate(arguments),
         Command::Submit(arguments) => operator::submit(arguments),
         Command::Hold(arguments) => operator::verb(Verb::Hold, arguments),

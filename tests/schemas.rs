@@ -7,6 +7,7 @@
 
 mod support;
 
+use graver::commands::bench::planning::PlanBenchReport;
 use graver::commands::bench::{LatencyReport, SpeedReport};
 use graver::commands::check::CheckReport;
 use graver::commands::kinematics::lines::Reply;
@@ -18,7 +19,7 @@ use schemars::{Schema, schema_for};
 use support::{Place, assert_valid, lines};
 
 /// The schemas by the name of their file.
-fn schemas() -> [(&'static str, Schema); 8] {
+fn schemas() -> [(&'static str, Schema); 9] {
     [
         ("check", schema_for!(CheckReport)),
         ("kinematics", schema_for!(Reply)),
@@ -26,6 +27,7 @@ fn schemas() -> [(&'static str, Schema); 8] {
         ("plan", schema_for!(PlanReport)),
         ("reply", schema_for!(VerbReply)),
         ("speed", schema_for!(SpeedReport)),
+        ("planning", schema_for!(PlanBenchReport)),
         ("status", schema_for!(Status)),
         ("summary", schema_for!(Summary)),
     ]
@@ -89,9 +91,13 @@ fn plan_and_check_print_what_their_schemas_say() {
 fn benchmarks_print_what_their_schemas_say() {
     let place = Place::new();
     let job = place.file("lines.ngc", &lines(1));
-    for what in ["plan", "simulate"] {
-        let arguments = ["bench", what, job.to_str().unwrap(), "--seconds", "0.05", "--json"];
-        assert_valid("speed", &place.graver(&arguments).json(0));
+    let arguments = ["bench", "simulate", job.to_str().unwrap(), "--seconds", "0.05", "--json"];
+    assert_valid("speed", &place.graver(&arguments).json(0));
+    for of in [vec![job.to_str().unwrap()], vec!["--lines", "5000"]] {
+        let planned = place.graver(&[vec!["bench", "plan", "--json"], of].concat()).json(0);
+        assert_valid("planning", &planned);
+        let programs = planned["programs"].as_array().unwrap();
+        assert!(programs.iter().all(|it| it["setpoints"].as_u64().unwrap() > 100), "{planned:#}");
     }
     let arguments = ["bench", "latency", "--seconds", "0.3", "--no-realtime", "--json"];
     let latency = place.graver(&arguments).json(0);

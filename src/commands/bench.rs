@@ -1,5 +1,7 @@
 //! `graver bench`: measures this PC.
 
+pub mod planning;
+
 use crate::arguments::{BenchArguments, LatencyArguments};
 use crate::exit::{Exit, Failure};
 use crate::output::say;
@@ -217,7 +219,7 @@ fn measure(
     Ok(measured)
 }
 
-/// What the other benchmarks print.
+/// What `bench simulate --json` prints.
 #[derive(Debug, Serialize, schemars::JsonSchema)]
 pub struct SpeedReport {
     /// The job.
@@ -232,26 +234,6 @@ pub struct SpeedReport {
     pub setpoints_per_second: f64,
     /// Time of the job over wall time, by the median.
     pub realtime_factor: f64,
-}
-
-/// Reads, plans, checks and samples a job again and again.
-///
-/// # Errors
-/// A machine or job that does not hold.
-pub fn plan(arguments: &BenchArguments) -> Result<Exit, Failure> {
-    let input = inputs::machine(&arguments.machine)?;
-    let request = inputs::job_request(
-        arguments.job.as_deref(),
-        &input.machine,
-        input.folder.as_deref(),
-        &input.job_overrides,
-    );
-    speed(arguments, || {
-        let began = Instant::now();
-        let plan = request.plan(&input.machine)?;
-        let samples = plan.setpoints(1).count() as u64;
-        Ok((plan.facts.name, samples, began.elapsed()))
-    })
 }
 
 /// Simulates a job again and again; planning is not counted.
