@@ -108,8 +108,8 @@ impl Controller {
         Self {
             state: State::Disabled,
             fault: Fault::default(),
-            intake: Intake::new(machine),
-            player: Player::new(),
+            intake: Intake::new(),
+            player: Player::new(machine),
             alignment: Alignment::default(),
             catch_up: CatchUp::default(),
             feedforward: Feedforward::new(machine),

@@ -195,14 +195,13 @@ impl Feedforward {
             };
             planned.put(index, axis, &joint, rate, change);
         }
+        let around: [&[f64; 3]; 8] = core::array::from_fn(|index| {
+            &lookahead.setpoint((sequence + index as u64).saturating_sub(3)).tool
+        });
         for (index, tool) in planned.tool.iter_mut().enumerate() {
-            (*tool, _) = hermite(
-                from.tool[index],
-                (to.tool[index] - earlier.tool[index]) / 2.0,
-                to.tool[index],
-                (later.tool[index] - from.tool[index]) / 2.0,
-                fraction,
-            );
+            let tool_at = around.map(|tool| tool[index]);
+            let [from_slope, to_slope] = [slope(&tool_at[..7]), slope(&tool_at[1..])];
+            (*tool, _) = hermite(tool_at[3], from_slope, tool_at[4], to_slope, fraction);
         }
         planned
     }
@@ -307,6 +306,13 @@ impl Planned {
 
 fn direction(speed: f64) -> f64 {
     if speed.abs() < STANDING { 0.0 } else { speed.signum() }
+}
+
+/// Slope at the middle one of seven values: exact to the sixth order, so that the cubics between them are
+/// the motion itself but for the cycles about a jump of its jerk.
+fn slope(values: &[f64]) -> f64 {
+    let rise = |distance: usize| values[3 + distance] - values[3 - distance];
+    (45.0 * rise(1) - 9.0 * rise(2) + rise(3)) / 60.0
 }
 
 /// Value and slope at `at` in 0..1 of the cubic with these values and slopes at 0 and 1.

@@ -109,7 +109,7 @@ mod tests {
                 }
                 _ => {}
             }
-            ring.accept(&setpoint, 2.0).unwrap();
+            ring.accept(&setpoint).unwrap();
         }
         ring
     }
@@ -195,7 +195,7 @@ mod tests {
                 let edge = GateEdge { offset: slot * 100_000, gate, power: f64::from(gate) };
                 assert!(setpoint.laser.push(edge));
             }
-            ring.accept(&setpoint, 2.0).unwrap();
+            ring.accept(&setpoint).unwrap();
         }
         let play = |from, to| laser(&ring, Stretch { from: at(from), to: at(to) }, StreamTime(0));
         assert_eq!(play(0.0, 1.0).unwrap().edges().len(), 10);

@@ -5,20 +5,17 @@
 //! stream that is over, or was never started, is let go.
 
 use crate::lookahead::Lookahead;
-use crate::rate_limit::RateLimit;
 use crate::stream_time::StreamTime;
 use crate::supervision::{Finding, Supervision};
-use machine::Machine;
 use messages::{Fault, FaultCode, FaultQuantity, Setpoint};
 
 /// Setpoints that must be in hand before a stream begins, unless it is shorter.
 pub const BEGINNING: u64 = 250;
 
 /// The way into the look-ahead.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Intake {
     lookahead: Lookahead,
-    rate_limit: RateLimit,
     /// The stream to play, 0 for none.
     started: u64,
     /// The newest stream that is over.
@@ -26,14 +23,9 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// Empty, for this machine.
-    pub fn new(machine: &Machine) -> Self {
-        Self {
-            lookahead: Lookahead::new(),
-            rate_limit: RateLimit::new(machine),
-            started: 0,
-            finished: 0,
-        }
+    /// Empty.
+    pub fn new() -> Self {
+        Self { lookahead: Lookahead::new(), started: 0, finished: 0 }
     }
 
     /// The setpoints in hand.
@@ -116,8 +108,7 @@ impl Intake {
         if continues {
             supervision.continuity(before, setpoint)?;
         }
-        let largest_rate = self.rate_limit.of(setpoint);
-        self.lookahead.accept(setpoint, largest_rate).map_err(|broken| {
+        self.lookahead.accept(setpoint).map_err(|broken| {
             let (value, limit) = (broken.sequence as f64, broken.expected as f64);
             let fault = Fault::new(FaultCode::StreamBroken);
             Finding::sound(fault.beyond(FaultQuantity::Setpoint, value, limit))

@@ -1,7 +1,7 @@
 //! The setpoints that travel ahead of time, in a fixed ring, with some of the past kept for going
 //! back along the stream.
 
-use crate::ramp::LARGEST_RATE;
+use crate::motion_limits::Motion;
 use crate::stream_time::StreamTime;
 use messages::Setpoint;
 use messages::setpoint::flags;
@@ -9,8 +9,7 @@ use messages::setpoint::flags;
 /// Setpoints in the ring; a power of two.
 pub const CAPACITY: usize = 2048;
 
-/// Played setpoints that stay. A hold from rate 2 comes to rest after 232 of them, and a resume
-/// starts 232 before the point where the gate was closed.
+/// Played setpoints that stay, for a resume to go back to.
 pub const HISTORY: usize = 640;
 
 /// Lead below which a transmission counts as relaxed [m or rad]: a tenth of any encoder count.
@@ -21,12 +20,8 @@ const BLOCK: usize = 64;
 
 const BLOCKS: usize = CAPACITY / BLOCK;
 
-/// What a block of setpoints allows and holds.
-#[derive(Debug, Clone, Copy)]
-struct Block {
-    largest_rate: f64,
-    lit: bool,
-}
+/// Setpoints on either side that the motion at one is taken from.
+const NEIGHBOURS: u64 = 2;
 
 /// A setpoint did not continue the stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -44,7 +39,9 @@ pub struct StreamBroken {
 #[derive(Debug)]
 pub struct Lookahead {
     setpoints: Box<[Setpoint; CAPACITY]>,
-    blocks: [Block; BLOCKS],
+    motions: Box<[Motion; CAPACITY]>,
+    /// Which blocks of setpoints have light.
+    lit: [bool; BLOCKS],
     stream: u64,
     accepted: u64,
     played: u64,
@@ -56,7 +53,8 @@ impl Lookahead {
     pub fn new() -> Self {
         Self {
             setpoints: boxed(Setpoint::default()),
-            blocks: [Block { largest_rate: LARGEST_RATE, lit: false }; BLOCKS],
+            motions: boxed(Motion::default()),
+            lit: [false; BLOCKS],
             stream: 0,
             accepted: 0,
             played: 0,
@@ -69,11 +67,11 @@ impl Lookahead {
         (self.stream, self.accepted, self.played, self.complete) = (stream, 0, 0, false);
     }
 
-    /// Takes the next setpoint of the stream, of which `largest_rate` is known.
+    /// Takes the next setpoint of the stream.
     ///
     /// # Errors
     /// A gap, a repetition, another stream, or no room.
-    pub fn accept(&mut self, setpoint: &Setpoint, largest_rate: f64) -> Result<(), StreamBroken> {
+    pub fn accept(&mut self, setpoint: &Setpoint) -> Result<(), StreamBroken> {
         let continues = setpoint.sequence == self.accepted
             && (setpoint.stream == self.stream || self.stream == 0);
         if !continues || setpoint.stream == 0 || self.complete || self.room() == 0 {
@@ -86,15 +84,26 @@ impl Lookahead {
         self.stream = setpoint.stream;
         let slot = self.accepted as usize % CAPACITY;
         self.setpoints[slot] = *setpoint;
-        let block = &mut self.blocks[slot / BLOCK];
-        if slot.is_multiple_of(BLOCK) {
-            *block = Block { largest_rate, lit: false };
-        }
-        block.largest_rate = block.largest_rate.min(largest_rate);
-        block.lit |= setpoint.laser.is_lit();
+        let lit = &mut self.lit[slot / BLOCK];
+        *lit = setpoint.laser.is_lit() || *lit && !slot.is_multiple_of(BLOCK);
         self.accepted += 1;
         self.complete = setpoint.has(flags::LAST);
+        let known = self.motions_known();
+        for sequence in self.accepted.saturating_sub(NEIGHBOURS + 1)..known {
+            self.motions[sequence as usize % CAPACITY] = self.motion_at(sequence);
+        }
         Ok(())
+    }
+
+    /// Setpoints whose motion is known: what comes after the newest is not, unless it is the last.
+    fn motions_known(&self) -> u64 {
+        self.accepted.saturating_sub(if self.complete { 0 } else { NEIGHBOURS })
+    }
+
+    fn motion_at(&self, sequence: u64) -> Motion {
+        let [two_before, before] = [2, 1].map(|cycles| sequence.saturating_sub(cycles));
+        let around = [two_before, before, sequence, sequence + 1, sequence + 2];
+        Motion::amid(around.map(|sequence| self.setpoint(sequence)))
     }
 
     /// The stream in the ring, 0 for none.
@@ -142,31 +151,18 @@ impl Lookahead {
         &self.setpoints[self.nearest(sequence)]
     }
 
-    /// The largest rate at `from` that all setpoints up to `to` allow, up to a block more at either
-    /// end. What has not come in yet is taken to allow no more than the planned rate. `before`
-    /// gives the rate from which a limit can still be kept, so many setpoints before it.
-    pub fn largest_rate(
-        &self,
-        from: StreamTime,
-        to: StreamTime,
-        before: impl Fn(f64, f64) -> f64,
-    ) -> f64 {
-        let distance = |time: StreamTime| (time - from).setpoints();
-        let known = self.complete || to <= self.end();
-        let unknown = if known { LARGEST_RATE } else { before(1.0, distance(self.end())) };
-        let blocks = self.blocks(from, to).map(|(start, block)| {
-            if block.largest_rate < LARGEST_RATE {
-                before(block.largest_rate, distance(start))
-            } else {
-                LARGEST_RATE
-            }
-        });
-        blocks.fold(unknown, f64::min)
+    /// The motion at the setpoint with this number, or at the nearest of which it is known.
+    pub fn motion(&self, sequence: u64) -> &Motion {
+        let newest = self.motions_known().saturating_sub(1);
+        &self.motions[self.nearest(sequence.min(newest))]
     }
 
     /// Whether there may be light between `from` and `to`, or up to a block outside.
     pub fn may_be_lit(&self, from: StreamTime, to: StreamTime) -> bool {
-        self.blocks(from, to).any(|(_, block)| block.lit)
+        let block = |sequence: u64| sequence / BLOCK as u64;
+        let last = block(to.min(self.end()).sequence());
+        let first = block(from.max(self.beginning()).sequence());
+        (first..=last).any(|index| self.lit[index as usize % BLOCKS])
     }
 
     /// Whether any setpoint from the one at or before `from` to `to` has light; a look at each, for
@@ -183,20 +179,6 @@ impl Lookahead {
             let motion = setpoint.velocity.iter().chain(&setpoint.acceleration);
             motion.chain(&setpoint.jerk).all(|value| *value == 0.0)
                 && setpoint.lead.iter().all(|lead| lead.abs() < RELAXED)
-        })
-    }
-
-    /// The blocks with setpoints from `from` to `to`, with where each starts.
-    fn blocks(
-        &self,
-        from: StreamTime,
-        to: StreamTime,
-    ) -> impl Iterator<Item = (StreamTime, &Block)> {
-        let block = |sequence: u64| sequence / BLOCK as u64;
-        let last = block(to.min(self.end()).sequence());
-        let first = block(from.max(self.beginning()).sequence());
-        (first..=last).map(|index| {
-            (StreamTime::of(index * BLOCK as u64), &self.blocks[index as usize % BLOCKS])
         })
     }
 
@@ -231,7 +213,7 @@ mod tests {
     }
 
     fn take(ring: &mut Lookahead, sequence: u64) -> Result<(), StreamBroken> {
-        ring.accept(&setpoint(7, sequence), 2.0)
+        ring.accept(&setpoint(7, sequence))
     }
 
     #[test]
@@ -240,11 +222,11 @@ mod tests {
         take(&mut ring, 0).unwrap();
         take(&mut ring, 1).unwrap();
         for (stream, sequence) in [(7, 1), (7, 3), (8, 2), (0, 2)] {
-            let refused = ring.accept(&setpoint(stream, sequence), 2.0);
+            let refused = ring.accept(&setpoint(stream, sequence));
             assert_eq!(refused, Err(StreamBroken { stream, sequence, expected: 2 }));
         }
         let last = Setpoint { flags: flags::LAST, ..setpoint(7, 2) };
-        ring.accept(&last, 2.0).unwrap();
+        ring.accept(&last).unwrap();
         assert!(take(&mut ring, 3).is_err());
     }
 
@@ -265,32 +247,20 @@ mod tests {
         assert!(ring.played() > 10, "going back takes nothing back");
     }
 
-    fn largest(ring: &Lookahead, from: StreamTime, to: StreamTime) -> f64 {
-        ring.largest_rate(from, to, |limit, _| limit)
-    }
-
     #[test]
-    fn summarises_blocks_and_forgets_old_ones() {
+    fn knows_which_blocks_have_light_and_forgets_old_ones() {
         let mut ring = Lookahead::new();
         for sequence in 0..3000_u64 {
             ring.pass(StreamTime::of(sequence));
-            let slow = sequence == 200 || sequence == 200 + CAPACITY as u64 + 64;
             let mut setpoint = setpoint(7, sequence);
             setpoint.laser.gate = u32::from(sequence == 200);
-            let rate = if slow { 1.25 } else { 2.0 };
-            ring.accept(&setpoint, rate).unwrap();
+            ring.accept(&setpoint).unwrap();
             if sequence == 1000 {
-                let around = |from, to| (StreamTime::of(from), StreamTime::of(to));
-                let (from, to) = around(100, 300);
-                assert_eq!((largest(&ring, from, to), ring.may_be_lit(from, to)), (1.25, true));
-                let (from, to) = around(300, 900);
-                assert_eq!((largest(&ring, from, to), ring.may_be_lit(from, to)), (2.0, false));
-                let (from, to) = around(300, 1100);
-                assert_eq!(largest(&ring, from, to), 1.0, "the unknown is played as planned");
+                let may_be_lit =
+                    |from, to| ring.may_be_lit(StreamTime::of(from), StreamTime::of(to));
+                assert!(may_be_lit(100, 300) && !may_be_lit(300, 900));
             }
         }
-        let slow = 200 + CAPACITY as u64 + 64;
-        assert_eq!(largest(&ring, StreamTime::of(slow), StreamTime::of(slow)), 1.25);
         assert!(!ring.may_be_lit(StreamTime::of(1300), StreamTime::of(2990)));
     }
 }

@@ -12,23 +12,32 @@
 
 use crate::gate::{self, Stretch, TooManyEdges};
 use crate::lookahead::Lookahead;
-use crate::ramp::LARGEST_RATE;
-use crate::ramp::{Ramp, Rate, Slew, rate_before};
+use crate::motion_limits::{Course, MotionLimits};
+use crate::ramp::{Ramp, Rate, Slew};
 use crate::stream_time::{ONE, StreamTime};
 use crate::supervision::Elapsed;
+use machine::Machine;
 use messages::LaserCycle;
 use messages::setpoint::flags;
 use messages::time::CYCLE_TIME;
 
-/// The slowest that an override goes.
-pub const SMALLEST_RATE: f64 = 0.1;
+/// The overrides that can be asked for.
+const OVERRIDES: core::ops::RangeInclusive<f64> = 0.1..=2.0;
 
-/// How far ahead rates are limited: slowing from the largest rate to the planned one may begin 878
-/// setpoints before.
-const HORIZON: StreamTime = StreamTime(960 * ONE);
+/// Setpoints never played into while more may come: the neighbours of an interpolation, and those
+/// whose motion the next ones tell.
+const RESERVE: StreamTime = StreamTime(4 * ONE);
 
-/// Setpoints never played into while more may come: the neighbours of an interpolation.
-const RESERVE: StreamTime = StreamTime(2 * ONE);
+/// How many times as far as an unhindered stop one within the limits may go, before it is hindered
+/// no longer; and how much further a resume goes back than an unhindered way up to rate.
+const HINDRANCE: i64 = 2;
+
+/// Cycles after which a stop is hindered no longer. Planned motion, however it uses the limits, lets it
+/// rest within half of them.
+const PATIENCE: u32 = 400;
+
+/// Setpoints in hand with which nothing can run dry: [`HINDRANCE`] times a stop from rate 1, and more.
+const PLENTY: StreamTime = StreamTime(512 * ONE);
 
 /// Setpoints that a rewind goes further back than the way up to rate, so that the rate is steady
 /// where the light comes back.
@@ -64,8 +73,8 @@ enum Activity {
     Resting,
     /// Going forward; the slew is the one to and from rest until the rate is reached.
     Playing(Slew),
-    /// Coming to rest.
-    Braking,
+    /// Coming to rest, for so many cycles by now.
+    Braking(u32),
     /// Going back in the dark, to rest at about this time.
     Rewinding(StreamTime),
     /// Coming to rest before going forward again.
@@ -89,12 +98,14 @@ pub struct Player {
     at_planned_rest: bool,
     /// Pauses below this sequence number have been kept.
     paused_until: u64,
-    wanted: Rate,
+    limits: MotionLimits,
+    /// The override asked for.
+    asked: f64,
 }
 
 impl Player {
-    /// Before the first setpoint of a stream, at the planned rate.
-    pub fn new() -> Self {
+    /// For this machine, before the first setpoint of a stream, at the planned rate.
+    pub fn new(machine: &Machine) -> Self {
         Self {
             now: Instant::default(),
             next: Instant::default(),
@@ -106,29 +117,39 @@ impl Player {
             unlit_from: None,
             at_planned_rest: true,
             paused_until: 0,
-            wanted: Rate::ONE,
+            limits: MotionLimits::new(machine),
+            asked: 1.0,
         }
     }
 
-    /// Back to before the first setpoint; the wanted rate stays.
+    /// Back to before the first setpoint; the override stays.
     pub fn rewind(&mut self) {
-        *self = Self { wanted: self.wanted, ..Self::new() };
+        (self.now, self.next, self.after) = Default::default();
+        self.ramp = Ramp::new();
+        (self.activity, self.marking) = (Activity::Resting, false);
+        (self.dark_until, self.unlit_from) = Default::default();
+        (self.at_planned_rest, self.paused_until) = (true, 0);
     }
 
-    /// Plays at `rate` from now on, as far as the limits let it; `false` and no change when it is
-    /// not within [`SMALLEST_RATE`]..=[`LARGEST_RATE`].
+    /// Plays at `rate` from now on, or as planned where that is more: to plan faster is the planner's.
+    /// `false` and no change when it is not within 0.1..=2.
     #[must_use]
-    pub fn set_rate(&mut self, rate: f64) -> bool {
-        let allowed = (SMALLEST_RATE..=LARGEST_RATE).contains(&rate);
+    pub fn ask_rate(&mut self, rate: f64) -> bool {
+        let allowed = OVERRIDES.contains(&rate);
         if allowed {
-            self.wanted = Rate::nearest(rate);
+            self.asked = rate;
         }
         allowed
     }
 
     /// The rate asked for.
-    pub fn wanted_rate(&self) -> f64 {
-        self.wanted.value()
+    pub fn asked_rate(&self) -> f64 {
+        self.asked
+    }
+
+    /// The rate to play at.
+    fn wanted(&self) -> Rate {
+        Rate::nearest(self.asked.min(1.0))
     }
 
     /// The instant of the feedback.
@@ -166,8 +187,8 @@ impl Player {
         match self.activity {
             // `after` is what the coming `advance` makes `next`.
             Activity::Playing(_) => self.brake_in_the_dark(self.after.time),
-            Activity::Rewinding(_) | Activity::Turning => self.activity = Activity::Braking,
-            Activity::Resting | Activity::Braking => {}
+            Activity::Rewinding(_) | Activity::Turning => self.activity = Activity::Braking(0),
+            Activity::Resting | Activity::Braking(_) => {}
         }
     }
 
@@ -180,7 +201,7 @@ impl Player {
         let cycles = elapsed.cycles.saturating_sub(1) as i64;
         let from = if sent { self.next.time } else { self.after.time };
         let from = from.max(self.dark_until);
-        let to = self.after.time + StreamTime(cycles * LARGEST_RATE as i64 * ONE);
+        let to = self.after.time + StreamTime(cycles * ONE);
         let lost = elapsed.missed > 0 && (sent || unsent) && lookahead.is_lit(from, to);
         if !lost {
             return None;
@@ -196,8 +217,7 @@ impl Player {
     pub fn unsettle(&mut self, cycles: u64, lookahead: &Lookahead) -> Option<StreamTime> {
         let from = self.next.time.max(self.dark_until);
         let playing = matches!(self.activity, Activity::Playing(_));
-        let played = (cycles as f64 * self.after.rate.max(1.0)).ceil() as u64;
-        if !playing || !lookahead.is_lit(from, self.after.time + StreamTime::of(played)) {
+        if !playing || !lookahead.is_lit(from, self.after.time + StreamTime::of(cycles)) {
             return None;
         }
         self.brake_in_the_dark(from);
@@ -212,7 +232,7 @@ impl Player {
             self.dark_until = from;
             self.unlit_from = None;
         }
-        self.activity = Activity::Braking;
+        self.activity = Activity::Braking(0);
     }
 
     /// Goes on from rest: at once where the stream itself rests, else from as far back as the
@@ -222,22 +242,22 @@ impl Player {
             return;
         }
         let here = self.after.time;
-        let rate = self.rate_allowed(lookahead, here);
-        let start = Ramp::starting_distance(rate, Slew::STOP) + STEADY;
+        let start = HINDRANCE * Ramp::starting_distance(self.wanted()).0;
+        let start = StreamTime(start) + STEADY;
         let resting = self.at_planned_rest || lookahead.is_resting(here);
         let light_ahead = !resting && lookahead.may_be_lit(here, here + start);
         let light_from = self.unlit_from.or(light_ahead.then_some(here));
         match light_from.map(|light| light - start) {
             Some(back) if back < here => self.activity = Activity::Rewinding(back),
-            _ => self.set_off(lookahead, resting),
+            _ => self.set_off(resting),
         }
         self.at_planned_rest = false;
     }
 
     /// From rest forward: where the stream rests too, the rate may jump.
-    fn set_off(&mut self, lookahead: &Lookahead, resting: bool) {
+    fn set_off(&mut self, resting: bool) {
         self.activity = if resting {
-            self.ramp.jump(self.rate_allowed(lookahead, self.after.time));
+            self.ramp = Ramp::even(self.wanted());
             Activity::Playing(Slew::OVERRIDE)
         } else {
             Activity::Playing(Slew::STOP)
@@ -253,49 +273,22 @@ impl Player {
         self.next = self.after;
         self.marking = matches!(self.activity, Activity::Playing(_));
         let from = self.next.time;
-        let mut event = Event::None;
-        let rate = match self.activity {
-            Activity::Resting => {
-                self.after = Instant { time: from, rate: 0.0, rate_change: 0.0 };
-                return event;
-            }
-            Activity::Playing(slew) => {
-                let allowed = self.rate_allowed(lookahead, from);
-                let rate = self.ramp.toward(allowed, slew);
-                let reach = from + self.ramp.stopping_distance(rate, Slew::STOP) + RESERVE;
-                if reach > lookahead.end() && !lookahead.is_complete() {
-                    self.brake_in_the_dark(from);
-                    self.marking = false;
-                    event = Event::Starved;
-                    self.ramp.toward(Rate::ZERO, Slew::STOP)
-                } else {
-                    if self.ramp.rate() == allowed.value() {
-                        self.activity = Activity::Playing(Slew::OVERRIDE);
-                    }
-                    rate
-                }
-            }
-            Activity::Rewinding(back) => {
-                let rate = self.ramp.toward(Rate(-Rate::ONE.0), Slew::STOP);
-                if from + self.ramp.stopping_distance(rate, Slew::STOP) < back {
-                    self.activity = Activity::Turning;
-                    self.ramp.toward(Rate::ZERO, Slew::STOP)
-                } else {
-                    rate
-                }
-            }
-            Activity::Braking | Activity::Turning => self.ramp.toward(Rate::ZERO, Slew::STOP),
-        };
-        let time = from + self.ramp.advance(rate);
-        let reached = self.ramp.rate();
+        if self.activity == Activity::Resting {
+            self.after = Instant { time: from, rate: 0.0, rate_change: 0.0 };
+            return Event::None;
+        }
+        let before = self.ramp;
+        let mut event = self.change_rate(lookahead, from);
+        let time = from + self.ramp.advance(before);
+        let reached = self.ramp.rate().value();
         self.after = Instant { time, rate: reached, rate_change: self.rate_change(reached) };
         if time < StreamTime::default() {
             // Back at the first setpoint, where the stream rests.
             self.stop_at(StreamTime::default());
-            if self.activity == Activity::Braking {
+            if matches!(self.activity, Activity::Braking(_)) {
                 self.activity = Activity::Resting;
             } else {
-                self.set_off(lookahead, true);
+                self.set_off(true);
             }
         } else if let Some(found) = self.planned_rest(lookahead) {
             // A planned rest on the way is as good a place to stop as any.
@@ -308,11 +301,64 @@ impl Player {
         } else if self.ramp.is_still() {
             match self.activity {
                 Activity::Turning => {
-                    self.set_off(lookahead, lookahead.is_resting(self.after.time));
+                    self.set_off(lookahead.is_resting(self.after.time));
                 }
-                Activity::Braking => self.activity = Activity::Resting,
+                Activity::Braking(_) => self.activity = Activity::Resting,
                 _ => {}
             }
+        }
+        event
+    }
+
+    /// One cycle of the rate, from `from` on, as the activity asks and the limits allow; and what comes
+    /// of that.
+    fn change_rate(&mut self, lookahead: &Lookahead, from: StreamTime) -> Event {
+        let before = self.ramp;
+        let toward = |target: Rate, slew: Slew| {
+            before.toward(target, slew, &Course { lookahead, limits: &self.limits }, from)
+        };
+        let end = lookahead.end() - RESERVE;
+        let scarce = !lookahead.is_complete() && from + PLENTY > end;
+        let stops = |ramp: Ramp, times: i64| {
+            from + ramp.advance(before) + StreamTime(times * ramp.stopping_distance().0)
+        };
+        let mut event = Event::None;
+        self.ramp = match self.activity {
+            Activity::Playing(slew) => {
+                let ramp = toward(self.wanted(), slew);
+                if scarce && stops(ramp, HINDRANCE) > end {
+                    event = Event::Starved;
+                    let ramp = toward(Rate::ZERO, Slew::STOP);
+                    self.brake_in_the_dark(from);
+                    self.marking = false;
+                    ramp
+                } else {
+                    if ramp.is_even_at(self.wanted()) {
+                        self.activity = Activity::Playing(Slew::OVERRIDE);
+                    }
+                    ramp
+                }
+            }
+            Activity::Rewinding(back) => {
+                let ramp = toward(Rate(-Rate::ONE.0), Slew::STOP);
+                if stops(ramp, 1) < back {
+                    let ramp = toward(Rate::ZERO, Slew::STOP);
+                    self.activity = Activity::Turning;
+                    ramp
+                } else {
+                    ramp
+                }
+            }
+            Activity::Braking(PATIENCE..) => before.unhindered(Rate::ZERO, Slew::STOP),
+            Activity::Braking(cycles) => {
+                self.activity = Activity::Braking(cycles + 1);
+                toward(Rate::ZERO, Slew::STOP)
+            }
+            Activity::Resting | Activity::Turning => toward(Rate::ZERO, Slew::STOP),
+        };
+        if scarce && stops(self.ramp, 1) > end {
+            // There is no more way to wait for room on.
+            self.ramp = before.unhindered(Rate::ZERO, Slew::STOP);
         }
         event
     }
@@ -356,7 +402,7 @@ impl Player {
 
     /// Rests at `time` at once; only where the stream rests.
     fn stop_at(&mut self, time: StreamTime) {
-        self.ramp.jump(Rate::ZERO);
+        self.ramp = Ramp::new();
         self.after = Instant { time, rate: 0.0, rate_change: 0.0 };
     }
 
@@ -364,19 +410,5 @@ impl Player {
         // Out of a planned rest the rate jumps, but nothing moves there.
         let from_rest = self.next.rate == 0.0 && reached.abs() > 0.05;
         if from_rest { 0.0 } else { (reached - self.next.rate) / CYCLE_TIME }
-    }
-
-    fn rate_allowed(&self, lookahead: &Lookahead, from: StreamTime) -> Rate {
-        if self.wanted <= Rate::ONE {
-            return self.wanted;
-        }
-        let largest = lookahead.largest_rate(from, from + HORIZON, rate_before);
-        self.wanted.min(Rate::below(largest))
-    }
-}
-
-impl Default for Player {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -68,14 +68,14 @@ fn holds_anywhere_and_goes_on_without_losing_or_doubling_a_mark() {
                 assert_eq!(rates, [1.0, 1.0], "{case}");
             }
         }
-        // 10 m/s² planned, and what `ramp` says a hold may add.
+        // 10 m/s² planned; a hold and a resume stay within.
         let sharpest = sharpest(&bench.records, &machine);
-        assert!(sharpest < 10.6, "{case}: a reference changed by {sharpest} m/s²");
+        assert!(sharpest < 10.1, "{case}: a reference changed by {sharpest} m/s²");
         let lit = bench.played().filter(|record| record.command.laser.is_lit());
         let worst = lit.map(|record| record.tracking).fold(0.0, f64::max);
         assert!(worst < 10e-6, "{case}: {worst} m off while lit");
         let worst = bench.played().map(|record| record.tracking).fold(0.0, f64::max);
-        assert!(worst < 20e-6, "{case}: {worst} m off in the dark");
+        assert!(worst < 35e-6, "{case}: {worst} m off in the dark");
     }
 }
 
@@ -112,7 +112,7 @@ fn any_sequence_of_holds_resumes_and_overrides_marks_once() {
         check_marks(&bench, &job, 0.4, &case);
         assert_eq!(bench.reports.last().unwrap().completed, 1, "{case}");
         let sharpest = sharpest(&bench.records, &machine);
-        assert!(sharpest < 10.6, "{case}: a reference changed by {sharpest} m/s²");
+        assert!(sharpest < 10.1, "{case}: a reference changed by {sharpest} m/s²");
     }
 }
 

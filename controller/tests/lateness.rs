@@ -104,7 +104,8 @@ fn run_dry(machine: &Machine, job: &Job, supply: usize) -> Bench {
     assert_eq!(bench.state(), ControllerState::Holding, "with {supply}");
     let furthest = bench.played().map(|record| record.command.stream_time).fold(0.0, f64::max);
     assert!(furthest <= (supply - 1) as f64 * 1e-3, "played beyond the {supply} in hand");
-    assert!(furthest >= (supply - 5) as f64 * 1e-3, "{furthest}: stopped too soon");
+    // Twice the way of an unhindered stop is kept in hand, and one is gone.
+    assert!(furthest >= (supply - 75) as f64 * 1e-3, "{furthest}: stopped too soon");
     bench
 }
 
@@ -129,7 +130,7 @@ fn a_dry_stream_goes_on_when_setpoints_come_again() {
         assert_eq!(bench.reports.last().unwrap().completed, 1, "{case}");
         let [lit, dark] = tracking(&bench);
         // In the dark, stiction may hold an axis back as it sets off from a long rest.
-        assert!(lit < 10e-6 && dark < 80e-6, "{case}: {lit} m, {dark} m in the dark");
+        assert!(lit < 10e-6 && dark < 95e-6, "{case}: {lit} m, {dark} m in the dark");
     }
 }
 

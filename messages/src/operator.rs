@@ -18,7 +18,8 @@ pub enum OperatorVerb {
     Stop = 5,
     /// Clear a latched fault; only at rest.
     Reset = 6,
-    /// Play at another rate, `value` 0.1..=2.
+    /// Override the rate, `value` 0.1..=2: up to 1 the stream is played at this rate, above it is for
+    /// the planner to plan faster.
     Override = 7,
     /// Play the stream whose number is `value`; no other stream is ever played.
     Start = 8,
@@ -65,7 +66,7 @@ sample! {
         state: u32,
         /// Always 0; keeps the sample free of padding.
         reserved: u32,
-        /// The value now in force, for an override.
+        /// The rate that is asked for since the last override, 1 before the first.
         value: f64,
     }
 }

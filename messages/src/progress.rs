@@ -4,7 +4,7 @@ use crate::{Fault, Nanoseconds, sample};
 
 sample! {
     /// Published every few cycles; the planner's licence to send more.
-    Progress = "graver.Progress.v2" {
+    Progress = "graver.Progress.v3" {
         /// When it was published.
         published: Nanoseconds,
         /// The stream in the look-ahead, 0 for none.
@@ -21,6 +21,9 @@ sample! {
         finished_stream: u64,
         /// Rate at which the stream is played.
         rate: f64,
+        /// The rate that was asked for, 0.1..=2. Above 1 the stream is played as planned, and what is
+        /// not yet sent may be planned anew at so much higher a speed.
+        override_rate: f64,
         /// Tool position the plan has now, machine frame [m].
         tool: [f64; 3],
         /// Joint reference now, load side [m or rad]: where a new stream must start.

@@ -126,6 +126,7 @@ impl Controller {
             stroke: command.stroke,
             finished_stream: self.intake.finished(),
             rate: command.rate,
+            override_rate: self.player.asked_rate(),
             tool: command.tool,
             position,
             state: command.state,

@@ -15,7 +15,7 @@ impl Controller {
             accepted: u32::from(accepted),
             state: met as u32,
             reserved: 0,
-            value: self.player.wanted_rate(),
+            value: self.player.asked_rate(),
         }
     }
 
@@ -51,7 +51,7 @@ impl Controller {
                 self.reset_ticket = u64::from(request.ticket);
                 self.supervision.reset();
             }
-            (OperatorVerb::Override, _) => return self.player.set_rate(request.value),
+            (OperatorVerb::Override, _) => return self.player.ask_rate(request.value),
             (OperatorVerb::Start, State::Disabled | State::Enabling { .. } | State::Idle) => {
                 let stream = request.value as u64;
                 return stream as f64 == request.value && self.intake.start(stream);

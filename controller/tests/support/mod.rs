@@ -10,7 +10,7 @@ use messages::setpoint::flags;
 use messages::time::CYCLE_PERIOD;
 use messages::{
     Command, CommandMode, ControllerReport, ControllerState, Feedback, GateEdge, LaserCycle,
-    Nanoseconds, OperatorReply, OperatorRequest, OperatorVerb, Setpoint,
+    Nanoseconds, OperatorReply, OperatorRequest, OperatorVerb, Progress, Setpoint,
 };
 
 /// Steps in which the motor is integrated [s]; its half is the largest shift in time, 0.25 µm at
@@ -253,6 +253,8 @@ pub struct Bench {
     pub motors: Vec<Motor>,
     pub records: Vec<Record>,
     pub reports: Vec<ControllerReport>,
+    /// The newest.
+    pub progress: Option<Progress>,
     pub feedback: Feedback,
     pub peers: Peers,
     pub sent: usize,
@@ -280,6 +282,7 @@ impl Bench {
             motors,
             records: Vec::new(),
             reports: Vec::new(),
+            progress: None,
             feedback: Feedback { epoch: 5, ..Feedback::default() },
             peers: Peers::default(),
             sent: 0,
@@ -347,6 +350,7 @@ impl Bench {
         self.controller.step(now, &inputs, &mut outputs);
         self.feedback.skipped = 0;
         self.reports.extend(outputs.report);
+        self.progress = outputs.progress.or(self.progress);
         let joints: Vec<f64> =
             self.motors.iter().map(|motor| motor.angle * motor.axis.ratio).collect();
         let tracking = messages::artwork::distance(&tool(&joints), &outputs.command.tool);
