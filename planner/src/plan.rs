@@ -13,6 +13,7 @@ use crate::drawing::Note;
 use crate::error::{Place, PlanError};
 use crate::geometry::operation::{Operation, OperationKind, Operations};
 use crate::job::Job;
+use crate::joint_space::directions::directions_near;
 use crate::joint_space::joint_move::JointMove;
 use crate::law::optimum::Speeds;
 use crate::limits::motion_limits::Scope;
@@ -82,7 +83,9 @@ fn plan_within(
         PlanError::Unreachable { line, place: Place { stroke: 0, time: 0.0 }, cause }
     })?;
     let mut notes = [drawing.notes.as_slice(), &found].concat();
-    let speeds = Speeds::choose(drawing.start, &operations, &limits, &job.marking, &mut notes);
+    let near = directions_near(machine, limits, job.attitude, scope);
+    let speeds =
+        Speeds::choose(drawing.start, &operations, &limits, &near, &job.marking, &mut notes);
     let standing = job
         .standing
         .unwrap_or_else(|| machine.mechanism.visit(Start { machine, start: drawing.start }));
