@@ -91,7 +91,8 @@ impl Latest {
 
     /// The rate at which setpoints are played, as asked for.
     fn rate(&self) -> f64 {
-        1.0
+        let rate = self.progress.override_rate.min(1.0);
+        if rate > 0.0 { rate } else { 1.0 }
     }
 }
 

@@ -2,6 +2,7 @@
 //! unwound.
 
 pub(crate) mod configuration;
+pub(crate) mod directions;
 pub(crate) mod follow_flight;
 pub mod joint_move;
 pub(crate) mod route;

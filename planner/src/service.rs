@@ -173,7 +173,7 @@ impl Service {
     /// Takes the next window once the one before has been sent.
     fn take_window(&mut self) -> Result<(), ServiceError> {
         let Work::Streaming(streaming) = &mut self.work else { return Ok(()) };
-        streaming.thread.set_rate(1.0);
+        streaming.thread.set_rate(self.newest_progress.override_rate.max(1.0));
         if streaming.is_complete || streaming.waiting.is_some() || streaming.window.len() > 0 {
             return Ok(());
         }

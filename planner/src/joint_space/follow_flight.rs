@@ -1,4 +1,4 @@
-//! Whether the joints can follow a flight of the tool.
+//! Whether the joints can follow a flight of the tool, and which of their limits it takes too much of.
 
 use machine::kinematics::{Attitude, KinematicsError, ToolMotion};
 use machine::{Mechanism, WorkArea};
@@ -8,13 +8,16 @@ use crate::law::flight::Flight;
 use crate::law::row::Row;
 use crate::limits::local::Local;
 use crate::limits::motion_limits::{MotionLimits, Scope};
-use crate::limits::source::Source;
+use crate::limits::source::{JointLimit, Source};
 use crate::limits::tightening::Tightening;
 
 /// Time between two looks at a flight [s], and how many there are at least: a joint's speed peaks
 /// shortly after a flight begins.
 const APART: f64 = 1e-3;
 const LEAST_LOOKS: f64 = 12.0;
+
+/// How far beside a break of a flight it is looked at, as a share of its duration.
+const BESIDE: f64 = 1e-9;
 
 /// A joint that goes farther than this between two looks jumps [m or rad].
 const JUMP: f64 = 0.3;
@@ -25,6 +28,44 @@ const SAME: f64 = 1e-8;
 /// Rounding at the edge of the area and at a soft limit [m or rad].
 const ROUNDING: f64 = 1e-9;
 
+/// How the joints follow a flight.
+#[derive(Debug, Clone)]
+pub(crate) struct Followed<const N: usize> {
+    pub(crate) end: Configuration<N>,
+    /// The largest share of each joint's limits in use, by [`JointLimit`] [1].
+    pub(crate) used: [[f64; JointLimit::COUNT]; N],
+}
+
+/// The shares of their limits that the joints use where they follow `tool`, being near `near`; `None`
+/// where they cannot.
+pub(crate) fn uses<const N: usize, M: Mechanism<N>>(
+    limits: &MotionLimits<'_, N, M>,
+    near: &Configuration<N>,
+    tool: &ToolMotion,
+    shares: &Tightening,
+) -> Option<[[f64; JointLimit::COUNT]; N]> {
+    let mut followed = Followed { end: *near, used: [[0.0; JointLimit::COUNT]; N] };
+    step(limits, &mut followed, tool, shares, &mut Vec::new())?;
+    Some(followed.used)
+}
+
+impl<const N: usize> Followed<N> {
+    /// Whether all limits are kept.
+    pub(crate) fn fits(&self) -> bool {
+        self.used.iter().flatten().all(|used| *used <= 1.0)
+    }
+
+    fn note(&mut self, source: Source, used: f64) {
+        if let Some((axis, limit)) = source.joint_limit()
+            && axis < N
+        {
+            let most = &mut self.used[axis][limit as usize];
+            // Put this way what is no number is kept.
+            *most = if used <= *most { *most } else { used };
+        }
+    }
+}
+
 /// Whether the tool stays inside `area`.
 pub(crate) fn stays_inside(flight: &Flight, area: &WorkArea) -> bool {
     let [lower, upper] = flight.bounds();
@@ -33,30 +74,48 @@ pub(crate) fn stays_inside(flight: &Flight, area: &WorkArea) -> bool {
     })
 }
 
-/// Where the joints end when they follow `flight` from `start`; `None` where they cannot.
+/// How the joints follow `flight` from `start`, up to where they use more than `most` of a limit; `None`
+/// where they cannot at any speed.
 pub(crate) fn follow_flight<const N: usize, M: Mechanism<N>>(
     limits: &MotionLimits<'_, N, M>,
     area: &WorkArea,
     start: &Configuration<N>,
     flight: &Flight,
     shares: &Tightening,
-) -> Option<Configuration<N>> {
+    most: f64,
+) -> Option<Followed<N>> {
     if limits.scope == Scope::Machine && !stays_inside(flight, area) {
         return None;
     }
-    let count = (flight.duration() / APART).ceil().max(LEAST_LOOKS) as usize;
-    let mut now = *start;
+    let mut followed = Followed { end: *start, used: [[0.0; JointLimit::COUNT]; N] };
     let mut rows = Vec::new();
-    for index in 0..=count {
-        let tool = tool(flight, flight.duration() * index as f64 / count as f64);
-        now = step(limits, &now, &tool, shares, &mut rows).ok()??;
+    for (index, time) in looks(flight).into_iter().enumerate() {
+        step(limits, &mut followed, &tool(flight, time), shares, &mut rows)?;
+        if followed.used.iter().flatten().any(|used| !(*used <= most)) {
+            return Some(followed);
+        }
         // A tool that must first be turned cannot fly from here.
-        let starts_elsewhere = index == 0 && (now.joints - start.joints).amax() > SAME;
+        let starts_elsewhere = index == 0 && (followed.end.joints - start.joints).amax() > SAME;
         if starts_elsewhere && limits.scope == Scope::Machine {
             return None;
         }
     }
-    Some(now)
+    Some(followed)
+}
+
+/// When a flight is looked at: evenly, and on both sides of each change of the jerk, where
+/// accelerations have their extremes.
+fn looks(flight: &Flight) -> Vec<f64> {
+    let duration = flight.duration();
+    let count = (duration / APART).ceil().max(LEAST_LOOKS) as usize;
+    let beside = duration * BESIDE;
+    let breaks = flight.breaks().flat_map(|time| [time - beside, time + beside]);
+    let mut looks: Vec<f64> = (0..=count)
+        .map(|index| duration * index as f64 / count as f64)
+        .chain(breaks.filter(|time| *time > 0.0 && *time < duration))
+        .collect();
+    looks.sort_by(f64::total_cmp);
+    looks
 }
 
 /// The tool's motion in a flight.
@@ -74,31 +133,42 @@ pub(crate) fn tool(flight: &Flight, time: f64) -> ToolMotion {
 /// Follows the tool to one instant, at which time itself is the parameter of the limits.
 fn step<const N: usize, M: Mechanism<N>>(
     limits: &MotionLimits<'_, N, M>,
-    before: &Configuration<N>,
+    followed: &mut Followed<N>,
     tool: &ToolMotion,
     shares: &Tightening,
     rows: &mut Vec<Row>,
-) -> Result<Option<Configuration<N>>, KinematicsError> {
+) -> Option<()> {
+    let before = followed.end;
     let mut branch = before.branch;
-    let motion = limits.follow(tool, &mut branch, &before.joints)?;
-    let now = Configuration { joints: motion.position, branch };
+    let motion = limits.follow(tool, &mut branch, &before.joints).ok()?;
+    followed.end = Configuration { joints: motion.position, branch };
     if limits.scope == Scope::PathAlone {
-        return Ok(Some(now));
+        return Some(());
     }
     if (motion.position - before.joints).amax() > JUMP {
-        return Ok(None);
+        return None;
     }
     for (index, axis) in limits.axes.iter().enumerate().take(N) {
         let [lower, upper] = axis.limits.position;
         if motion.position[index] < lower - ROUNDING || motion.position[index] > upper + ROUNDING {
-            return Ok(None);
+            return None;
         }
     }
-    let state = limits.solve(&motion.position, branch, None)?;
-    keeps_margins(limits.mechanism, &state)?;
-    rows.clear();
-    let mut local = Local::new(f64::INFINITY, Source::RAPID, 1.0, f64::INFINITY);
-    limits.joint_rows(&motion, &state, shares, &mut local, rows)?;
-    let fits = |row: &Row| row.base[2] + row.by_speed[2] <= row.top + row.top_by_speed;
-    Ok((local.speed >= 1.0 && rows.iter().all(fits)).then_some(now))
+    let mut look = || -> Result<Local, KinematicsError> {
+        let state = limits.solve(&motion.position, branch, None)?;
+        keeps_margins(limits.mechanism, &state)?;
+        rows.clear();
+        let mut local = Local::new(f64::INFINITY, Source::RAPID, 1.0, f64::INFINITY);
+        limits.joint_rows(&motion, &state, shares, &mut local, rows)?;
+        Ok(local)
+    };
+    let local = look().ok()?;
+    followed.note(local.speed_source, 1.0 / local.speed);
+    for row in rows.iter() {
+        let used = row.base[2] + row.by_speed[2];
+        let room = row.top + row.top_by_speed;
+        // Where the speed alone leaves nothing, only less of it helps.
+        followed.note(Source(row.limit), if room > 0.0 { used / room } else { f64::INFINITY });
+    }
+    Some(())
 }

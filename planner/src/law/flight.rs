@@ -8,6 +8,7 @@
 mod along;
 mod band;
 mod cone;
+mod direction;
 mod frame;
 mod grid;
 mod model;
@@ -17,6 +18,8 @@ mod search;
 mod speed;
 
 use nalgebra::Vector3;
+
+pub(crate) use direction::DirectionLimit;
 
 use crate::law::profile::Move;
 
@@ -128,10 +131,28 @@ impl Flight {
         search::fitting(from, to, limits, fits)
     }
 
+    /// The shortest found between `from` and `to` within `limits` and those of `directions`; `None`
+    /// as for [`Self::new`].
+    pub fn within(
+        from: &State,
+        to: &State,
+        limits: &FlightLimits,
+        directions: &[DirectionLimit],
+    ) -> Option<Self> {
+        if !(from.is_finite() && to.is_finite() && from.keeps(limits) && to.keeps(limits)) {
+            return None;
+        }
+        search::shortest(from, to, limits, directions)
+    }
+
     /// From rest into `to` in the shortest time found, wherever that starts; `to` keeps `limits`. `None`
     /// where no motion was found.
-    pub fn run_in(to: &State, limits: &FlightLimits) -> Option<Self> {
-        run::into(to, limits)
+    pub fn run_in(
+        to: &State,
+        limits: &FlightLimits,
+        directions: &[DirectionLimit],
+    ) -> Option<Self> {
+        run::into(to, limits, directions)
     }
 
     /// From rest into `to`, whose acceleration is across its velocity, by a ramp and a swing: a little
@@ -142,9 +163,13 @@ impl Flight {
 
     /// From `from` to rest in the shortest time found, wherever that ends; `from` keeps `limits`. `None`
     /// where no motion was found.
-    pub fn run_out(from: &State, limits: &FlightLimits) -> Option<Self> {
+    pub fn run_out(
+        from: &State,
+        limits: &FlightLimits,
+        directions: &[DirectionLimit],
+    ) -> Option<Self> {
         let back = State { velocity: -from.velocity, ..*from };
-        run::into(&back, limits).map(|flight| flight.reversed())
+        run::into(&back, limits, directions).map(|flight| flight.reversed())
     }
 
     /// [s].

@@ -8,6 +8,27 @@ use crate::verify::checker::Quantity;
 /// Axes come after the limits of the tool, this many numbers apart.
 const PER_AXIS: u16 = 16;
 
+/// Which limit of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum JointLimit {
+    Velocity,
+    Acceleration,
+    Jerk,
+    /// Current of a DC motor, or torque of a stepper.
+    Torque,
+    /// Voltage of a DC motor, or pulse rate of a stepper.
+    Voltage,
+}
+
+impl JointLimit {
+    /// How many there are.
+    pub(crate) const COUNT: usize = Self::ALL.len();
+
+    /// By number.
+    const ALL: [Self; 5] =
+        [Self::Velocity, Self::Acceleration, Self::Jerk, Self::Torque, Self::Voltage];
+}
+
 /// A limit by number, as the time law carries it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Source(pub(crate) u16);
@@ -28,38 +49,45 @@ impl Source {
     /// whatever the axes leave of them.
     pub(crate) const DARK_TURN: Self = Self(5);
 
-    fn of_axis(axis: usize, kind: u16) -> Self {
-        Self((axis as u16 + 1) * PER_AXIS + kind)
+    fn of_axis(axis: usize, limit: JointLimit) -> Self {
+        Self((axis as u16 + 1) * PER_AXIS + limit as u16)
+    }
+
+    /// The number of the axis and which of its limits it is; `None` for one of the tool.
+    pub(crate) fn joint_limit(self) -> Option<(usize, JointLimit)> {
+        let axis = (self.0 / PER_AXIS).checked_sub(1)?;
+        let limit = JointLimit::ALL.get(usize::from(self.0 % PER_AXIS))?;
+        Some((usize::from(axis), *limit))
     }
 
     /// Speed of a joint.
     pub(crate) fn joint_velocity(axis: usize) -> Self {
-        Self::of_axis(axis, 0)
+        Self::of_axis(axis, JointLimit::Velocity)
     }
 
     /// Acceleration of a joint.
     pub(crate) fn joint_acceleration(axis: usize) -> Self {
-        Self::of_axis(axis, 1)
+        Self::of_axis(axis, JointLimit::Acceleration)
     }
 
     /// Jerk of a joint.
     pub(crate) fn joint_jerk(axis: usize) -> Self {
-        Self::of_axis(axis, 2)
+        Self::of_axis(axis, JointLimit::Jerk)
     }
 
     /// Current of a DC motor, or torque of a stepper.
     pub(crate) fn torque(axis: usize) -> Self {
-        Self::of_axis(axis, 3)
+        Self::of_axis(axis, JointLimit::Torque)
     }
 
     /// Voltage of a DC motor, or pulse rate of a stepper.
     pub(crate) fn voltage(axis: usize) -> Self {
-        Self::of_axis(axis, 4)
+        Self::of_axis(axis, JointLimit::Voltage)
     }
 
     /// What a person reads, with the name of the axis.
     pub(crate) fn describe(self, axes: &[Axis]) -> (String, Option<String>) {
-        if self.0 < PER_AXIS {
+        let Some((axis, limit)) = self.joint_limit() else {
             let name = match self {
                 Self::FEED => "speed asked for",
                 Self::MARKING_SPEED => "largest marking speed",
@@ -69,17 +97,17 @@ impl Source {
                 _ => Quantity::ToolJerk.name(),
             };
             return (name.to_owned(), None);
-        }
-        let axis = axes.get(usize::from(self.0 / PER_AXIS - 1));
+        };
+        let axis = axes.get(axis);
         let is_stepper = axis.is_some_and(|axis| axis.motor.stepper().is_some());
-        let quantity = match (self.0 % PER_AXIS, is_stepper) {
-            (0, _) => Quantity::JointVelocity,
-            (1, _) => Quantity::JointAcceleration,
-            (2, _) => Quantity::JointJerk,
-            (3, false) => Quantity::MotorCurrent,
-            (3, true) => Quantity::MotorTorque,
-            (_, false) => Quantity::MotorVoltage,
-            (_, true) => Quantity::PulseRate,
+        let quantity = match (limit, is_stepper) {
+            (JointLimit::Velocity, _) => Quantity::JointVelocity,
+            (JointLimit::Acceleration, _) => Quantity::JointAcceleration,
+            (JointLimit::Jerk, _) => Quantity::JointJerk,
+            (JointLimit::Torque, false) => Quantity::MotorCurrent,
+            (JointLimit::Torque, true) => Quantity::MotorTorque,
+            (JointLimit::Voltage, false) => Quantity::MotorVoltage,
+            (JointLimit::Voltage, true) => Quantity::PulseRate,
         };
         (quantity.name().to_owned(), axis.map(|axis| axis.name.clone()))
     }

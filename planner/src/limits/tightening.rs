@@ -33,6 +33,13 @@ pub(crate) struct AxisShares {
 }
 
 impl Tightening {
+    /// All of every limit.
+    pub(crate) fn all(axes: usize) -> Self {
+        let all =
+            AxisShares { velocity: 1.0, acceleration: 1.0, jerk: 1.0, torque: 1.0, voltage: 1.0 };
+        Self { speed: 1.0, acceleration: 1.0, jerk: 1.0, axes: vec![all; axes] }
+    }
+
     /// All of the tool's limits; of those of the axes all but for what a law may be beyond its rows
     /// between the places where it is held to them.
     pub(crate) fn none(axes: usize) -> Self {
@@ -75,6 +82,22 @@ impl Tightening {
             _ => self.slow(0.85),
         }
         true
+    }
+
+    /// The same with a little of the axes' limits left over: what the way out of a path is promised
+    /// with, so that it is still there when the check of its samples has taken some of them.
+    pub(crate) fn with_reserve(&self) -> Self {
+        /// What is left of each.
+        const SHARE: f64 = 0.99;
+        let mut shares = self.clone();
+        for axis in &mut shares.axes {
+            axis.velocity *= SHARE;
+            axis.acceleration *= SHARE;
+            axis.jerk *= SHARE;
+            axis.torque *= SHARE;
+            axis.voltage *= SHARE;
+        }
+        shares
     }
 
     /// The same with a part of the motors left to the loops, for moves that a mark may follow at once.

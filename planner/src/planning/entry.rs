@@ -7,13 +7,13 @@ use machine::kinematics::ToolMotion;
 
 use super::Planning;
 use super::paths::PathRun;
-use super::runs::{RUN_TRIALS, state};
+use super::runs::{FAR_BEYOND, FOLLOW_TRIALS, Unfit, state};
 use crate::drawing::Turns;
 use crate::geometry::jet::Jet;
 use crate::joint_space::configuration::{Configuration, PathFunction, Refused, candidates, walk};
 use crate::joint_space::follow_flight::{follow_flight, tool};
 use crate::law::End;
-use crate::law::flight::{Flight, State};
+use crate::law::flight::{DirectionLimit, Flight, FlightLimits, State};
 use crate::limits::motion_limits::Scope;
 use crate::limits::tightening::Tightening;
 use crate::trajectory::Motion;
@@ -45,7 +45,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         };
         let to = state(&first, speed);
         let flown =
-            (self.task.turns == Turns::Fly).then(|| self.fly(&to, middle, shares)).flatten();
+            (self.task.turns == Turns::Fly).then(|| self.fly(run, &to, middle, shares)).flatten();
         let is_linear = self.limits.mechanism.is_linear();
         match flown {
             Some(entry) if is_linear => Ok(entry),
@@ -61,16 +61,41 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     }
 
     /// In one flight from where the tool is.
-    fn fly(&self, to: &State, middle: &PathFunction<'_>, shares: &Tightening) -> Option<Entry<N>> {
+    fn fly(
+        &self,
+        run: &PathRun<N>,
+        to: &State,
+        middle: &PathFunction<'_>,
+        shares: &Tightening,
+    ) -> Option<Entry<N>> {
         let from = match &self.front.moving {
             Some(state) => *state,
             None => State::rest(self.router(shares).tool().ok()?.position),
         };
         let now = self.front.now;
-        let follow = |flight: &Flight| follow_flight(&self.limits, self.area, &now, flight, shares);
-        let limits = self.flight_limits(shares, 1.0);
-        let flight = Flight::new(&from, to, &limits, &mut |flight| follow(flight).is_some())?;
-        let start = follow(&flight)?;
+        let follow = |flight: &Flight, most: f64| {
+            follow_flight(&self.limits, self.area, &now, flight, shares, most)
+        };
+        let make = |limits: &FlightLimits, directions: &[DirectionLimit]| {
+            Flight::within(&from, to, limits, directions)
+        };
+        let near = [now, run.trail[0].1];
+        let near = if self.limits.mechanism.is_linear() { &near[..1] } else { &near };
+        let found = self.flown(near, shares, &make, &|flight| follow(flight, FAR_BEYOND));
+        let (flight, followed) = match found {
+            Ok(found) => found,
+            Err(Unfit::Limits) => return None,
+            // A slower one may keep inside.
+            Err(Unfit::Place) => {
+                let mut fits =
+                    |flight: &Flight| follow(flight, 1.0).is_some_and(|followed| followed.fits());
+                let limits = self.flight_limits(shares);
+                let flight = Flight::new(&from, to, &limits, &mut fits)?;
+                let followed = follow(&flight, 1.0)?;
+                (flight, followed)
+            }
+        };
+        let start = followed.end;
         if self.limits.scope == Scope::Machine {
             walk(&self.limits, start, &[middle]).ok()?.within(&self.limits).ok()?;
         }
@@ -102,7 +127,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         };
         let near = self.joints_at(&still, &self.wanted_near(&still, &router.now)?)?;
         let run_in = self.run_in(to, &near, shares);
-        let run_in = run_in.ok_or(Refused::NoConfiguration { tried: RUN_TRIALS })?;
+        let run_in = run_in.ok_or(Refused::NoConfiguration { tried: FOLLOW_TRIALS })?;
         let into = |share: f64| tool(&run_in, run_in.duration() * share);
         let approach = router.approach(&into(0.0), &[&into, middle])?;
         motions.extend(approach.motion);

@@ -376,7 +376,10 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             run.begin = End::Moving { speed: fastest * shares.speed, acceleration: 0.0 };
             run.exit = run.begin;
             // The way to rest is there from the end of the path at this speed, or else from rest.
-            if self.front.goes_on || self.can_leave(run, fastest * shares.speed, shares) {
+            let law = TimeLaw::even(0.0, length, fastest * shares.speed, 0);
+            let keeps = || !self.tighten_tail(run, &law, &mut shares.clone());
+            let leaves = || self.can_leave(run, fastest * shares.speed, shares);
+            if self.front.goes_on || (keeps() && leaves()) {
                 return self.time(run, shares)?.map_err(|_| Refused::NoConfiguration { tried: 1 });
             }
             run.even = None;

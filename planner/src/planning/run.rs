@@ -16,6 +16,7 @@ use crate::error::PlanError;
 use crate::geometry::operation::{Operation, Operations};
 use crate::geometry::track::Track;
 use crate::job::{Job, MarkingSpeed};
+use crate::joint_space::directions::directions_near;
 use crate::law::optimum::Speeds;
 use crate::limits::motion_limits::Scope;
 use crate::plan::PlanFacts;
@@ -75,7 +76,8 @@ pub(crate) fn plan_windows(
     } else {
         Vec::new()
     };
-    let speeds = Speeds::choose(drawing.start, &open, &limits, &job.marking, &mut notes);
+    let near = directions_near(machine, limits, job.attitude, scope);
+    let speeds = Speeds::choose(drawing.start, &open, &limits, &near, &job.marking, &mut notes);
     drop(open);
     let standing = job
         .standing

@@ -9,15 +9,37 @@ use super::{Draft, Planning};
 use crate::error::PlanError;
 use crate::geometry::jet::Jet;
 use crate::joint_space::configuration::{Configuration, Refused};
-use crate::joint_space::follow_flight::{follow_flight, tool};
-use crate::law::flight::{Flight, FlightLimits, State};
+use crate::joint_space::directions::{Parts, directions};
+use crate::joint_space::follow_flight::{Followed, follow_flight, tool};
+use crate::law::flight::{DirectionLimit, Flight, FlightLimits, State};
 use crate::limits::motion_limits::Scope;
+use crate::limits::source::JointLimit;
 use crate::limits::tightening::Tightening;
 use crate::trajectory::Motion;
 
-/// How much slower a run-in or run-out is tried that the axes cannot follow, and how often.
-const RUN_SLOWER: f64 = 0.87;
-pub(super) const RUN_TRIALS: usize = 24;
+/// How often a flight is sought with less of the limits that the one before took too much of, how
+/// much of each it is to take then, and the least that is left of one at once.
+pub(super) const FOLLOW_TRIALS: usize = 8;
+const FITS: f64 = 0.9995;
+const LEAST_FIT: f64 = 0.5;
+
+/// A flight that takes so much of a limit is not followed further.
+pub(super) const FAR_BEYOND: f64 = 1e3;
+
+/// Why no flight was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unfit {
+    /// It goes where tool or joints cannot be.
+    Place,
+    /// No limits were found within which the joints can follow one.
+    Limits,
+}
+
+/// Finds a flight within limits of the tool and along directions.
+type Make<'a> = dyn Fn(&FlightLimits, &[DirectionLimit]) -> Option<Flight> + 'a;
+
+/// Says how the joints follow it.
+type Follow<'a, const N: usize> = dyn Fn(&Flight) -> Option<Followed<N>> + 'a;
 
 impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     /// Comes to rest, if the tool moves.
@@ -42,16 +64,16 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let Configuration { joints, mut branch } = run.trail[run.trail.len() - 1].1;
         let Ok(motion) = self.limits.follow(&tool, &mut branch, &joints) else { return false };
         let now = Configuration { joints: motion.position, branch };
-        self.run_out(&state(&end, speed), &now, shares).is_some()
+        self.run_out(&state(&end, speed), &now, &shares.with_reserve()).is_some()
     }
 
-    /// The tool's limits in a flight, with less of them where it is played slower.
-    pub(super) fn flight_limits(&self, shares: &Tightening, slower: f64) -> FlightLimits {
+    /// The tool's limits in a flight.
+    pub(super) fn flight_limits(&self, shares: &Tightening) -> FlightLimits {
         let path = &self.limits.path;
         FlightLimits {
             speed: shares.speed * path.rapid.max(path.speed),
-            acceleration: shares.acceleration * path.acceleration * slower * slower,
-            jerk: shares.jerk * path.jerk * slower * slower * slower,
+            acceleration: shares.acceleration * path.acceleration,
+            jerk: shares.jerk * path.jerk,
         }
     }
 
@@ -65,7 +87,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     ) -> Result<(Flight, Configuration<N>), Refused> {
         self.run_out(state, now, shares)
             .or_else(|| self.run_out(state, now, &Tightening::none(N)))
-            .ok_or(Refused::NoConfiguration { tried: RUN_TRIALS })
+            .ok_or(Refused::NoConfiguration { tried: FOLLOW_TRIALS })
     }
 
     /// The way to rest from `state`, and where the joints then stand.
@@ -75,20 +97,14 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         now: &Configuration<N>,
         shares: &Tightening,
     ) -> Option<(Flight, Configuration<N>)> {
-        let mut slower = 1.0;
-        for _ in 0..RUN_TRIALS {
-            let limits = self.flight_limits(shares, slower);
-            if state.acceleration.norm() >= 0.999 * limits.acceleration && slower < 1.0 {
-                return None;
-            }
-            if let Some(flight) = Flight::run_out(state, &limits)
-                && let Some(end) = follow_flight(&self.limits, self.area, now, &flight, shares)
-            {
-                return Some((flight, end));
-            }
-            slower *= RUN_SLOWER;
-        }
-        None
+        let make = |limits: &FlightLimits, directions: &[DirectionLimit]| {
+            Flight::run_out(state, limits, directions)
+        };
+        let follow = |flight: &Flight| {
+            follow_flight(&self.limits, self.area, now, flight, shares, FAR_BEYOND)
+        };
+        let (flight, followed) = self.flown(&[*now], shares, &make, &follow).ok()?;
+        Some((flight, followed.end))
     }
 
     /// The way from rest to `state`, where the joints are as in `start`.
@@ -98,21 +114,48 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         start: &Configuration<N>,
         shares: &Tightening,
     ) -> Option<Flight> {
-        let mut slower = 1.0;
-        for _ in 0..RUN_TRIALS {
-            let limits = self.flight_limits(shares, slower);
-            if state.acceleration.norm() >= 0.999 * limits.acceleration && slower < 1.0 {
-                return None;
+        let make = |limits: &FlightLimits, directions: &[DirectionLimit]| {
+            Flight::run_in(state, limits, directions)
+        };
+        let follow = |flight: &Flight| {
+            let first = self.before(flight, start)?;
+            follow_flight(&self.limits, self.area, &first, flight, shares, FAR_BEYOND)
+        };
+        self.flown(&[*start], shares, &make, &follow).ok().map(|(flight, _)| flight)
+    }
+
+    /// The flight that `make` finds within the limits of the tool, or within those and the ones of the
+    /// joints near `near`, which `follow` it; less and less of those that it takes too much of.
+    pub(super) fn flown(
+        &self,
+        near: &[Configuration<N>],
+        shares: &Tightening,
+        make: &Make<'_>,
+        follow: &Follow<'_, N>,
+    ) -> Result<(Flight, Followed<N>), Unfit> {
+        let limits = self.flight_limits(shares);
+        let mut parts: Parts<N> = [[1.0; JointLimit::COUNT]; N];
+        let mut sides = Vec::new();
+        for trial in 0..FOLLOW_TRIALS {
+            let flight = make(&limits, &sides).ok_or(Unfit::Limits)?;
+            let followed = follow(&flight).ok_or(Unfit::Place)?;
+            if followed.fits() {
+                return Ok((flight, followed));
             }
-            if let Some(flight) = Flight::run_in(state, &limits)
-                && let Some(first) = self.before(&flight, start)
-                && follow_flight(&self.limits, self.area, &first, &flight, shares).is_some()
-            {
-                return Some(flight);
+            if trial > 0 {
+                let parts = parts.iter_mut().flatten();
+                for (part, used) in parts.zip(followed.used.iter().flatten()) {
+                    *part *= if *used > 1.0 { (FITS / used).max(LEAST_FIT) } else { 1.0 };
+                }
             }
-            slower *= RUN_SLOWER;
+            sides.clear();
+            for near in near {
+                sides.extend(
+                    directions(&self.limits, near, shares, &parts).map_err(|_| Unfit::Place)?,
+                );
+            }
         }
-        None
+        Err(Unfit::Limits)
     }
 
     /// The joints at the start of a flight that ends in `end`.

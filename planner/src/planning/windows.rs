@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use machine::Mechanism;
 use messages::artwork::{Artwork, ArtworkLine, Stroke};
+use messages::time::CYCLE_TIME;
 use nalgebra::Vector3;
 
 use super::paths::PathRun;
@@ -12,12 +13,14 @@ use super::{Draft, Planning, Slowed};
 use crate::error::PlanError;
 use crate::geometry::contour::Contour;
 use crate::joint_space::configuration::{Configuration, Refused};
+use crate::joint_space::follow_flight::uses;
 use crate::law::flight::State;
 use crate::law::time_law::TimeLaw;
 use crate::law::windows::{between, straight};
 use crate::law::{End, Infeasible};
 use crate::limits::along::AlongPath;
-use crate::limits::source::Source;
+use crate::limits::motion_limits::Scope;
+use crate::limits::source::{JointLimit, Source};
 use crate::limits::tightening::Tightening;
 use crate::trajectory::Motion;
 
@@ -35,6 +38,16 @@ const SLOW: f64 = 0.99;
 /// rounding.
 const CHORD: f64 = Artwork::CHORD_ERROR * 0.8;
 
+/// The end of a stretch is sampled with the next, when nothing of it can be changed any more. So much
+/// of it [s] is held to the limits at once, looked at so often; what it may use of a limit of the joints
+/// and of one of the tool, what it is planned with if it takes more, and how often.
+const TAIL: f64 = 4.0 * CYCLE_TIME;
+const TAIL_LOOKS: u32 = 32;
+const TAIL_SHARE: f64 = 0.9997;
+const TAIL_TOOL: f64 = 1.0005;
+const TAIL_GOAL: f64 = 0.998;
+const TAIL_TRIALS: usize = 4;
+
 /// A stretch of a path, timed.
 pub(super) struct Timed {
     pub(super) law: TimeLaw,
@@ -45,8 +58,84 @@ pub(super) struct Timed {
 }
 
 impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
-    /// Times the next stretch of `run`.
+    /// Times the next stretch of `run`, such that its end keeps the limits.
     pub(super) fn time(
+        &self,
+        run: &PathRun<N>,
+        shares: &Tightening,
+    ) -> Result<Result<Timed, Infeasible>, Refused> {
+        let mut own = shares.clone();
+        let mut timed = self.time_within(run, &own)?;
+        for _ in 0..TAIL_TRIALS {
+            let Ok(found) = &timed else { break };
+            if run.even.is_some() || !self.tighten_tail(run, &found.law, &mut own) {
+                break;
+            }
+            let again = self.time_within(run, &own)?;
+            if again.is_ok() || run.at == 0.0 {
+                timed = again;
+            } else {
+                break;
+            }
+        }
+        Ok(timed)
+    }
+
+    /// Leaves less of what the end of `law` takes too much of. Says whether there was anything.
+    pub(super) fn tighten_tail(
+        &self,
+        run: &PathRun<N>,
+        law: &TimeLaw,
+        shares: &mut Tightening,
+    ) -> bool {
+        let all = Tightening::all(N);
+        let path = &self.limits.path;
+        let begin = law.duration() - TAIL;
+        let mut tool_uses = [0.0_f64; 3];
+        let mut joint_uses = [[0.0_f64; JointLimit::COUNT]; N];
+        for look in 0..=TAIL_LOOKS {
+            let time = begin + TAIL * f64::from(look) / f64::from(TAIL_LOOKS);
+            let now = law.at(time.max(0.0));
+            let tool = run.path.at(now.position).motion(now.velocity, now.acceleration, now.jerk);
+            let after = run.speeds.partition_point(|speed| speed.from <= now.position);
+            let speed = run.speeds[after.max(1) - 1].speed;
+            let used = [
+                tool.velocity.norm() / speed,
+                tool.acceleration.norm() / path.acceleration,
+                tool.jerk.norm() / path.jerk,
+            ];
+            tool_uses.iter_mut().zip(used).for_each(|(most, used)| *most = most.max(used));
+            if self.limits.scope == Scope::PathAlone {
+                continue;
+            }
+            let after = run.trail.partition_point(|(at, _)| *at <= now.position);
+            let near = &run.trail[after.max(1) - 1].1;
+            let Some(used) = uses(&self.limits, near, &tool, &all) else { continue };
+            let both = joint_uses.iter_mut().flatten().zip(used.iter().flatten());
+            both.for_each(|(most, used)| *most = most.max(*used));
+        }
+        let mut is_beyond = false;
+        let mut hold = |used: f64, most: f64, share: &mut f64| {
+            if used > most {
+                *share *= (TAIL_GOAL / used).max(0.5);
+                is_beyond = true;
+            }
+        };
+        hold(tool_uses[0], TAIL_TOOL, &mut shares.speed);
+        hold(tool_uses[1], TAIL_TOOL, &mut shares.acceleration);
+        hold(tool_uses[2], TAIL_TOOL, &mut shares.jerk);
+        for (used, axis) in joint_uses.into_iter().zip(&mut shares.axes) {
+            let [velocity, acceleration, jerk, torque, voltage] = used;
+            hold(velocity, TAIL_SHARE, &mut axis.velocity);
+            hold(acceleration, TAIL_SHARE, &mut axis.acceleration);
+            hold(jerk, TAIL_SHARE, &mut axis.jerk);
+            hold(torque, TAIL_SHARE, &mut axis.torque);
+            hold(voltage, TAIL_SHARE, &mut axis.voltage);
+        }
+        is_beyond
+    }
+
+    fn time_within(
         &self,
         run: &PathRun<N>,
         shares: &Tightening,

@@ -19,7 +19,8 @@ use proptest::prelude::*;
 pub const LINEAR: [&str; 3] = ["corexy", "cartesian", "cartesian_steppers"];
 
 /// All others.
-pub const CURVED: [&str; 5] = ["five_bar", "polar", "serial", "twin_actuator", "prrrp"];
+pub const CURVED: [&str; 7] =
+    ["five_bar", "polar", "serial", "twin_actuator", "prrrp", "mcm", "tri_planar"];
 
 static MACHINES: LazyLock<Vec<Machine>> = LazyLock::new(|| {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../machines"));
@@ -64,6 +65,8 @@ pub enum Element {
     Dot(f64),
     /// A stop between marks.
     Stop,
+    /// An output that is switched, and whether on.
+    Output(u32, bool),
     /// How corners are passed from here on: `None` at rest, or within this power of ten [m].
     Corners(Option<f64>),
     /// How is marked from here on: level, whether it follows the speed, and a power of ten of the
@@ -127,6 +130,7 @@ fn element() -> impl Strategy<Value = Element> {
         1 => (share(), share(), -1.0..0.5).prop_map(|(x, y, s)| Element::Feed(x, y, s)),
         1 => (0.001..0.01).prop_map(Element::Dot),
         1 => Just(Element::Stop),
+        1 => (0..64_u32, any::<bool>()).prop_map(|(bit, on)| Element::Output(bit, on)),
         2 => prop::option::of(-6.0..-4.0).prop_map(Element::Corners),
         3 => (0.05..1.0, any::<bool>(), prop::option::of(-1.5..0.3))
             .prop_map(|(level, follows, speed)| Element::Power(level, follows, speed)),
@@ -151,15 +155,6 @@ fn ten(power: f64) -> f64 {
     pow(10.0, power)
 }
 
-impl Limits {
-    /// Whether a limit of the axes of their own bounds how a line is entered from a run-in, which is
-    /// slowed as a whole then: raising the path's limit `which` can make it slower.
-    pub fn has_axis_limits_below_the_paths(&self, which: usize) -> bool {
-        let own = self.axis_acceleration.is_some() || self.axis_jerk.is_some();
-        matches!(which, 0..=3) && (own || self.axis_velocity < 0.0)
-    }
-}
-
 impl Case {
     /// Whether something is marked at one speed, entered from a run-in.
     pub fn marks_at_one_speed(&self) -> bool {
@@ -177,12 +172,6 @@ impl Case {
             }
         }
         found
-    }
-
-    /// Whether a line at one speed may end where an axis is at a lowered speed limit and still
-    /// quickens: the way to rest from there goes beyond that limit.
-    pub fn leaves_at_an_axis_speed_limit(&self) -> bool {
-        self.limits.axis_velocity < 0.0 && self.marks_at_one_speed()
     }
 
     /// The machine with the case's limits.
@@ -293,6 +282,7 @@ impl Pen {
             }
             Element::Dot(time) => self.push(Action::Dwell { time, lit: Some(0.3) }),
             Element::Stop => self.push(Action::Dwell { time: 0.0, lit: None }),
+            Element::Output(bit, on) => self.push(Action::Output { bit, on }),
             Element::Corners(None) => self.push(Action::Corners(Corners::Exact)),
             Element::Corners(Some(power)) => {
                 self.push(Action::Corners(Corners::Blend(Some(ten(power)))));

@@ -1,7 +1,7 @@
 //! What every plan must keep, seen from its setpoints alone: nothing here believes what a setpoint says
 //! of its own derivatives.
 
-use machine::{Axis, Machine};
+use machine::{Axis, DcMotor, Machine, Motor, StepperMotor};
 use messages::Setpoint;
 use messages::setpoint::flags;
 use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
@@ -21,6 +21,9 @@ const GLIMMER: i64 = 2;
 
 /// What rounding makes of the speed of a tool that stands [m/s].
 const STANDING: f64 = 1e-9;
+
+/// Speed below which a shaft stands and its friction takes no side [rad/s].
+const STANDING_SHAFT: f64 = 1e-6;
 
 type Found = Result<(), String>;
 
@@ -42,6 +45,7 @@ pub fn keeps_everything(setpoints: &[Setpoint], job: &Job, machine: &Machine) ->
     keeps_tool_limits(setpoints, machine)?;
     for (index, axis) in machine.axes.iter().enumerate() {
         keeps_axis_limits(setpoints, index, axis)?;
+        keeps_motor_limits(setpoints, index, axis)?;
     }
     keeps_dark(setpoints, job, machine)
 }
@@ -148,6 +152,73 @@ fn keeps_axis_limits(setpoints: &[Setpoint], index: usize, axis: &Axis) -> Found
     keeps(&first, axis.limits.velocity, noise[0], &name("velocity"))?;
     keeps(&second, axis.limits.acceleration, noise[1], &name("acceleration"))?;
     keeps(&third, axis.limits.jerk, noise[2], &name("jerk"))
+}
+
+/// What a motor's shaft does in the cycle before a setpoint: its mean speed [rad/s], and its torque at
+/// the end of it [N·m].
+#[derive(Clone, Copy)]
+struct Shaft {
+    speed: f64,
+    torque: f64,
+}
+
+/// Torque is the effort and the friction of a shaft that turns; the spring of the transmission makes
+/// the motor turn otherwise than the joint.
+fn shafts(setpoints: &[Setpoint], index: usize, axis: &Axis) -> Vec<Shaft> {
+    let angle =
+        |setpoint: &Setpoint| (setpoint.position[index] + setpoint.lead[index]) / axis.ratio;
+    let turns = setpoints.windows(2).map(|pair| {
+        let speed = (angle(&pair[1]) - angle(&pair[0])) / CYCLE_TIME;
+        let stands = speed.abs() < STANDING_SHAFT;
+        let coulomb = if stands { 0.0 } else { axis.friction.coulomb.copysign(speed) };
+        let torque = pair[1].effort[index] + coulomb + axis.friction.viscous * speed;
+        Shaft { speed, torque }
+    });
+    turns.collect()
+}
+
+fn keeps_motor_limits(setpoints: &[Setpoint], index: usize, axis: &Axis) -> Found {
+    let shafts = shafts(setpoints, index, axis);
+    match &axis.motor {
+        Motor::Dc(motor) => keeps_dc_limits(&shafts, motor),
+        Motor::Stepper(motor) => keeps_stepper_limits(&shafts, motor),
+    }
+    .map_err(|found| format!("axis {}: {found}", axis.name))
+}
+
+/// i = τ/k and R·i + L·i′ + k·ω, within what the machine leaves a plan of the power stage.
+fn keeps_dc_limits(shafts: &[Shaft], motor: &DcMotor) -> Found {
+    let constant = motor.torque_constant;
+    let mut before = shafts.first().map_or(0.0, |shaft| shaft.torque / constant);
+    for (cycle, shaft) in shafts.iter().enumerate() {
+        let current = shaft.torque / constant;
+        let voltage = motor.resistance * (current + before) / 2.0
+            + motor.inductance * (current - before) / CYCLE_TIME
+            + constant * shaft.speed;
+        let (most_current, most_voltage) = (motor.current_limit().plan, motor.voltage_limit().plan);
+        if current.abs() > most_current * ALLOWANCE || voltage.abs() > most_voltage * ALLOWANCE {
+            return Err(format!(
+                "{current} A of {most_current} A, {voltage} V of {most_voltage} V in cycle {cycle}"
+            ));
+        }
+        before = current;
+    }
+    Ok(())
+}
+
+/// The torque over the speed, by the curve of the machine, and the pulses.
+fn keeps_stepper_limits(shafts: &[Shaft], motor: &StepperMotor) -> Found {
+    for (cycle, Shaft { speed, torque }) in shafts.iter().enumerate() {
+        let most = motor.pull_out_torque(*speed);
+        let pulses = speed.abs() * motor.pulses_per_turn() / core::f64::consts::TAU;
+        if torque.abs() > most * ALLOWANCE || pulses > motor.pulse_rate * ALLOWANCE {
+            return Err(format!(
+                "{torque} N·m of {most} N·m, {pulses} pulses a second of {} in cycle {cycle}",
+                motor.pulse_rate
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Time [ns] in which the gate is open in a cycle.

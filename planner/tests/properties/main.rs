@@ -1,7 +1,7 @@
 //! What every plan of every drawing must keep, on random machines and drawings that shrink to the
 //! smallest that fails.
 //!
-//! Some hundred cases by default, the same ones each time; as many as are asked for, and others, by
+//! Ten thousand cases by default, the same ones each time; as many as are asked for, and others, by
 //! `GRAVER_CASES=1000000 GRAVER_SEED=7 cargo test --release -p planner --test properties`.
 
 #![allow(missing_docs, unreachable_pub, clippy::unwrap_used)]
@@ -18,10 +18,14 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
 
 /// Cases of all tests together.
-const CASES: u32 = 600;
+const CASES: u32 = 10_000;
 
 /// How much longer a job may get where it should not: the law is optimal to a few parts in a thousand.
 const LONGER: f64 = 1.01;
+
+/// The same of lines at one speed that the job leaves open: it is chosen by the runs in and out and the
+/// moves between, as if the tool stopped there, and by what the joints leave at a few places.
+const LONGER_OPEN: f64 = 1.15;
 
 /// What sampling adds to a duration [s].
 const CYCLES: f64 = 3e-3;
@@ -47,9 +51,7 @@ fn for_cases(
     seed[..8].copy_from_slice(&of("GRAVER_SEED").unwrap_or(0).to_le_bytes());
     let random = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
     let mut runner = TestRunner::new_with_rng(config, random);
-    let found = runner.run(&(case(range), change()), |(case, change)| {
-        if case.leaves_at_an_axis_speed_limit() { Ok(()) } else { test(&case, &change) }
-    });
+    let found = runner.run(&(case(range), change()), |(case, change)| test(&case, &change));
     if let Err(failure) = found {
         panic!("{failure}");
     }
@@ -120,19 +122,22 @@ fn is_dot(element: &Element) -> bool {
 }
 
 fn raised_limits_never_cost_time(case: &Case, change: &Change) -> Result<(), TestCaseError> {
-    if case.limits.has_axis_limits_below_the_paths(change.which) || chooses_speeds(case, change) {
-        return Ok(());
-    }
     let machine = case.machine();
     let job = case.job(&machine);
     let mut better = machine.clone();
     change.raise(&mut better);
     let Some((slow, fast)) = plan_both(&machine, &job, &better, &job)? else { return Ok(()) };
-    prop_assert!(fast <= slow * LONGER + CYCLES, "{fast} s with more, {slow} s with less");
+    if case.marks_at_one_speed() && (slow.marks_slower || fast.marks_slower) {
+        return Ok(());
+    }
+    let longer = if case.marks_at_one_speed() { LONGER_OPEN } else { LONGER };
+    let (slow, fast) = (slow.duration, fast.duration);
+    prop_assert!(fast <= slow * longer + CYCLES, "{fast} s with more, {slow} s with less");
     Ok(())
 }
 
 fn lowered_feeds_never_save_time(case: &Case, change: &Change) -> Result<(), TestCaseError> {
+    // At one speed a lower feed has a shorter run-in and run-out, which can save more than it costs.
     if case.marks_at_one_speed() {
         return Ok(());
     }
@@ -141,13 +146,9 @@ fn lowered_feeds_never_save_time(case: &Case, change: &Change) -> Result<(), Tes
     let mut slower = job.clone();
     slower.drawing.steps.iter_mut().for_each(|step| lower(step, machine.path.speed, change.factor));
     let Some((slow, fast)) = plan_both(&machine, &slower, &machine, &job)? else { return Ok(()) };
+    let (slow, fast) = (slow.duration, fast.duration);
     prop_assert!(fast <= slow * LONGER + CYCLES, "{fast} s as drawn, {slow} s at a lower feed");
     Ok(())
-}
-
-/// Whether a higher speed is not quicker: lines at one speed have a run-in, which is longer then.
-fn chooses_speeds(case: &Case, change: &Change) -> bool {
-    change.which == 0 && case.marks_at_one_speed()
 }
 
 fn lower(step: &mut Step, most: f64, factor: f64) {
@@ -158,19 +159,37 @@ fn lower(step: &mut Step, most: f64, factor: f64) {
     }
 }
 
-/// The durations of two plans, unless one is refused for a place.
+/// What two plans are compared by.
+struct Timed {
+    duration: f64,
+    /// Whether a limit slows a line below what it asks for. Of lines at one speed, such a one is marked
+    /// faster where there is more of the limit, from a longer run-in.
+    marks_slower: bool,
+}
+
+/// Both plans, unless one is refused for a place.
 fn plan_both(
     one: &Machine,
     job: &Job,
     other: &Machine,
     other_job: &Job,
-) -> Result<Option<(f64, f64)>, TestCaseError> {
-    let duration = |machine: &Machine, job: &Job| match plan(machine, job) {
-        Ok(plan) => Ok(Some(plan.facts.duration)),
+) -> Result<Option<(Timed, Timed)>, TestCaseError> {
+    let timed = |machine: &Machine, job: &Job| match plan(machine, job) {
+        Ok(plan) => {
+            let asks_for_more = job.drawing.steps.iter().any(|step| match &step.action {
+                Action::Mark { speed, .. } => speed.is_some_and(|speed| speed > machine.path.speed),
+                _ => false,
+            });
+            let is_slowed = |note: &planner::drawing::Note| {
+                note.text.starts_with("slowed") || note.text.contains("in proportion")
+            };
+            let marks_slower = asks_for_more || plan.facts.notes.iter().any(is_slowed);
+            Ok(Some(Timed { duration: plan.facts.duration, marks_slower }))
+        }
         Err(error) if checks::is_sound(&error) => Ok(None),
         Err(error) => Err(TestCaseError::fail(format!("refused: {error}"))),
     };
-    Ok(duration(one, job)?.zip(duration(other, other_job)?))
+    Ok(timed(one, job)?.zip(timed(other, other_job)?))
 }
 
 #[test]

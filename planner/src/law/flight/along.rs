@@ -13,7 +13,7 @@ pub(super) fn leave(square: &[f64; 3]) -> f64 {
 }
 
 /// The length in (0, `top`) at which the barrier of `squares` with `slope` has its least.
-pub(super) fn along<const C: usize>(squares: &[[f64; 3]; C], slope: f64, top: f64) -> f64 {
+pub(super) fn along(squares: &[[f64; 3]], slope: f64, top: f64) -> f64 {
     let (mut low, mut high) = (0.0, top);
     let mut length = (0.9 * top).min(1.0);
     for _ in 0..6 {

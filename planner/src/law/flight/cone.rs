@@ -1,18 +1,20 @@
 //! The limits of a flight as cones: linear in the coefficients of its velocity.
 
+use super::direction::Side;
 use super::grid::{Grid, INTERVALS};
 
 /// Coefficients of the velocity that are free.
 pub(super) const FREE: usize = INTERVALS - 2;
 
-/// Cones: acceleration at inner breaks, jerk in intervals, free coefficients.
-pub(super) const CONES: usize = 3 * INTERVALS - 3;
+/// Accelerations at inner breaks, jerks in intervals, free coefficients: the cones of one limit of
+/// all three.
+const CONES: usize = 3 * INTERVALS - 3;
 
 /// How much of the share the speed takes: little, as a line's own speed may be the limit.
 const SHARE: f64 = 0.1;
 
 /// The ends and limits of a flight in its own plane (`D` = 2) or space (3).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Task<const D: usize> {
     /// At start and end [m/s].
     pub velocity: [[f64; D]; 2],
@@ -22,6 +24,8 @@ pub(super) struct Task<const D: usize> {
     pub displacement: Option<[f64; D]>,
     /// [m/s], [m/s²], [m/s³].
     pub limits: [f64; 3],
+    /// What else there is along single directions.
+    pub sides: Vec<Side<D>>,
 }
 
 /// A vector whose norm is to stay below a radius, and what the step does to it.
@@ -38,6 +42,8 @@ pub(super) struct Cone<const D: usize> {
     pub constant: [f64; D],
     /// Growth of its radius with the share: 1 or [`SHARE`].
     pub slope: f64,
+    /// The direction along which alone it holds, of length 1.
+    pub direction: Option<[f64; D]>,
 }
 
 /// The scalar product.
@@ -51,7 +57,28 @@ pub(super) fn dot<const D: usize>(left: &[f64; D], right: &[f64; D]) -> f64 {
 
 impl<const D: usize> Cone<D> {
     fn new(first: usize, factors: [f64; 3], constant: [f64; D], slope: f64) -> Self {
-        Self { at: [0.0; D], step: [0.0; D], first, factors, constant, slope }
+        let (at, step) = ([0.0; D], [0.0; D]);
+        Self { at, step, first, factors, constant, slope, direction: None }
+    }
+
+    /// `vector` as far as the cone holds it.
+    fn held(&self, vector: [f64; D]) -> [f64; D] {
+        match &self.direction {
+            Some(direction) => {
+                let part = dot(direction, &vector);
+                direction.map(|axis| axis * part)
+            }
+            None => vector,
+        }
+    }
+
+    /// The matrix that does the same.
+    pub(super) fn holds(&self, row: usize, column: usize) -> f64 {
+        match &self.direction {
+            Some(direction) => direction[row] * direction[column],
+            None if row == column => 1.0,
+            None => 0.0,
+        }
     }
 
     /// The linear part for `coefficients`.
@@ -64,7 +91,7 @@ impl<const D: usize> Cone<D> {
                 sum[axis] += factor * coefficient[axis];
             }
         }
-        sum
+        self.held(sum)
     }
 
     /// What the norm is to stay below at `share`.
@@ -74,32 +101,58 @@ impl<const D: usize> Cone<D> {
 }
 
 /// The cones of `task` over `grid`.
-pub(super) fn cones<const D: usize>(task: &Task<D>, grid: &Grid) -> [Cone<D>; CONES] {
-    let [speed, acceleration, jerk] = task.limits;
-    let zero = [0.0; D];
-    let mut cones = [Cone::new(0, [0.0; 3], zero, 1.0); CONES];
-    let (accelerations, rest) = cones.split_at_mut(INTERVALS - 1);
-    let (jerks, speeds) = rest.split_at_mut(INTERVALS);
-    for (index, cone) in accelerations.iter_mut().enumerate() {
-        let factor = 1.0 / (acceleration * grid.gap(index + 1));
-        *cone = Cone::new(index, [-factor, factor, 0.0], zero, 1.0);
-    }
-    for (index, cone) in jerks.iter_mut().enumerate() {
-        let scale = 1.0 / (jerk * grid.steps[index]);
-        let end = |value: [f64; D], sign: f64| value.map(|part| sign * scale * part);
-        *cone = if index == 0 {
-            let factor = scale / grid.gap(1);
-            Cone::new(0, [-factor, factor, 0.0], end(task.acceleration[0], -1.0), 1.0)
-        } else if index == INTERVALS - 1 {
-            let factor = scale / grid.gap(index);
-            Cone::new(index - 1, [factor, -factor, 0.0], end(task.acceleration[1], 1.0), 1.0)
-        } else {
-            let (before, after) = (scale / grid.gap(index), scale / grid.gap(index + 1));
-            Cone::new(index - 1, [before, -before - after, after], zero, 1.0)
-        };
-    }
-    for (index, cone) in speeds.iter_mut().enumerate() {
-        *cone = Cone::new(index + 1, [1.0 / speed, 0.0, 0.0], zero, SHARE);
+pub(super) fn cones<const D: usize>(task: &Task<D>, grid: &Grid) -> Vec<Cone<D>> {
+    let mut cones = Vec::with_capacity(CONES * (1 + task.sides.len()));
+    add(task, grid, None, &task.limits, &mut cones);
+    for side in &task.sides {
+        let of = |(limit, all): (f64, f64)| if limit < all { limit } else { f64::INFINITY };
+        let [speed, acceleration, jerk] = side.limits;
+        let [all_speed, all_acceleration, all_jerk] = task.limits;
+        let limits =
+            [(speed, all_speed), (acceleration, all_acceleration), (jerk, all_jerk)].map(of);
+        add(task, grid, Some(side.direction), &limits, &mut cones);
     }
     cones
+}
+
+/// Adds the cones of those of `limits` that are finite.
+fn add<const D: usize>(
+    task: &Task<D>,
+    grid: &Grid,
+    direction: Option<[f64; D]>,
+    [speed, acceleration, jerk]: &[f64; 3],
+    cones: &mut Vec<Cone<D>>,
+) {
+    let zero = [0.0; D];
+    let mut push = |cone: Cone<D>| {
+        let cone = Cone { direction, ..cone };
+        cones.push(Cone { constant: cone.held(cone.constant), ..cone });
+    };
+    if acceleration.is_finite() {
+        for index in 0..INTERVALS - 1 {
+            let factor = 1.0 / (acceleration * grid.gap(index + 1));
+            push(Cone::new(index, [-factor, factor, 0.0], zero, 1.0));
+        }
+    }
+    if jerk.is_finite() {
+        for index in 0..INTERVALS {
+            let scale = 1.0 / (jerk * grid.steps[index]);
+            let end = |value: [f64; D], sign: f64| value.map(|part| sign * scale * part);
+            push(if index == 0 {
+                let factor = scale / grid.gap(1);
+                Cone::new(0, [-factor, factor, 0.0], end(task.acceleration[0], -1.0), 1.0)
+            } else if index == INTERVALS - 1 {
+                let factor = scale / grid.gap(index);
+                Cone::new(index - 1, [factor, -factor, 0.0], end(task.acceleration[1], 1.0), 1.0)
+            } else {
+                let (before, after) = (scale / grid.gap(index), scale / grid.gap(index + 1));
+                Cone::new(index - 1, [before, -before - after, after], zero, 1.0)
+            });
+        }
+    }
+    if speed.is_finite() {
+        for index in 1..=FREE {
+            push(Cone::new(index, [1.0 / speed, 0.0, 0.0], zero, SHARE));
+        }
+    }
 }

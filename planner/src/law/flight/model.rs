@@ -35,8 +35,7 @@ impl<const D: usize, const W: usize, const R: usize> Model<D, W, R> {
         self.share[1] += cone.slope * cone.slope * (radius * radius * square - inverse);
         let block: [[f64; D]; D] = core::array::from_fn(|row| {
             core::array::from_fn(|column| {
-                let diagonal = if row == column { inverse } else { 0.0 };
-                square * cone.at[row] * cone.at[column] + diagonal
+                square * cone.at[row] * cone.at[column] + inverse * cone.holds(row, column)
             })
         });
         let mixed = cone.slope * radius * square;

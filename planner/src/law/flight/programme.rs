@@ -12,7 +12,7 @@
 
 use super::along::{along, leave};
 use super::band::small;
-use super::cone::{CONES, Cone, Task, cones, dot};
+use super::cone::{Cone, Task, cones, dot};
 use super::grid::{Grid, INTERVALS};
 use super::model::Model;
 
@@ -41,7 +41,9 @@ pub(super) struct Answer<const D: usize> {
 
 /// The programme at one duration. `W` = 3·`D`, `R` = `D`·[`FREE`], `C` = `D` + 2.
 struct Programme<const D: usize, const W: usize, const R: usize, const C: usize> {
-    cones: [Cone<D>; CONES],
+    cones: Vec<Cone<D>>,
+    /// The terms of its barrier along a step.
+    squares: Vec<[f64; 3]>,
     weights: [f64; INTERVALS],
     share: f64,
     coefficients: [[f64; D]; INTERVALS],
@@ -62,6 +64,7 @@ impl<const D: usize, const W: usize, const R: usize, const C: usize> Programme<D
         });
         let mut programme = Self {
             cones: cones(task, grid),
+            squares: Vec::new(),
             weights,
             share: 0.0,
             coefficients,
@@ -172,19 +175,20 @@ impl<const D: usize, const W: usize, const R: usize, const C: usize> Programme<D
 
     /// Goes along `step` and `change` to the least of the barrier.
     fn advance(&mut self, step: &[[f64; D]; INTERVALS], change: f64, price: f64) {
-        let mut squares = [[0.0; 3]; CONES];
+        self.squares.clear();
         let mut top = f64::INFINITY;
-        for (cone, square) in self.cones.iter_mut().zip(&mut squares) {
+        for cone in &mut self.cones {
             cone.step = cone.apply(step);
             let (radius, growth) = (cone.radius(self.share), cone.slope * change);
-            *square = [
+            let square = [
                 radius * radius - dot(&cone.at, &cone.at),
                 2.0 * (radius * growth - dot(&cone.at, &cone.step)),
                 growth * growth - dot(&cone.step, &cone.step),
             ];
-            top = top.min(leave(square));
+            top = top.min(leave(&square));
+            self.squares.push(square);
         }
-        let length = along(&squares, price * change, top);
+        let length = along(&self.squares, price * change, top);
         for cone in &mut self.cones {
             for axis in 0..D {
                 cone.at[axis] += length * cone.step[axis];
@@ -211,7 +215,7 @@ pub(super) fn solve<const D: usize, const W: usize, const R: usize, const C: usi
     goal: f64,
 ) -> Answer<D> {
     let mut programme = Programme::<D, W, R, C>::new(task, grid, guess, off);
-    let weight = 2.0 * CONES as f64;
+    let weight = 2.0 * programme.cones.len() as f64;
     let mut gap = off.max(goal);
     for _ in 0..40 {
         let share = programme.share;

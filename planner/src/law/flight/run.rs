@@ -16,7 +16,7 @@ use core::f64::consts::{FRAC_PI_2, SQRT_2};
 use messages::math;
 use nalgebra::Vector3;
 
-use super::{Flight, FlightLimits, ROUNDING, State, search};
+use super::{DirectionLimit, Flight, FlightLimits, ROUNDING, State, search};
 use crate::law::profile::Ramp;
 
 /// Lateral acceleration below which a line starts straight [m/s²].
@@ -38,7 +38,11 @@ struct Pair {
 }
 
 /// The shortest found from rest into `to`; `None` where there is none.
-pub(super) fn into(to: &State, limits: &FlightLimits) -> Option<Flight> {
+pub(super) fn into(
+    to: &State,
+    limits: &FlightLimits,
+    directions: &[DirectionLimit],
+) -> Option<Flight> {
     let speed = to.velocity.norm();
     let wanted = to.acceleration.norm();
     if !to.is_finite() {
@@ -54,9 +58,12 @@ pub(super) fn into(to: &State, limits: &FlightLimits) -> Option<Flight> {
         jerk: limits.jerk,
     };
     if wanted <= STRAIGHT {
-        return Some(paired(to, &limits));
+        return Some(paired(to, &limits.along(&to.velocity, directions)));
     }
-    let gridded = search::free(to, &limits);
+    let gridded = search::free(to, &limits, directions);
+    if !directions.is_empty() {
+        return gridded;
+    }
     let across = to.velocity.dot(&to.acceleration).abs() <= 1e-9 * speed * wanted;
     let paired = across.then(|| paired(to, &limits));
     search::shorter(gridded, paired)

@@ -11,7 +11,7 @@ use super::cone::Task;
 use super::frame::Frame;
 use super::grid::{Grid, INTERVALS, Spacing};
 use super::programme::{Answer, solve};
-use super::{Flight, FlightLimits, LONGEST, ROUNDING, State};
+use super::{DirectionLimit, Flight, FlightLimits, LONGEST, ROUNDING, State};
 use crate::law::profile::Ramp;
 
 /// Nearness of the found duration to the next that is too short.
@@ -25,6 +25,11 @@ const ROUGH: f64 = 0.1;
 
 /// To what part it is found in the end.
 const FINE: f64 = 0.008;
+
+/// A duration that is so much longer, and needs so much of the share before it, is no way to go on;
+/// so often.
+const STALLED: [f64; 2] = [1.2, 0.99];
+const STALLS: usize = 3;
 
 /// Lowerings of the limits by a quarter, and bisections after the first that fits.
 const LOWERINGS: usize = 30;
@@ -50,14 +55,14 @@ pub(super) fn fitting(
     limits: &FlightLimits,
     fits: &mut dyn FnMut(&Flight) -> bool,
 ) -> Option<Flight> {
-    let full = shortest(from, to, limits)?;
+    let full = shortest(from, to, limits, &[])?;
     if fits(&full) {
         return Some(full);
     }
     WAYS.into_iter().fold(None, |best, way| {
         let mut attempt = |part: f64| {
             let lower = lower(from, to, limits, part, way)?;
-            let flight = shortest(from, to, &lower)?;
+            let flight = shortest(from, to, &lower, &[])?;
             let good = fits(&flight);
             Some((flight, good))
         };
@@ -121,8 +126,13 @@ fn lower(
     (lower != *limits).then_some(lower)
 }
 
-/// The shortest flight within `limits`; `None` where it would take too long.
-fn shortest(from: &State, to: &State, limits: &FlightLimits) -> Option<Flight> {
+/// The shortest flight within `limits` and those of `directions`; `None` where it would take too long.
+pub(super) fn shortest(
+    from: &State,
+    to: &State,
+    limits: &FlightLimits,
+    directions: &[DirectionLimit],
+) -> Option<Flight> {
     let way = to.position - from.position;
     let change = to.velocity - from.velocity;
     let curved = from.acceleration != to.acceleration;
@@ -131,7 +141,7 @@ fn shortest(from: &State, to: &State, limits: &FlightLimits) -> Option<Flight> {
     }
     let straight = from.acceleration.norm() == 0.0 && !curved;
     if straight && from.velocity.norm() == 0.0 && to.velocity.norm() == 0.0 {
-        return Some(Flight::straight(from, to, limits))
+        return Some(Flight::straight(from, to, &limits.along(&way, directions)))
             .filter(|flight| flight.duration <= LONGEST);
     }
     if straight && change.norm() <= ROUNDING {
@@ -141,21 +151,27 @@ fn shortest(from: &State, to: &State, limits: &FlightLimits) -> Option<Flight> {
             return Some(Flight::through(from, to, &[duration], accelerations));
         }
     }
-    within_speed(from, to, true, limits)
+    within_speed(from, to, true, limits, directions)
 }
 
 /// The shortest flight at whose curved ends, too, the speed is kept.
 ///
 /// The programme sees the speed between the ends only. Right at an end that is curved, and as fast
 /// as may be, the first phase must slow down soon enough, which a lower speed after it makes it do.
-fn within_speed(from: &State, to: &State, placed: bool, limits: &FlightLimits) -> Option<Flight> {
+fn within_speed(
+    from: &State,
+    to: &State,
+    placed: bool,
+    limits: &FlightLimits,
+    directions: &[DirectionLimit],
+) -> Option<Flight> {
     let frame = Frame::new(from, to);
     let mut inner = *limits;
     for _ in 0..RETRIES {
         let flight = if frame.flat {
-            seek::<2, 6, 24, 4>(from, to, &frame, placed, &inner)
+            seek::<2, 6, 24, 4>(from, to, &frame, placed, &inner, directions)
         } else {
-            seek::<3, 9, 36, 5>(from, to, &frame, placed, &inner)
+            seek::<3, 9, 36, 5>(from, to, &frame, placed, &inner, directions)
         };
         let flight = flight.filter(|flight| flight.keeps_speed(limits.speed));
         let straight = from.acceleration.norm() == 0.0 && to.acceleration.norm() == 0.0;
@@ -168,9 +184,13 @@ fn within_speed(from: &State, to: &State, placed: bool, limits: &FlightLimits) -
 }
 
 /// From rest anywhere into `to`, over the breaks of a grid.
-pub(super) fn free(to: &State, limits: &FlightLimits) -> Option<Flight> {
+pub(super) fn free(
+    to: &State,
+    limits: &FlightLimits,
+    directions: &[DirectionLimit],
+) -> Option<Flight> {
     let from = State::rest(to.position);
-    within_speed(&from, to, false, limits)
+    within_speed(&from, to, false, limits, directions)
 }
 
 /// The shortest flight in `frame`; `placed` where `from` is at its position.
@@ -180,14 +200,19 @@ fn seek<const D: usize, const W: usize, const R: usize, const C: usize>(
     frame: &Frame,
     placed: bool,
     limits: &FlightLimits,
+    directions: &[DirectionLimit],
 ) -> Option<Flight> {
     let task = Task::<D> {
         velocity: [frame.down(&from.velocity), frame.down(&to.velocity)],
         acceleration: [frame.down(&from.acceleration), frame.down(&to.acceleration)],
         displacement: placed.then(|| frame.down(&(to.position - from.position))),
         limits: [limits.speed, limits.acceleration, limits.jerk],
+        sides: directions.iter().filter_map(|side| side.down(frame)).collect(),
     };
-    let search = Search::<D, W, R, C>::new(&task, from, to, placed, limits);
+    let change = to.velocity - from.velocity;
+    let way = if change.norm() > ROUNDING { change } else { to.position - from.position };
+    let search =
+        Search::<D, W, R, C>::new(&task, from, to, placed, &limits.along(&way, directions));
     let found = search.run()?;
     let steps = &found.grid.steps;
     let coefficients = &found.answer.coefficients;
@@ -304,6 +329,7 @@ impl<'a, const D: usize, const W: usize, const R: usize, const C: usize> Search<
     fn run(&self) -> Option<Found<D>> {
         let mut found = self.trial(self.least.max(1e-9) * BEGIN, ROUGH, None);
         let mut short = None;
+        let mut stalled = 0;
         for _ in 0..100 {
             let Answer { share, gap, .. } = found.answer;
             let duration = found.duration;
@@ -321,6 +347,16 @@ impl<'a, const D: usize, const W: usize, const R: usize, const C: usize> Search<
                     Some(short) => self.refine(short, found),
                     None => found,
                 });
+            }
+            // More time makes no difference where it is an end that is beyond a limit.
+            if let Some((before, other)) = short
+                && duration > STALLED[0] * before
+                && likely > STALLED[1] * other
+            {
+                stalled += 1;
+                if stalled == STALLS {
+                    return None;
+                }
             }
             let power = match short {
                 Some((before, other)) => {

@@ -4,6 +4,7 @@ use crate::random::logarithmic;
 use messages::math;
 use messages::random::SplitMix64;
 
+mod directions;
 mod jobs;
 mod runs;
 mod turns;

@@ -37,7 +37,7 @@ fn total(lines: &[Line], speed: f64, limits: &FlightLimits, fits: Fits) -> f64 {
         time += flight.duration() + (last - first).norm() / speed;
         state = moving(*last, velocity);
     }
-    time + Flight::run_out(&state, limits).unwrap().duration()
+    time + Flight::run_out(&state, limits, &[]).unwrap().duration()
 }
 
 /// Two belts at 45°, each within 10 m/s² and 1 m/s.
