@@ -59,6 +59,8 @@ pub(crate) struct Joining {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Contour {
     tracks: Vec<Track>,
+    /// Where each of them begins [m].
+    starts: Vec<f64>,
     blends: Vec<Blend>,
     demands: Vec<Demand>,
     /// How its light goes with its speed.
@@ -76,6 +78,7 @@ impl Contour {
         let line = demands.first().map_or(0, |demand| demand.line);
         Self {
             tracks: vec![track],
+            starts: vec![0.0],
             blends: Vec::new(),
             demands: demands.to_vec(),
             policy,
@@ -129,6 +132,7 @@ impl Contour {
         for demand in demands {
             self.ask(Demand { from: self.length + demand.from, ..*demand });
         }
+        self.starts.push(self.length);
         self.length += track.length();
         self.bend = self.bend.or(track.bend());
         self.tracks.push(track.clone());
@@ -154,8 +158,14 @@ impl Contour {
 
     /// Each stretch with where it ends [m].
     pub(crate) fn stretches(&self) -> impl Iterator<Item = (Demand, f64)> + '_ {
-        let ends = self.demands.iter().skip(1).map(|demand| demand.from).chain([self.length]);
-        self.demands.iter().copied().zip(ends)
+        self.stretches_from(0)
+    }
+
+    /// The same from the demand with this number on.
+    pub(crate) fn stretches_from(&self, first: usize) -> impl Iterator<Item = (Demand, f64)> + '_ {
+        let demands = self.demands.get(first..).unwrap_or_default();
+        let ends = demands.iter().skip(1).map(|demand| demand.from).chain([self.length]);
+        demands.iter().copied().zip(ends)
     }
 
     /// Whether anything of it is marked.
@@ -188,28 +198,29 @@ impl Contour {
 
     /// The point of the drawn line at `distance` from the start [m].
     pub(crate) fn at(&self, distance: f64) -> Jet {
-        let mut from = 0.0;
-        for track in &self.tracks {
-            if distance < from + track.length() {
-                return track.at(distance - from);
-            }
-            from += track.length();
-        }
-        self.end()
+        let index = self.track_at(distance);
+        let (track, from) = (&self.tracks[index], self.starts[index]);
+        if distance < from + track.length() { track.at(distance - from) } else { self.end() }
+    }
+
+    /// The number of the track at `distance` from the start [m].
+    fn track_at(&self, distance: f64) -> usize {
+        self.starts.partition_point(|start| *start <= distance).max(1) - 1
     }
 
     /// True points of the drawn line from `from` to `to` [m], no chord farther than `chord_error`
     /// from it [m].
     pub(crate) fn points(&self, from: f64, to: f64, chord_error: f64) -> Vec<[f64; 3]> {
         let mut points = vec![self.at(from).point.into()];
-        let mut start = 0.0;
-        for track in &self.tracks {
-            let end = start + track.length();
-            if end > from + GAP && start < to - GAP {
+        let first = self.track_at(from + GAP);
+        for (track, start) in self.tracks.iter().zip(&self.starts).skip(first) {
+            if *start >= to - GAP {
+                break;
+            }
+            if start + track.length() > from + GAP {
                 let (first, last) = ((from - start).max(0.0), (to - start).min(track.length()));
                 track.part(first, last).sample(chord_error, &mut points);
             }
-            start = end;
         }
         points
     }

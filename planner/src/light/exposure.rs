@@ -73,7 +73,11 @@ impl Light {
     ) -> Result<(), TooShort> {
         let places = law.places();
         let follows = follows || contour.policy == Policy::Proportional;
-        for (demand, end) in contour.stretches() {
+        let passed = contour.demands().partition_point(|demand| demand.from <= places.start);
+        for (demand, end) in contour.stretches_from(passed.max(1) - 1) {
+            if demand.from >= places.end {
+                break;
+            }
             let (from, to) = (demand.from.max(places.start), end.min(places.end));
             if to - from <= 0.0 {
                 continue;
