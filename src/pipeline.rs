@@ -4,6 +4,7 @@
 //! whose services systemd starts and whose jobs operators submit. The supervisor is not on the
 //! real-time path: it watches, asks and writes down.
 
+mod caps;
 pub mod configuration;
 pub mod control;
 pub mod job_run;

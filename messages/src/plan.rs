@@ -19,6 +19,10 @@ pub struct PlanFacts {
     pub samples: u64,
     /// Largest speed while the laser is on [m/s], 0 when nothing is drawn.
     pub speed: f64,
+    /// The largest speed that the job asks for while the laser is on [m/s].
+    pub speed_asked: f64,
+    /// The largest that job and machine allow while the laser is on [m/s].
+    pub speed_limit: f64,
     /// What a person should know.
     pub notes: Vec<Note>,
     /// Largest share of each limit that the plan uses.
@@ -42,6 +46,11 @@ pub struct Binding {
     pub line: u64,
     /// The place that costs most, machine frame [m].
     pub position: [f64; 3],
+}
+
+impl Binding {
+    /// The limit that is no limit of the machine: the speed that the job asks for.
+    pub const SPEED_ASKED_FOR: &'static str = "speed asked for";
 }
 
 /// Largest value over limit, found over all setpoints.

@@ -140,6 +140,8 @@ pub(crate) struct Account {
     pub(crate) notes: Vec<Note>,
     /// The largest speed while the laser is on [m/s].
     pub(crate) speed: f64,
+    /// The largest that the job asks for while the laser is on [m/s].
+    pub(crate) asked: f64,
     /// Length that is marked [m], and the number of lines and dots.
     pub(crate) length: f64,
     pub(crate) strokes: u64,
@@ -169,6 +171,7 @@ struct Draft<'s> {
     trajectory: Trajectory,
     strokes: Vec<ArtworkLine>,
     length: f64,
+    asked: f64,
     shares: &'s Tightening,
     slowed: Vec<Slowed>,
     notes: Vec<Note>,
@@ -275,12 +278,13 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     }
 
     fn keep(&mut self, (draft, setpoints): (Draft<'_>, Vec<Setpoint>)) -> Window {
-        let Draft { trajectory, strokes, slowed, notes, bound, speed, length, .. } = draft;
+        let Draft { trajectory, strokes, slowed, notes, bound, speed, length, asked, .. } = draft;
         let account = &mut self.account;
         account.note_slowed(&slowed);
         account.notes.extend(notes);
         account.shares.merge(&bound);
         account.speed = account.speed.max(speed);
+        account.asked = account.asked.max(asked);
         account.length += length;
         account.strokes += strokes.iter().filter(|stroke| !stroke.goes_on).count() as u64;
         let (end, estimate) = (self.front.time, self.estimate());
@@ -354,6 +358,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             trajectory: Trajectory { attitude: self.task.attitude, ..Trajectory::default() },
             strokes: Vec::new(),
             length: 0.0,
+            asked: 0.0,
             shares,
             slowed: Vec::new(),
             notes: Vec::new(),

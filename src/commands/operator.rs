@@ -58,6 +58,9 @@ fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure
     if reply["accepted"].as_bool() == Some(true) {
         if !arguments.json {
             say!("accepted; the machine was {state}");
+            if let Some(caps) = reply["capped_by"].as_str() {
+                say!("{caps}");
+            }
         }
         Ok(Exit::Done)
     } else {

@@ -96,7 +96,7 @@ impl<'a> JobRun<'a> {
         let request = serde_json::to_vec_pretty(job).map_err(Failure::service)?;
         folder.write(run_folder::REQUEST, request).map_err(Failure::bad_input)?;
         let name = job_name(job);
-        pipeline.board.name_job(Some(&name));
+        pipeline.board.name_job(Some((&name, folder.path())));
         let run_outcome = RunOutcome { job: name.clone(), ..RunOutcome::default() };
         Ok(Self {
             control: pipeline.control.clone(),

@@ -5,6 +5,7 @@
 //! submitted it.
 
 use super::ServiceOwner;
+use super::caps::caps;
 use super::control::{JobControl, Phase};
 use super::status::StatusBoard;
 use crate::exit::Failure;
@@ -101,12 +102,15 @@ pub struct VerbReply {
     pub state: String,
     /// The rate now wanted, 1 as planned.
     pub value: f64,
+    /// What keeps the job under way from being marked as much faster as an override asks for; null where
+    /// nothing does.
+    pub capped_by: Option<String>,
 }
 
 impl VerbReply {
     /// A request that is carried out without the controller.
     fn accepted(state: &str) -> Self {
-        Self { accepted: true, state: state.to_owned(), value: 1.0 }
+        Self { accepted: true, state: state.to_owned(), value: 1.0, capped_by: None }
     }
 }
 
@@ -116,6 +120,7 @@ impl From<OperatorReply> for VerbReply {
             accepted: reply.accepted == 1,
             state: ControllerState::from_wire(reply.state).name().to_owned(),
             value: reply.value,
+            capped_by: None,
         }
     }
 }
@@ -260,6 +265,14 @@ impl Answers {
             Verb::Hold if self.control.hold() => json!(VerbReply::accepted("preparing")),
             Verb::Hold => self.hold(),
             Verb::Resume if self.control.resume() => json!(VerbReply::accepted("holding")),
+            Verb::Override => match self.link.request(verb.into(), value) {
+                Ok(reply) => {
+                    let folder = self.board.folder();
+                    let capped_by = folder.and_then(|folder| caps(&folder, reply.value));
+                    json!(VerbReply { capped_by, ..VerbReply::from(reply) })
+                }
+                Err(error) => json!({ "error": error.to_string() }),
+            },
             verb => self.ask(verb, value),
         }
     }

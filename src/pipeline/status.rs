@@ -4,12 +4,15 @@ use super::Latest;
 use messages::{ControllerState, PlannerPhase};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::sync::Mutex;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A notice board: the supervisor writes, operators' threads read.
 #[derive(Debug, Default)]
 pub struct StatusBoard {
     status: Mutex<Status>,
+    /// The run folder of the job.
+    folder: Mutex<Option<PathBuf>>,
 }
 
 /// What a pipeline is doing, as `graver status --json` prints it.
@@ -76,9 +79,15 @@ impl StatusBoard {
         status.services = pids.iter().map(|(name, pid)| ((*name).to_owned(), *pid)).collect();
     }
 
-    /// Names the job that runs, or none.
-    pub fn name_job(&self, job: Option<&str>) {
-        self.lock().job = job.map(str::to_owned);
+    /// Names the job that runs and its run folder, or none.
+    pub fn name_job(&self, job: Option<(&str, &Path)>) {
+        self.lock().job = job.map(|(name, _)| name.to_owned());
+        *locked(&self.folder) = job.map(|(_, folder)| folder.to_owned());
+    }
+
+    /// The run folder of the job that runs.
+    pub fn folder(&self) -> Option<PathBuf> {
+        locked(&self.folder).clone()
     }
 
     /// What stands there now.
@@ -86,8 +95,12 @@ impl StatusBoard {
         self.lock().clone()
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, Status> {
-        // A reader that panicked cannot have left it half written.
-        self.status.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Status> {
+        locked(&self.status)
     }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // A reader that panicked cannot have left it half written.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

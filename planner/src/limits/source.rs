@@ -89,7 +89,7 @@ impl Source {
     pub(crate) fn describe(self, axes: &[Axis]) -> (String, Option<String>) {
         let Some((axis, limit)) = self.joint_limit() else {
             let name = match self {
-                Self::FEED => "speed asked for",
+                Self::FEED => Binding::SPEED_ASKED_FOR,
                 Self::MARKING_SPEED => "largest marking speed",
                 Self::RAPID => "largest rapid speed",
                 Self::DARK_TURN => "turns and runs in the dark",

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use machine::Mechanism;
 
 use super::paths::PathRun;
-use super::windows::{WINDOW, strokes};
+use super::windows::WINDOW;
 use super::{Draft, Planning, plateau};
 use crate::error::PlanError;
 use crate::geometry::contour::Contour;
@@ -112,8 +112,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             return None;
         }
         let was_lit = run.contour.demands().last().is_some_and(|demand| demand.power > 0.0);
-        draft.strokes.extend(strokes(next, was_lit));
-        draft.length += next.lit_length();
+        self.note_drawn(next, was_lit, draft);
         let speeds = self.speed_limits(&contour);
         let known = run.path.length() - left_out;
         let mut longer = PathRun {

@@ -200,6 +200,8 @@ impl Facts<'_> {
             duration: planning.duration(),
             samples: planning.samples(),
             speed: account.speed,
+            speed_asked: account.asked,
+            speed_limit: planning.task.speeds.most,
             notes: [self.notes.clone(), planning.notes()].concat(),
             uses: planning.utilization().clone(),
             binding: account.shares.report(&planning.task.machine.axes),

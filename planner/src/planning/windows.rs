@@ -243,8 +243,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             before
         };
         if begins {
-            draft.strokes.extend(strokes(&run.contour, false));
-            draft.length += run.contour.lit_length();
+            self.note_drawn(&run.contour, false, draft);
         }
         self.account(&run, &law, draft);
         let places = law.places();
@@ -265,6 +264,16 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             None => self.leave(&run, draft.shares)?,
         }
         Ok(())
+    }
+
+    /// Notes what a contour draws, of which the first line goes on from the contour before if that
+    /// `was_lit` at its end.
+    pub(super) fn note_drawn(&self, contour: &Contour, was_lit: bool, draft: &mut Draft<'_>) {
+        draft.strokes.extend(strokes(contour, was_lit));
+        draft.length += contour.lit_length();
+        let lit = contour.demands().iter().filter(|demand| demand.power > 0.0);
+        let asked = lit.map(|demand| self.task.speeds.of(demand.speed));
+        draft.asked = asked.fold(draft.asked, f64::max);
     }
 
     /// Ends a path: the joints are where it ends, at rest or moving.
@@ -337,7 +346,7 @@ pub(super) fn dot(at: &Vector3<f64>, line: u64) -> ArtworkLine {
 
 /// The lines that a contour marks, each from light to dark; the first goes on from the contour before if
 /// that `was_lit` at its end.
-pub(super) fn strokes(contour: &Contour, was_lit: bool) -> Vec<ArtworkLine> {
+fn strokes(contour: &Contour, was_lit: bool) -> Vec<ArtworkLine> {
     let mut strokes = Vec::new();
     let mut open: Option<(f64, f64, u64)> = None;
     let mut close = |(from, to, line): (f64, f64, u64)| {

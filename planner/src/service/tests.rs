@@ -354,6 +354,50 @@ fn a_long_job_is_sent_while_it_is_planned() {
 }
 
 #[test]
+fn what_is_not_sent_yet_is_planned_anew_when_it_shall_be_faster() {
+    let mut bench = Bench::new();
+    bench.offer_program(1, &rounds(30));
+    bench.turn_until(PlannerPhase::Streaming);
+    bench.say(|progress| (progress.stream, progress.room) = (1, 300));
+    let mut all = bench.collect(300);
+    let speeds = |all: &[Setpoint]| {
+        let lit = all.iter().filter(|it| it.laser.is_lit());
+        lit.map(|it| it.path_velocity)
+            .fold((f64::INFINITY, 0.0), |(least, most), speed| (speed.min(least), speed.max(most)))
+    };
+    for (rate, speed) in [(1.0, 0.05), (2.0, 0.1), (1.2, 0.06), (0.5, 0.05)] {
+        bench.say(|progress| progress.override_rate = rate);
+        let from = all.len() + 9_000;
+        while all.len() < from + 1_000 {
+            let accepted = all.len() as u64;
+            bench.say(|progress| (progress.accepted, progress.room) = (accepted, 300));
+            all.extend(bench.collect(300));
+            assert_eq!(bench.phase(), PlannerPhase::Streaming);
+        }
+        let (least, most) = speeds(&all[from..]);
+        assert!(least >= 0.99 * speed && most <= 1.001 * speed, "{least} to {most} m/s at {rate}");
+    }
+    bench.send_rest(&mut all);
+    assert!(all.iter().enumerate().all(|(index, it)| it.sequence == index as u64));
+    assert!(speeds(&all).1 <= 0.1001);
+    let limits = Machine::builtin().path;
+    let jumps = all.windows(4).map(|it| {
+        let third = |row: usize| {
+            (it[3].tool[row] - 3.0 * it[2].tool[row] + 3.0 * it[1].tool[row] - it[0].tool[row])
+                * 1e9
+        };
+        messages::math::hypot(third(0), third(1))
+    });
+    assert!(jumps.fold(0.0, f64::max) <= 1.01 * limits.jerk);
+    let text = std::fs::read_to_string(bench.folder.path().join(run_folder::ARTWORK)).unwrap();
+    let mut artwork = Artwork::default();
+    text.lines().for_each(|line| artwork.add(serde_json::from_str(line).unwrap()));
+    assert_eq!(artwork.strokes.len(), 1, "nothing is drawn twice");
+    let length = 30.0 * 0.03 * messages::math::TURN;
+    assert!((artwork.length() - length).abs() < 1e-3 * length, "{}", artwork.length());
+}
+
+#[test]
 fn a_long_job_is_withdrawn_while_it_is_planned() {
     let mut bench = Bench::new();
     bench.offer_program(1, &rounds(40));
