@@ -91,7 +91,7 @@ pub(crate) fn follow_flight<const N: usize, M: Mechanism<N>>(
     let mut rows = Vec::new();
     for (index, time) in looks(flight).into_iter().enumerate() {
         step(limits, &mut followed, &tool(flight, time), shares, &mut rows)?;
-        if followed.used.iter().flatten().any(|used| !(*used <= most)) {
+        if followed.used.iter().flatten().any(|used| used.is_nan() || *used > most) {
             return Some(followed);
         }
         // A tool that must first be turned cannot fly from here.

@@ -115,7 +115,7 @@ struct Travel<'a> {
 enum Step {
     /// In the dark, to a place [m].
     Go(Vector3<f64>),
-    Line(Line),
+    Line(Box<Line>),
 }
 
 /// A line that is marked at one speed.
@@ -174,7 +174,9 @@ impl<'a> Travel<'a> {
         near: &Near<'_>,
     ) -> Self {
         let moves = operations.iter().filter_map(|operation| match &operation.kind {
-            OperationKind::Path(contour) => Some(Step::Line(Line::new(contour, limits, near))),
+            OperationKind::Path(contour) => {
+                Some(Step::Line(Box::new(Line::new(contour, limits, near))))
+            }
             OperationKind::Rapid(to) => Some(Step::Go(*to)),
             OperationKind::Dot(dot) => Some(Step::Go(dot.at)),
             _ => None,
