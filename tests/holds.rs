@@ -50,11 +50,12 @@ impl Uses {
     /// Between four cycles in a row.
     fn of(machine: &Machine, places: &[Place; 4]) -> Self {
         let [a, b, c, d] = places;
-        let second = |a: f64, b: f64, c: f64| (c - 2.0 * b + a) / CYCLE_TIME.powi(2);
-        let third =
-            |a: f64, b: f64, c: f64, d: f64| (d - 3.0 * c + 3.0 * b - a) / CYCLE_TIME.powi(3);
+        let second = |a: f64, b: f64, c: f64| (c - 2.0 * b + a) / (CYCLE_TIME * CYCLE_TIME);
+        let third = |a: f64, b: f64, c: f64, d: f64| {
+            (d - 3.0 * c + 3.0 * b - a) / (CYCLE_TIME * CYCLE_TIME * CYCLE_TIME)
+        };
         let norm = |part: &dyn Fn(usize) -> f64| {
-            (0..3).map(|index| part(index).powi(2)).sum::<f64>().sqrt()
+            (0..3).map(|index| part(index) * part(index)).sum::<f64>().sqrt()
         };
         let tool = |i: usize| [a.tool[i], b.tool[i], c.tool[i], d.tool[i]];
         let joint = |i: usize| [a.joints[i], b.joints[i], c.joints[i], d.joints[i]];

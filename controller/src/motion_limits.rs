@@ -335,3 +335,57 @@ impl Bends {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// A stream of constant jerk along both joints of the built-in machine.
+    fn cubic(jerk: f64) -> Lookahead {
+        let mut ring = Lookahead::new();
+        for sequence in 0..200 {
+            let time = (sequence as f64 - 60.0) * CYCLE_TIME;
+            let place = jerk * time * time * time / 6.0;
+            let mut setpoint = Setpoint { stream: 1, sequence, ..Setpoint::default() };
+            (setpoint.tool[0], setpoint.position[0], setpoint.position[1]) = (place, place, place);
+            ring.accept(&setpoint).unwrap();
+        }
+        ring
+    }
+
+    #[test]
+    fn the_derivatives_of_a_cubic_are_exact() {
+        let ring = cubic(400.0);
+        let time = 0.04;
+        let [velocity, acceleration, jerk] = ring.motion(100).tool[0];
+        assert!((velocity - 200.0 * time * time).abs() < 1e-9, "{velocity}");
+        assert!((acceleration - 400.0 * time).abs() < 1e-6, "{acceleration}");
+        assert!((jerk - 400.0).abs() < 1e-3, "{jerk}");
+    }
+
+    #[test]
+    fn a_bend_uses_what_the_plan_leaves_of_the_jerk() {
+        let (ring, limits) = (cubic(400.0), MotionLimits::new(&Machine::builtin()));
+        let course = Course { lookahead: &ring, limits: &limits };
+        let going = Going { rate: 1.0, ..Going::default() };
+        let bends = course.bends(StreamTime::of(80), going);
+        assert!(bends.is_allowed);
+        // 0.08 m/s and 8 m/s², of which half a cycle of the bend comes to the change.
+        let slope = 0.08 + 1.5 * 8.0 * CYCLE_TIME;
+        assert!((bends.most - (492.5 - 400.0) / slope).abs() < 1.0, "{bends:?}");
+        assert!(course.allows(StreamTime::of(80), going, bends.most - 1.0));
+        assert!(!course.allows(StreamTime::of(80), going, bends.most + 1.0));
+        assert!(!course.allows(StreamTime::of(80), going, bends.least - 1.0));
+    }
+
+    #[test]
+    fn an_even_rate_is_always_allowed_where_the_plan_is() {
+        let (ring, limits) = (cubic(500.0), MotionLimits::new(&Machine::builtin()));
+        let course = Course { lookahead: &ring, limits: &limits };
+        for rate in [1.0, 0.99, 0.5, 0.1, 0.0] {
+            let going = Going { rate, ..Going::default() };
+            assert!(course.allows(StreamTime::of(75), going, 0.0), "{rate}");
+        }
+    }
+}

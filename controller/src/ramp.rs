@@ -233,3 +233,53 @@ impl Ramp {
 fn bend_of(counts: i64) -> f64 {
     Rate(counts).value() / (CYCLE_TIME * CYCLE_TIME)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Unhindered to `target`: the rates, and how far the stream moves.
+    fn run(mut ramp: Ramp, target: Rate, slew: Slew) -> (Vec<Ramp>, StreamTime) {
+        let (mut ramps, mut way) = (vec![ramp], StreamTime::default());
+        while !ramp.is_even_at(target) {
+            let before = ramp;
+            ramp = ramp.unhindered(target, slew);
+            way = way + ramp.advance(before);
+            ramps.push(ramp);
+            assert!(ramps.len() < 5000, "never at {target:?}");
+        }
+        (ramps, way)
+    }
+
+    #[test]
+    fn lands_exactly_and_keeps_both_limits() {
+        for (from, to) in [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (0.3, 0.302), (0.777, 0.1)] {
+            for slew in [Slew::STOP, Slew::OVERRIDE] {
+                let [from, to] = [from, to].map(Rate::nearest);
+                let (ramps, _) = run(Ramp::even(from), to, slew);
+                let inside = from.min(to)..=from.max(to);
+                for ramp in &ramps {
+                    assert!(inside.contains(&ramp.rate()), "{ramp:?} from {from:?} to {to:?}");
+                    assert!(ramp.change.abs() <= slew.change && ramp.bend.abs() <= slew.bend);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn foresees_the_way_to_rest_and_up_to_a_rate_exactly() {
+        let (ramps, way) = run(Ramp::new(), Rate::ONE, Slew::STOP);
+        // The last cycle is at the rate already.
+        assert_eq!(Ramp::starting_distance(Rate::ONE) + StreamTime::of(1), way);
+        for ramp in ramps {
+            let (_, way) = run(ramp, Rate::ZERO, Slew::STOP);
+            assert_eq!(ramp.stopping_distance(), way, "{ramp:?}");
+        }
+    }
+
+    #[test]
+    fn an_unhindered_hold_takes_what_the_header_says() {
+        let (ramps, _) = run(Ramp::even(Rate::ONE), Rate::ZERO, Slew::STOP);
+        assert!((110..=112).contains(&ramps.len()), "{} cycles", ramps.len());
+    }
+}
