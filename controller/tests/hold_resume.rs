@@ -75,7 +75,7 @@ fn holds_anywhere_and_goes_on_without_losing_or_doubling_a_mark() {
         let worst = lit.map(|record| record.tracking).fold(0.0, f64::max);
         assert!(worst < 10e-6, "{case}: {worst} m off while lit");
         let worst = bench.played().map(|record| record.tracking).fold(0.0, f64::max);
-        assert!(worst < 35e-6, "{case}: {worst} m off in the dark");
+        assert!(worst < 20e-6, "{case}: {worst} m off in the dark");
     }
 }
 
