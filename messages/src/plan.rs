@@ -51,6 +51,8 @@ pub struct Binding {
 impl Binding {
     /// The limit that is no limit of the machine: the speed that the job asks for.
     pub const SPEED_ASKED_FOR: &'static str = "speed asked for";
+    /// The machine's largest speed while marking.
+    pub const MARKING_SPEED: &'static str = "largest marking speed";
 }
 
 /// Largest value over limit, found over all setpoints.

@@ -27,8 +27,10 @@ fn told(plan: &PlanFacts, rate: f64) -> Option<String> {
             plan.speed_limit
         ));
     }
-    let is_asked = |limit: &&Binding| limit.limit == Binding::SPEED_ASKED_FOR;
-    if let Some(limit) = plan.binding.iter().find(|limit| !is_asked(limit) && limit.share >= LEAST)
+    let is_speed = |limit: &&Binding| {
+        [Binding::SPEED_ASKED_FOR, Binding::MARKING_SPEED].contains(&limit.limit.as_str())
+    };
+    if let Some(limit) = plan.binding.iter().find(|limit| !is_speed(limit) && limit.share >= LEAST)
     {
         let axis = limit.axis.as_ref().map(|axis| format!(" of {axis}")).unwrap_or_default();
         told.push(format!(

@@ -90,7 +90,7 @@ impl Source {
         let Some((axis, limit)) = self.joint_limit() else {
             let name = match self {
                 Self::FEED => Binding::SPEED_ASKED_FOR,
-                Self::MARKING_SPEED => "largest marking speed",
+                Self::MARKING_SPEED => Binding::MARKING_SPEED,
                 Self::RAPID => "largest rapid speed",
                 Self::DARK_TURN => "turns and runs in the dark",
                 Self::TOOL_ACCELERATION => Quantity::ToolAcceleration.name(),
