@@ -22,7 +22,7 @@ use nalgebra::Vector3;
 
 use crate::drawing::{Note, Turns};
 use crate::error::{Place, PlanError};
-use crate::geometry::contour::Contour;
+use crate::geometry::contour::{Contour, Demand};
 use crate::geometry::operation::OperationKind;
 use crate::joint_space::configuration::{Configuration, Refused};
 use crate::joint_space::joint_move::JointMove;
@@ -303,19 +303,26 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         });
         let parts = self.front.parts.iter().map(|part| self.estimate_of(part));
         let ahead = parts.fold(ahead, |sum, part| sum + part);
-        let done = estimated - ahead;
+        let done = (estimated - ahead).max(0.0);
         let left = (self.task.estimate - done).max(0.0);
         // What is still to come is slower than estimated in the same measure as what has been planned, of
         // which a little says little.
         let little = LITTLE * self.task.estimate + f64::MIN_POSITIVE;
-        time + left * (time - self.first_rest() + little) / (done + little)
+        let slower = (time - self.first_rest() + little) / (done / self.rate + little);
+        time + left / self.rate * slower
     }
 
     /// How long a path takes at the speeds asked for [s].
     fn estimate_of(&self, contour: &Contour) -> f64 {
-        let speeds = self.speed_limits(contour);
-        let ends = speeds.iter().skip(1).map(|speed| speed.from).chain([contour.length()]);
-        speeds.iter().zip(ends).map(|(speed, end)| (end - speed.from) / speed.speed).sum()
+        let rapid = self.limits.path.rapid;
+        let time = |(demand, end): (Demand, f64)| {
+            let speed = match demand.speed {
+                asked if demand.power > 0.0 => self.task.speeds.of(asked),
+                asked => asked.map_or(rapid, |speed| speed.min(rapid)),
+            };
+            (end - demand.from) / speed
+        };
+        contour.stretches().map(time).sum()
     }
 
     /// From the first motion to the end of the last window [s].

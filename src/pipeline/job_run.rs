@@ -221,11 +221,11 @@ impl<'a> JobRun<'a> {
     /// Stops a job that is played and cannot be done to its end.
     fn give_up(&mut self) {
         self.refuse();
-        self.run_outcome.outcome = Some(Outcome::Aborted);
-        self.rest();
         if self.played {
+            self.run_outcome.outcome = Some(Outcome::Aborted);
             self.pipeline.ask(OperatorVerb::Stop, 0.0);
         }
+        self.rest();
     }
 
     /// Hands the job to the controller as soon as it is recorded, or nobody is there to record it,

@@ -313,7 +313,7 @@ impl<'a> Operations<'a> {
         if let Some(contour) = &mut self.contour {
             let fits = policy.is_none_or(|policy| policy == contour.policy);
             if fits && contour.extend(track, demands, &joining) {
-                if contour.weight() > LONG_PATH && contour.is_lit() {
+                if contour.weight() > LONG_PATH {
                     let next = contour.split_last();
                     if let Some(part) = core::mem::replace(&mut self.contour, next) {
                         self.end(part, true);

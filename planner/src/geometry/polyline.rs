@@ -160,7 +160,11 @@ impl Polyline {
         // The last may go on, and its last move may be taken off again.
         runs.pop();
         runs.pop();
-        let Some(last) = runs.last().map(|run| *run.end()) else { return Vec::new() };
+        let Some(last) = runs.last().map(|run| *run.end()) else {
+            // One straight line so far: looked at again when it is twice as long.
+            self.look = 2 * self.chords.len();
+            return Vec::new();
+        };
         let found = lines(&self.vertices[..=last], &self.chords[..last]);
         self.vertices.drain(..last);
         self.chords.drain(..last);

@@ -17,6 +17,13 @@ use crate::joint_space::configuration::branches;
 /// How far apart points of a path are looked at [m].
 const STEP: f64 = 1e-3;
 
+/// What the digits of a program may hide [m].
+const DIGITS: f64 = 1e-5;
+
+/// Jobs on joints that turn are planned before they begin if they are estimated to last no longer than
+/// this [s]: that is quickly done, and tells more than single points can.
+const SHORT: f64 = 60.0;
+
 /// Jobs that are estimated to last longer may be too long to be planned [s].
 const LONG: f64 = 86_400.0;
 
@@ -57,6 +64,12 @@ impl MechanismVisitor for Within<'_> {
                 extent.add(corner.into());
             }
             return extent.corners().all(|corner| reach.holds_point(&corner));
+        }
+        let limits = &machine.path;
+        let estimate =
+            job.estimate(limits, &|speed| speed.unwrap_or(limits.speed).min(limits.speed));
+        if !reach.is_linear && estimate <= SHORT {
+            return false;
         }
         let Ok(steps) = job.steps() else { return false };
         for step in steps {
@@ -105,6 +118,8 @@ struct Reach<'a, const N: usize, M: Mechanism<N>> {
     area: &'a WorkArea,
     axes: &'a [Axis],
     is_linear: bool,
+    /// How far a smoothed path may go beyond the drawn one [m].
+    margin: f64,
     /// The joints at the last point.
     near: Joints<N>,
 }
@@ -118,6 +133,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
             mechanism,
             area: &machine.area,
             axes: &machine.axes,
+            margin: 2.0 * machine.path.tolerance + DIGITS,
             near: home,
         }
     }
@@ -151,9 +167,9 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
             // A dense polyline's chords are looked at by their ends.
             (1..=count).all(|index| {
                 let point = curve.point(index as f64 / count as f64);
-                let flat = Vector3::new(beyond, beyond, 0.0);
-                extent.add(point - flat);
-                extent.add(point + flat);
+                let around = Vector3::repeat(beyond);
+                extent.add(point - around);
+                extent.add(point + around);
                 self.is_linear || self.holds_point(&point)
             })
         };
@@ -162,8 +178,12 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
     }
 
     fn holds_point(&mut self, point: &Vector3<f64>) -> bool {
-        let inside =
-            (0..3).all(|row| (self.area.lower[row]..=self.area.upper[row]).contains(&point[row]));
+        let inside = (0..3).all(|row| {
+            let margin =
+                if self.area.lower[row] < self.area.upper[row] { self.margin } else { 0.0 };
+            let (lower, upper) = (self.area.lower[row] + margin, self.area.upper[row] - margin);
+            (lower..=upper).contains(&point[row])
+        });
         inside
             && (0..self.branches.len()).any(|branch| {
                 let pose = Pose::at(*point);

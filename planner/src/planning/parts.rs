@@ -35,8 +35,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     ) -> Result<Arc<Contour>, PlanError> {
         let mut contour = contour;
         self.front.goes_on = true;
-        let needed = self.look_ahead(&self.speed_limits(&contour));
-        while contour.length() < needed {
+        while contour.length() < self.look_ahead(&self.speed_limits(&contour)) {
             let Some(next) = self.take_next_part()? else { return Ok(contour) };
             contour = Arc::new(contour.followed_by(0.0, &next).0);
         }
@@ -51,7 +50,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         draft: &mut Draft<'_>,
     ) -> Result<(), PlanError> {
         while self.front.goes_on && run.path.length() - run.at < self.look_ahead(&run.speeds) {
-            let before = self.front.next;
+            let (before, estimated) = (self.front.next, self.front.estimated);
             let longer = match self.take_next_part()? {
                 Some(next) => self.longer(run, &next, draft),
                 None => None,
@@ -59,7 +58,10 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             match longer {
                 Some(longer) => *run = longer,
                 // It ends here, and the next part is a path of its own.
-                None => (self.front.goes_on, self.front.next) = (false, before),
+                None => {
+                    (self.front.goes_on, self.front.next) = (false, before);
+                    self.front.estimated = estimated;
+                }
             }
             if !self.front.goes_on {
                 self.choose_exit(run, draft.shares);
@@ -84,6 +86,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
                 self.stays_inside(contour)?;
                 self.front.next += 1;
                 self.front.estimated += self.estimate_of(contour);
+                self.front.place = contour.end().point;
                 self.front.goes_on = self.operations.next_part(self.front.next)?.is_some();
             }
             None => self.front.goes_on = false,
@@ -112,9 +115,14 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             return None;
         }
         let was_lit = run.contour.demands().last().is_some_and(|demand| demand.power > 0.0);
-        self.note_drawn(next, was_lit, draft);
-        let speeds = self.speed_limits(&contour);
+        if run.at > 0.0 {
+            self.note_drawn(next, was_lit, draft);
+        }
         let known = run.path.length() - left_out;
+        // What is known already stays: it may be more than is asked for, where the tool has it.
+        let mut speeds = moved_back(&run.speeds, left_out);
+        speeds.retain(|limit| limit.from < known);
+        speeds.extend(limits_from(&self.limits_for(&contour, run.most), known));
         let mut longer = PathRun {
             at: run.at - left_out,
             fallback: run.fallback.as_ref().map(|law| law.moved_back(left_out)),
@@ -124,6 +132,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             speeds: Arc::new(speeds),
             ..run.clone()
         };
+        longer.least_reach = self.least_reach(&longer.speeds);
         longer.even = longer.even.filter(|speed| {
             longer.speeds.iter().all(|limit| limit.speed == *speed)
                 && self.goes_evenly(
@@ -184,6 +193,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             }
             speed *= SLOWER;
         }
+        run.follows = true;
     }
 
     /// Marks at `rate` times the speeds asked for from here on, 1 as the job has them.
@@ -193,11 +203,14 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         }
         self.rate = rate;
         let Some(mut run) = self.front.run.take() else { return };
-        let mut speeds = self.speed_limits(&run.contour);
-        if let End::Moving { speed, .. } = run.begin {
-            let to = run.at + self.way_to_slow_down(speed);
-            keep_up(&mut speeds, run.at, to, speed);
+        let mut speeds = self.limits_for(&run.contour, run.most);
+        if let End::Moving { speed, acceleration } = run.begin {
+            // What it still gains before its acceleration is gone.
+            let gained = acceleration.max(0.0).powi(2) / self.limits.path.jerk;
+            let to = run.at + self.way_to_slow_down(speed + gained);
+            keep_up(&mut speeds, run.at, to, speed + gained);
         }
+        run.least_reach = self.least_reach(&speeds);
         run.speeds = Arc::new(speeds);
         run.even = None;
         if !self.front.goes_on && matches!(run.exit, End::Moving { .. }) {
@@ -212,6 +225,21 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let time = speed / limits.acceleration + limits.acceleration / limits.jerk;
         GENTLE * speed * time
     }
+}
+
+/// Speeds along a path that begins `distance` later [m].
+fn moved_back(speeds: &[SpeedLimit], distance: f64) -> Vec<SpeedLimit> {
+    let first = speeds.partition_point(|limit| limit.from <= distance).max(1) - 1;
+    let moved =
+        |limit: &SpeedLimit| SpeedLimit { from: (limit.from - distance).max(0.0), ..*limit };
+    speeds[first..].iter().map(moved).collect()
+}
+
+/// Those from `place` on [m].
+fn limits_from(speeds: &[SpeedLimit], place: f64) -> Vec<SpeedLimit> {
+    let first = speeds.partition_point(|limit| limit.from <= place).max(1) - 1;
+    let kept = |limit: &SpeedLimit| SpeedLimit { from: limit.from.max(place), ..*limit };
+    speeds[first..].iter().map(kept).collect()
 }
 
 /// Lets the speeds from `from` to `to` [m] be at least `least` [m/s]: what the tool has it cannot lose at

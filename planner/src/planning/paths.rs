@@ -35,6 +35,9 @@ const END_SHARE: f64 = 0.995;
 const END_SLOWER: f64 = 0.8;
 const END_TRIALS: usize = 14;
 
+/// Notes of paths that are divided, at most.
+const MOST_NOTES: usize = 100;
+
 /// How often another configuration is timed where the one before cannot be reached.
 const CONFIGURATIONS: usize = 7;
 
@@ -52,6 +55,8 @@ pub(super) struct PathRun<const N: usize> {
     pub(super) exit: End,
     /// The speed that its joints were smoothed for [m/s]; `None` for as wide as they may be.
     pub(super) smoothed_for: Option<f64>,
+    /// The speed that it must keep all along, where the job leaves it open [m/s].
+    pub(super) most: Option<f64>,
     /// The one speed of the path, where it has one [m/s].
     pub(super) even: Option<f64>,
     /// Whether the power follows the speed whatever the policy.
@@ -162,6 +167,28 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         limits
     }
 
+    /// The speed limits along a contour of which the job leaves the speed open, up to `most` [m/s].
+    pub(super) fn limits_for(&self, contour: &Contour, most: Option<f64>) -> Vec<SpeedLimit> {
+        let mut limits = self.speed_limits(contour);
+        if let Some(most) = most {
+            // One speed all along.
+            let source = Source::TOOL_ACCELERATION;
+            limits.iter_mut().for_each(|limit| {
+                (limit.speed, limit.source) = (limit.speed.min(most), source);
+            });
+        }
+        limits
+    }
+
+    /// The least way of a window, a tenth of what surely leads to rest [m].
+    pub(super) fn least_reach(&self, speeds: &[SpeedLimit]) -> f64 {
+        let limits = &self.limits.path;
+        let top = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
+        // Twice the way to rest, at least.
+        let rest = top * top / limits.acceleration + top * limits.acceleration / limits.jerk + 1e-5;
+        rest * 0.1
+    }
+
     fn run(
         &self,
         contour: Arc<Contour>,
@@ -169,11 +196,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         trail: Vec<(f64, Configuration<N>)>,
         speeds: Vec<SpeedLimit>,
     ) -> PathRun<N> {
-        let limits = &self.limits.path;
         let top = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
-        // Twice the way to rest, at least.
-        let least_reach =
-            top * top / limits.acceleration + top * limits.acceleration / limits.jerk + 1e-5;
+        let least_reach = self.least_reach(&speeds);
         let fraction = if path.is_straight() { 1.0 } else { 0.5 };
         PathRun {
             contour,
@@ -184,10 +208,11 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             begin: End::Rest,
             exit: End::Rest,
             smoothed_for: None,
+            most: None,
             even: None,
             follows: true,
-            reach: (fraction * top).max(least_reach),
-            least_reach: least_reach * 0.1,
+            reach: (fraction * top).max(10.0 * least_reach),
+            least_reach,
             fallback: None,
         }
     }
@@ -237,7 +262,9 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
              than the stroke winds up",
             parts.len()
         );
-        draft.notes.push(Note { line: contour.line, text });
+        if self.account.notes.len() < MOST_NOTES {
+            draft.notes.push(Note { line: contour.line, text });
+        }
         self.front.parts.extend(parts.into_iter().map(Arc::new));
         self.front.goes_on = false;
         Ok(())
@@ -250,16 +277,11 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         draft: &mut Draft<'_>,
     ) -> Result<(), PlanError> {
         let top = contour.top_speed(&self.limits.path);
-        let mut speeds = self.speed_limits(&contour);
+        let speeds = self.speed_limits(&contour);
         let fastest = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
         let is_open = contour.demands().iter().all(|demand| demand.speed.is_none());
-        if is_open && top < fastest {
-            // One speed all along, as the job leaves it open.
-            let source = Source::TOOL_ACCELERATION;
-            speeds.iter_mut().for_each(|speed| {
-                (speed.speed, speed.source) = (speed.speed.min(top), source);
-            });
-        }
+        let most = (is_open && top < fastest).then_some(top);
+        let speeds = self.limits_for(&contour, most);
         let fastest = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
         let smoothed_for = Some(fastest.min(top));
         let path = contour.trace(smoothed_for, &self.limits.path);
@@ -274,7 +296,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             let trail = trail(&self.limits, &wanted, &path)
                 .map_err(|cause| self.refusal(Refused::Kinematics(cause)))?;
             let mut run = self.run(contour.clone(), path.clone(), trail, speeds.clone());
-            (run.follows, run.smoothed_for) = (false, smoothed_for);
+            (run.follows, run.smoothed_for, run.most) = (false, smoothed_for, most);
             let evenly = speeds.len() == 1 && fastest <= top;
             let timed = self
                 .time_constant(&mut run, evenly, &mut ends, draft.shares)

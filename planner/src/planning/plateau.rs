@@ -85,7 +85,7 @@ fn farthest<const N: usize>(run: &PathRun<N>, place: f64) -> f64 {
 }
 
 /// The way to rest from `place`; `None` where the limits leave none.
-fn rest_from<const N: usize, M: Mechanism<N>>(
+pub(super) fn rest_from<const N: usize, M: Mechanism<N>>(
     run: &PathRun<N>,
     along: &mut AlongPath<'_, '_, N, M>,
     place: f64,

@@ -127,7 +127,8 @@ fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
         points.iter().any(|point| beyond(point) > (value - limit).abs() / 2.0)
     };
     let steps = job.steps().into_iter().flatten().map_while(Result::ok);
-    if let Some(step) = steps.skip_while(|step| step.line < *line).find(leaves) {
+    let mut near = steps.skip_while(|step| step.line < *line).take(Job::HELD as usize);
+    if let Some(step) = near.find(leaves) {
         *line = step.line;
     }
     error
@@ -243,15 +244,7 @@ fn windows<const N: usize, M: Mechanism<N>>(
         if outlet.is_abandoned() {
             return Err(PlanError::Abandoned);
         }
-        let rate = outlet.rate();
-        if rate != planning.rate() {
-            if let Some((checkpoint, _)) = waiting.pop_front() {
-                planning.restore(checkpoint);
-                waiting.clear();
-                (setpoints, is_over) = (0, false);
-            }
-            planning.set_rate(rate);
-        }
+        // First what there is room for: a rate that changes all the time must not hold the job up.
         while let Some((checkpoint, window)) = waiting.pop_front() {
             let count = window.setpoints.len();
             match outlet.take(window) {
@@ -261,6 +254,15 @@ fn windows<const N: usize, M: Mechanism<N>>(
                     break;
                 }
             }
+        }
+        let rate = outlet.rate();
+        if rate != planning.rate() {
+            if let Some((checkpoint, _)) = waiting.pop_front() {
+                planning.restore(checkpoint);
+                waiting.clear();
+                (setpoints, is_over) = (0, false);
+            }
+            planning.set_rate(rate);
         }
         if !is_over && (waiting.is_empty() || setpoints < outlet.ahead()) {
             let checkpoint = planning.checkpoint();

@@ -9,14 +9,14 @@ use messages::time::CYCLE_TIME;
 use nalgebra::Vector3;
 
 use super::paths::PathRun;
-use super::{Draft, Planning, Slowed};
+use super::{Draft, Planning, Slowed, plateau};
 use crate::error::PlanError;
 use crate::geometry::contour::Contour;
 use crate::joint_space::configuration::{Configuration, Refused};
 use crate::joint_space::follow_flight::uses;
 use crate::law::flight::State;
 use crate::law::time_law::TimeLaw;
-use crate::law::windows::{between, straight};
+use crate::law::windows::{between, keeps_even, straight};
 use crate::law::{End, Infeasible};
 use crate::limits::along::AlongPath;
 use crate::limits::motion_limits::Scope;
@@ -26,6 +26,9 @@ use crate::trajectory::Motion;
 
 /// The time that a window should take [s].
 pub(super) const WINDOW: f64 = 1.2;
+
+/// How long the tool goes on at its speed where it cannot change it yet [s].
+const STEP: f64 = 0.05;
 
 /// The part of a window that is handed on, at least and at most; the rest, in which it comes to rest, is
 /// planned anew with what follows.
@@ -141,15 +144,21 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         shares: &Tightening,
     ) -> Result<Result<Timed, Infeasible>, Refused> {
         let length = run.path.length();
-        if let Some(speed) = run.even {
-            let speed = speed * shares.speed;
-            let to = (run.at + speed * WINDOW).min(length);
-            let law = TimeLaw::even(run.at, to, speed, run.speeds[0].source.0);
-            let next = End::Moving { speed, acceleration: 0.0 };
-            return Ok(Ok(Timed { law, next: (to < length).then_some(next), fallback: None }));
-        }
         let mut along = AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
         let goes_on = self.front.goes_on;
+        // A speed that the tool has it cannot leave at once.
+        let even =
+            run.even.map(|speed| End::Moving { speed: speed * shares.speed, acceleration: 0.0 });
+        if let Some(next @ End::Moving { speed, .. }) = even
+            && (run.at == 0.0 || run.begin == next)
+        {
+            let to = (run.at + speed * WINDOW).min(length);
+            let law = TimeLaw::even(run.at, to, speed, run.speeds[0].source.0);
+            // Of a path that goes on nobody knows yet how it can be left.
+            let fallback =
+                if goes_on { plateau::rest_from(run, &mut along, to, next) } else { None };
+            return Ok(Ok(Timed { law, next: (to < length).then_some(next), fallback }));
+        }
         let is_whole = !goes_on && run.at == 0.0 && run.begin == End::Rest && run.exit == End::Rest;
         if is_whole && run.path.is_straight() {
             along.is_exact = true;
@@ -194,18 +203,42 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     pub(super) fn go_on(&mut self, draft: &mut Draft<'_>) -> Result<(), PlanError> {
         let Some(mut run) = self.front.run.take() else { return Ok(()) };
         self.lengthen(&mut run, draft)?;
+        self.front.line = run.line_at(run.at);
         let timed = self.time(&run, draft.shares).map_err(|cause| self.refusal(cause))?;
         let timed = match timed {
             Ok(timed) => timed,
             // The end cannot be met at its speed: it is met at rest.
             Err(_) => {
-                run.exit = End::Rest;
-                run.follows = true;
+                let exit = core::mem::replace(&mut run.exit, End::Rest);
                 let timed = self.time(&run, draft.shares).map_err(|cause| self.refusal(cause))?;
-                timed.map_err(|found| self.stuck(&run, &found))?
+                match (timed, self.step_evenly(&run, draft.shares)) {
+                    (Ok(timed), _) => {
+                        run.follows = true;
+                        timed
+                    }
+                    (Err(_), Some(step)) => {
+                        run.exit = exit;
+                        step
+                    }
+                    (Err(found), None) => return Err(self.stuck(&run, &found)),
+                }
             }
         };
         self.add(run, timed, draft)
+    }
+
+    /// A little way on at the speed that the tool has, where there is no other yet: the limits that leave
+    /// no room to change it here may do so there.
+    fn step_evenly(&self, run: &PathRun<N>, shares: &Tightening) -> Option<Timed> {
+        let next @ End::Moving { speed, acceleration: 0.0 } = run.begin else { return None };
+        let to = run.at + speed * STEP;
+        let mut along = AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
+        along.is_tool_free = true;
+        if to >= run.path.length() || !keeps_even(&mut along, run.at, to, speed) {
+            return None;
+        }
+        let law = TimeLaw::even(run.at, to, speed, run.speeds[0].source.0);
+        Some(Timed { law, next: Some(next), fallback: None })
     }
 
     /// A motion that cannot go on, which the plan of the window before excludes.
@@ -235,7 +268,10 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let before = self.front.light.stroke;
         let begins = run.at == 0.0;
         let marking = self.task.speeds.of(None);
-        let lit = self.front.light.path(&run.contour, &law, start, run.follows, marking);
+        // A stop in the light would burn.
+        let stops = next == Some(End::Rest) || (run.at > 0.0 && run.begin == End::Rest);
+        let follows = run.follows || stops;
+        let lit = self.front.light.path(&run.contour, &law, start, follows, marking);
         lit.map_err(|short| self.too_short(short))?;
         let stroke = if run.contour.is_lit() {
             (before + 1).min(self.front.light.stroke.max(1))

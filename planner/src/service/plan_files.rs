@@ -58,7 +58,8 @@ impl PlanFiles {
         let facts = facts();
         finite(&facts)?;
         let path = self.folder.join(run_folder::PLAN);
-        let unfinished = self.folder.join(format!(".{}.unfinished", run_folder::PLAN));
+        let unfinished =
+            self.folder.join(format!(".{}.{}.part", run_folder::PLAN, std::process::id()));
         // A reader sees the old content or the new.
         let write = || -> io::Result<()> {
             fs::write(&unfinished, serde_json::to_vec_pretty(&facts)?)?;

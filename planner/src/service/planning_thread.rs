@@ -12,7 +12,7 @@ use crossbeam::atomic::AtomicCell;
 use crossbeam::channel::{Receiver, Sender, bounded};
 use machine::Machine;
 use messages::{AxisArray, Setpoint, run_folder};
-use runtime::ServiceError;
+use runtime::{ServiceError, message};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -135,6 +135,9 @@ impl Task {
             // Refused as a whole, then, before anything moves.
             self.plan_to(&job, &mut Nowhere { shared: &self.shared }).map_err(refuse)?;
         }
+        if self.shared.abandoned.load() {
+            return Err(refuse(PlanError::Abandoned));
+        }
         let files = PlanFiles::create(&self.folder)?;
         let mut sending = Sending { sender, shared: &self.shared, files, strokes: 0, failed: None };
         let facts = self.plan_to(&job, &mut sending);
@@ -209,10 +212,15 @@ impl Outlet for Sending<'_> {
     }
 
     fn heed(&mut self, facts: &dyn Fn() -> PlanFacts, is_last: bool) {
-        if self.failed.is_none()
-            && let Err(refusal) = self.files.note(facts, is_last)
-        {
-            self.failed = Some(refusal);
+        // The folder of a job that was withdrawn may be another one's by now.
+        if self.is_abandoned() {
+            return;
+        }
+        match self.files.note(facts, is_last) {
+            Ok(()) => {}
+            // All of the job has been handed on: its marks need no plan.
+            Err(refusal) if is_last => message::tell(&refusal.message),
+            Err(refusal) => self.failed = Some(refusal),
         }
     }
 }
