@@ -29,8 +29,12 @@ const OVERRIDES: core::ops::RangeInclusive<f64> = 0.1..=2.0;
 const RESERVE: StreamTime = StreamTime(4 * ONE);
 
 /// How many times as far as an unhindered stop one within the limits may go, before it is hindered
-/// no longer; and how much further a resume goes back than an unhindered way up to rate.
+/// no longer.
 const HINDRANCE: i64 = 2;
+
+/// How much further than an unhindered way up to rate a resume goes back, in quarters. Where it is
+/// hindered more, light comes back before the rate is reached, with its power in proportion.
+const UP_TO_RATE: i64 = 5;
 
 /// Cycles after which a stop is hindered no longer. Planned motion, however it uses the limits, lets it
 /// rest within half of them.
@@ -242,7 +246,7 @@ impl Player {
             return;
         }
         let here = self.after.time;
-        let start = HINDRANCE * Ramp::starting_distance(self.wanted()).0;
+        let start = UP_TO_RATE * Ramp::starting_distance(self.wanted()).0 / 4;
         let start = StreamTime(start) + STEADY;
         let resting = self.at_planned_rest || lookahead.is_resting(here);
         let light_ahead = !resting && lookahead.may_be_lit(here, here + start);

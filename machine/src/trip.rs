@@ -6,7 +6,7 @@
 //! keeps a margin of its own.
 
 use crate::actuator::Axis;
-use crate::motor::{DcMotor, Motor};
+use crate::motor::{DcMotor, Motor, StepperMotor};
 
 /// What supervision forgives a planned value beyond its limit: a thousandth. Both ends compute the same
 /// numbers, so that no more than rounding lies between them.
@@ -20,6 +20,9 @@ const HEATING_SHARE: f64 = 0.99;
 /// What of a power stage's current and voltage a plan may use. Nothing trips at the end of either, but
 /// loops without room cannot correct anything there: a hundredth is what they take on a sound machine.
 const POWER_SHARE: f64 = 0.99;
+
+/// What of a stepper's pull-out torque a plan may use.
+const TORQUE_SHARE: f64 = 0.97;
 
 /// Rounding of a planned position at a soft limit [m or rad].
 const PLANNED_ROUNDING: f64 = 1e-9;
@@ -62,6 +65,14 @@ impl DcMotor {
     pub fn heating_limit(&self) -> Option<Limit> {
         let continuous = self.continuous_current?;
         Some(Limit { plan: HEATING_SHARE * continuous, trip: continuous })
+    }
+}
+
+impl StepperMotor {
+    /// Torque that a plan may ask for at `speed` [rad/s], in N·m: at the pull-out torque itself nothing
+    /// holds the rotor where it is any more; here a quarter of its stiffness at rest still does.
+    pub fn torque_limit(&self, speed: f64) -> f64 {
+        TORQUE_SHARE * self.pull_out_torque(speed)
     }
 }
 

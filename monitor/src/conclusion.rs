@@ -226,6 +226,10 @@ pub fn conclude(
         }
         // Nor was anything marked before there was an artwork.
         if let Some(planned) = artwork::read(folder, warnings) {
+            // Of a plan that was broken off the artwork is newer than the facts.
+            if planned.strokes.len() != plan.strokes {
+                (plan.strokes, plan.length) = (planned.strokes.len(), planned.length());
+            }
             drawn = planned;
             let faults =
                 [run_outcome.latched, run_outcome.drives.map(|it| it.fault).unwrap_or_default()];

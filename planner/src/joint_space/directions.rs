@@ -105,7 +105,7 @@ fn motor_direction(
             ((by_torque * left(current)).min(stalled), rate)
         }
         Motor::Stepper(motor) => {
-            (by_torque * left(share.torque * motor.pull_out_torque(0.0)), f64::INFINITY)
+            (by_torque * left(share.torque * motor.torque_limit(0.0)), f64::INFINITY)
         }
     };
     Some(DirectionLimit {

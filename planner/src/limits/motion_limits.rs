@@ -72,7 +72,7 @@ pub(crate) fn torque_and_slew(motor: &Motor) -> [f64; 2] {
             motor.voltage / motor.inductance * motor.torque_constant,
         ],
         Motor::Stepper(motor) => {
-            let torque = motor.pull_out_torque(0.0);
+            let torque = motor.torque_limit(0.0);
             [torque, torque / SOON]
         }
     }

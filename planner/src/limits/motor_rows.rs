@@ -81,11 +81,11 @@ fn tangent(motor: &StepperMotor, turns: f64, speed: f64) -> [f64; 2] {
     /// How far apart the two points are, as a share of the speed.
     const APART: f64 = 1e-3;
     let speed = if speed.is_finite() { speed } else { motor.largest_speed() / turns.max(1e-9) };
-    let torque = |speed: f64| motor.pull_out_torque(turns * speed);
+    let torque = |speed: f64| motor.torque_limit(turns * speed);
     let here = torque(speed);
     let slope = (here - torque(speed * (1.0 - APART))) / (speed * APART);
     let slope = if slope.is_finite() { slope.min(0.0) } else { 0.0 };
-    let rest = (here - slope * speed).min(motor.holding_torque);
+    let rest = (here - slope * speed).min(motor.torque_limit(0.0));
     [rest, (here - rest) / speed.max(f64::MIN_POSITIVE)]
 }
 

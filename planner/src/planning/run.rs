@@ -27,6 +27,12 @@ pub(crate) trait Outlet {
     /// Whether nobody wants them any more.
     fn is_abandoned(&self) -> bool;
 
+    /// Notes that a window has been planned, which will be taken after those before it.
+    fn note(&mut self, _window: &Window) {}
+
+    /// Forgets the windows that were noted and not taken: they are planned anew.
+    fn forget(&mut self) {}
+
     /// Takes the next window; gives it back when there is no room for it yet.
     fn take(&mut self, window: Window) -> Result<(), Window>;
 
@@ -43,7 +49,7 @@ pub(crate) trait Outlet {
     /// Waits a little for room.
     fn wait(&mut self) {}
 
-    /// What the plan comes to so far, asked for after each window and, as `is_last`, at the end.
+    /// What the plan comes to so far, asked for after each window and, as `is_last`, after the last.
     fn heed(&mut self, _facts: &dyn Fn() -> PlanFacts, _is_last: bool) {}
 }
 
@@ -225,9 +231,8 @@ impl MechanismVisitor for Run<'_, '_> {
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
         let Self { task, source, stream, outlet, facts } = self;
         let mut planning = Planning::new(&mechanism, task, source, stream)?;
-        let done = windows(&mut planning, outlet, &facts);
-        outlet.heed(&|| facts.of(&planning), true);
-        done.map(|()| facts.of(&planning))
+        windows(&mut planning, outlet, &facts)?;
+        Ok(facts.of(&planning))
     }
 }
 
@@ -260,6 +265,7 @@ fn windows<const N: usize, M: Mechanism<N>>(
             if let Some((checkpoint, _)) = waiting.pop_front() {
                 planning.restore(checkpoint);
                 waiting.clear();
+                outlet.forget();
                 (setpoints, is_over) = (0, false);
             }
             planning.set_rate(rate);
@@ -270,10 +276,14 @@ fn windows<const N: usize, M: Mechanism<N>>(
             match planning.next_window(&|| outlet.is_abandoned())? {
                 Some(window) => {
                     setpoints += window.setpoints.len();
+                    outlet.note(&window);
                     waiting.push_back((checkpoint, window));
                     outlet.heed(&|| facts.of(planning), false);
                 }
-                None => is_over = true,
+                None => {
+                    is_over = true;
+                    outlet.heed(&|| facts.of(planning), true);
+                }
             }
         } else if waiting.is_empty() {
             return Ok(());

@@ -7,8 +7,9 @@ use messages::artwork::ArtworkLine;
 use messages::finite::first_not_finite;
 use messages::run_folder;
 use runtime::{ServiceError, message};
+use std::collections::VecDeque;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -18,6 +19,9 @@ const INTERVAL: Duration = Duration::from_secs(1);
 /// The files of a plan in a run folder.
 pub(super) struct PlanFiles {
     artwork: BufWriter<File>,
+    /// Where the lines of each window begin that may still be taken back [bytes].
+    begins: VecDeque<u64>,
+    end: u64,
     folder: PathBuf,
     noted: Option<Instant>,
 }
@@ -27,22 +31,51 @@ impl PlanFiles {
     pub(super) fn create(folder: &Path) -> Result<Self, Refusal> {
         let path = folder.join(run_folder::ARTWORK);
         let artwork = File::create(&path).map_err(|source| failed(path, source))?;
-        Ok(Self { artwork: BufWriter::new(artwork), folder: folder.to_owned(), noted: None })
+        Ok(Self {
+            artwork: BufWriter::new(artwork),
+            begins: VecDeque::new(),
+            end: 0,
+            folder: folder.to_owned(),
+            noted: None,
+        })
     }
 
-    /// Adds what is to be marked next.
+    /// Adds what is to be marked in the next window.
     pub(super) fn add(&mut self, lines: &[ArtworkLine]) -> Result<(), Refusal> {
         for line in lines {
             finite(line)?;
         }
-        let mut write = || -> io::Result<()> {
+        let mut write = || -> io::Result<u64> {
             for line in lines {
                 serde_json::to_writer(&mut self.artwork, line)?;
                 self.artwork.write_all(b"\n")?;
             }
-            self.artwork.flush()
+            self.artwork.flush()?;
+            self.artwork.stream_position()
         };
-        write().map_err(|source| failed(self.folder.join(run_folder::ARTWORK), source))
+        let end = write();
+        self.begins.push_back(self.end);
+        self.end = end.map_err(|source| failed(self.folder.join(run_folder::ARTWORK), source))?;
+        Ok(())
+    }
+
+    /// Keeps the lines of the oldest window that may still be taken back.
+    pub(super) fn keep(&mut self) {
+        self.begins.pop_front();
+    }
+
+    /// Takes back the lines of all windows that were not kept.
+    pub(super) fn take_back(&mut self) -> Result<(), Refusal> {
+        let Some(begin) = self.begins.pop_front() else { return Ok(()) };
+        self.begins.clear();
+        self.end = begin;
+        let mut cut = || -> io::Result<u64> {
+            self.artwork.flush()?;
+            self.artwork.get_ref().set_len(begin)?;
+            self.artwork.seek(SeekFrom::Start(begin))
+        };
+        cut().map_err(|source| failed(self.folder.join(run_folder::ARTWORK), source))?;
+        Ok(())
     }
 
     /// Writes what the plan comes to so far, now and then and as `is_last`.

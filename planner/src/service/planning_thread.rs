@@ -182,15 +182,26 @@ impl Outlet for Sending<'_> {
         self.shared.abandoned.load() || self.failed.is_some()
     }
 
+    fn note(&mut self, window: &Window) {
+        // What is marked can be judged only by an artwork that was there before.
+        if !self.is_abandoned()
+            && let Err(refusal) = self.files.add(&window.strokes)
+        {
+            self.failed = Some(refusal);
+        }
+    }
+
+    fn forget(&mut self) {
+        if let Err(refusal) = self.files.take_back() {
+            self.failed = Some(refusal);
+        }
+    }
+
     fn take(&mut self, window: Window) -> Result<(), Window> {
         if self.sender.is_full() {
             return Err(window);
         }
-        // What is marked can be judged only by an artwork that was there before.
-        if let Err(refusal) = self.files.add(&window.strokes) {
-            self.failed = Some(refusal);
-            return Ok(());
-        }
+        self.files.keep();
         self.strokes += window.strokes.iter().filter(|line| !line.goes_on).count() as u64;
         let Window { setpoints, end, estimate, .. } = window;
         let known = Known { end, estimate, strokes: self.strokes };

@@ -318,9 +318,15 @@ fn a_planner_restarted_in_the_middle_of_a_stream_sends_none_of_it() {
 
 /// Rounds of a circle of 30 mm in chords of 0.3 mm, 50 mm/s.
 fn rounds(count: usize) -> String {
-    let mut text = String::from("G21 G90\nM4 S500\nG0 X30 Y0\nG1 F3000\n");
-    for index in 1..=count * 628 {
-        let (sine, cosine) = messages::math::sin_cos(0.01 * index as f64);
+    rounds_in("M4", count, 628)
+}
+
+/// Rounds of it in so many chords each.
+fn rounds_in(policy: &str, count: usize, chords: usize) -> String {
+    let mut text = format!("G21 G90\n{policy} S500\nG0 X30 Y0\nG1 F3000\n");
+    for index in 1..=count * chords {
+        let angle = messages::math::TURN * index as f64 / chords as f64;
+        let (sine, cosine) = messages::math::sin_cos(angle);
         text.push_str(&format!("X{:.3} Y{:.3}\n", 30.0 * cosine, 30.0 * sine));
     }
     text
@@ -355,8 +361,16 @@ fn a_long_job_is_sent_while_it_is_planned() {
 
 #[test]
 fn what_is_not_sent_yet_is_planned_anew_when_it_shall_be_faster() {
+    for policy in ["M3", "M4"] {
+        plans_anew_at_other_rates(&rounds_in(policy, 30, 628));
+        // In parts, of which the next is put behind the one before at any rate.
+        plans_anew_at_other_rates(&rounds_in(policy, 30, 4_000));
+    }
+}
+
+fn plans_anew_at_other_rates(program: &str) {
     let mut bench = Bench::new();
-    bench.offer_program(1, &rounds(30));
+    bench.offer_program(1, program);
     bench.turn_until(PlannerPhase::Streaming);
     bench.say(|progress| (progress.stream, progress.room) = (1, 300));
     let mut all = bench.collect(300);

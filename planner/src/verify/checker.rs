@@ -334,7 +334,7 @@ impl Checker {
                 Motor::Stepper(motor) => {
                     let size = sizing / motor.pull_out_torque(standing(speed));
                     uses.sizing[index] = uses.sizing[index].max(size);
-                    let (torque, most) = (torque.abs(), motor.pull_out_torque(speed));
+                    let (torque, most) = (torque.abs(), motor.torque_limit(speed));
                     let name = named(Quantity::MotorTorque, "N·m");
                     let share = name.below(torque, most, 1.0)?;
                     uses.current[index] = uses.current[index].max(share);
