@@ -82,6 +82,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         match &next {
             Some(contour) => {
                 self.stays_inside(contour)?;
+                self.go_as_low_as(contour);
                 self.front.next += 1;
                 self.front.estimated += self.estimate_of(contour);
                 self.front.goes_on = self.operations.next_part(self.front.next)?.is_some();
