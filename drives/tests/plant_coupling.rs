@@ -93,7 +93,7 @@ fn halving_the_substep_divides_the_error_by_eight() {
 #[test]
 fn where_the_chain_ends_the_plant_jams_with_a_fault() {
     let arm = Arm { stiffness: Some(40.0), reach: 1.2 };
-    let dark = LaserSource { on_delay: 0.0, off_delay: 0.0 };
+    let dark = LaserSource::IDEAL;
     let pose = Pose::at(Vector3::new(0.35, 0.0, 0.0));
     let home = arm.inverse(&pose, (), &Joints::zeros()).unwrap();
     let mut plant =

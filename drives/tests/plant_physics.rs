@@ -16,7 +16,7 @@ use nalgebra::{Vector1, Vector2};
 use shaft::Shaft;
 
 const SUBSTEP: f64 = 50e-6;
-const DARK: LaserSource = LaserSource { on_delay: 0.0, off_delay: 0.0 };
+const DARK: LaserSource = LaserSource::IDEAL;
 
 fn corexy() -> CoreXy {
     match Machine::builtin().mechanism {

@@ -140,7 +140,7 @@ fn the_plant_moves_on_through_skipped_cycles_as_if_the_answers_had_been_missed()
 fn no_skipped_cycle_is_ever_lit_and_what_was_lit_before_is_told() {
     let mut machine = Machine::builtin();
     for off_delay in [0.0, 30e-6, 2.5e-3] {
-        machine.laser = LaserSource { on_delay: 0.0, off_delay };
+        machine.laser = LaserSource { off_delay, ..LaserSource::IDEAL };
         for skipped in 1..8 {
             let mut run = Run::moving(&machine, 20);
             run.lit(lit());

@@ -12,7 +12,7 @@ use messages::time::CYCLE_TIME;
 use messages::{CommandMode, FaultCode, axis::axis_array};
 use shaft::Shaft;
 
-const DARK: LaserSource = LaserSource { on_delay: 0.0, off_delay: 0.0 };
+const DARK: LaserSource = LaserSource::IDEAL;
 
 /// 2 mm a turn: what the tests call micrometres.
 const LEAD: f64 = 0.002 / core::f64::consts::TAU;

@@ -60,6 +60,9 @@ const TRIALS: [usize; 2] = [24, 40];
 /// How much slower each of the latter is.
 const SLOWER: f64 = 0.85;
 
+/// How far a chord may lie from a curve whose depth is told [m].
+const CHORD: f64 = 1e-6;
+
 /// Samples checked between two questions whether anybody still waits for the plan.
 const ASK: u64 = 4096;
 
@@ -70,6 +73,8 @@ pub(crate) struct Task<'a> {
     pub(crate) scope: Scope,
     pub(crate) speeds: Speeds,
     pub(crate) turns: Turns,
+    /// Whether z is the tool's height over the work, below which it must not dip in the dark.
+    pub(crate) z_is_height: bool,
     pub(crate) attitude: crate::geometry::attitude::AttitudeLaw,
     /// How long the job takes at the speeds asked for, if starts and turns took no time [s].
     pub(crate) estimate: f64,
@@ -128,6 +133,8 @@ struct Front<const N: usize, M: Mechanism<N>> {
     /// [m].
     estimated: f64,
     place: Vector3<f64>,
+    /// The least z that was written up to this path, and of it [m].
+    lowest: [f64; 2],
 }
 
 /// What is told of the windows so far.
@@ -233,6 +240,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             lead_in: Some(lead_in),
             estimated: 0.0,
             place: task.start,
+            lowest: [task.start.z; 2],
         };
         let account = Account::default();
         Ok(Self { limits, area: &machine.area, task, operations, front, account, rate: 1.0 })
@@ -373,6 +381,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             speed: 0.0,
         };
         draft.trajectory.pieces.extend(self.front.lead_in.take());
+        self.hold_height();
         let is_last = !self.advance(&mut draft)?;
         let light = &mut self.front.light;
         draft.trajectory.laser =
@@ -404,8 +413,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         self.front.line = operation.line;
         match &operation.kind {
             OperationKind::Path(contour) => {
+                let before = self.front.lowest[1].min(self.front.place.z);
+                self.front.lowest = [before, f64::INFINITY];
                 self.note_rapid(&contour.start().point);
                 self.front.estimated += self.estimate_of(contour);
+                self.go_as_low_as(contour);
                 let contour = self.with_next_parts(contour.clone())?;
                 self.front.place = contour.end().point;
                 self.begin_path(contour, draft)?;
@@ -449,6 +461,24 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             }
         }
         Ok(true)
+    }
+
+    /// Lets the tool go as low as `contour` is written.
+    fn go_as_low_as(&mut self, contour: &Contour) {
+        if !self.task.z_is_height {
+            return;
+        }
+        let points = contour.points(0.0, contour.length(), CHORD);
+        let lowest = &mut self.front.lowest[1];
+        *lowest = points.iter().fold(*lowest, |lowest, point| lowest.min(point[2]));
+        self.hold_height();
+    }
+
+    /// Keeps flights from going lower than the paths that they join.
+    fn hold_height(&mut self) {
+        if self.task.z_is_height {
+            self.limits.lowest = self.front.lowest[0].min(self.front.lowest[1]);
+        }
     }
 
     /// Notes how long a free move to `to` is estimated to take.

@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     fn source(on_delay: f64, off_delay: f64) -> Source {
-        Source::new(&LaserSource { on_delay, off_delay })
+        Source::new(&LaserSource { on_delay, off_delay, ..LaserSource::IDEAL })
     }
 
     fn pulse(on: u32, off: u32) -> LaserCycle {

@@ -371,6 +371,12 @@ table! {
         pub on_delay: AtLeastZero<unit::Duration> = "0 s",
         /// From the gate's closing to darkness, at most 1 s; the planner makes up for it.
         pub off_delay: AtLeastZero<unit::Duration> = "0 s",
+        /// The least power at which the source gives steady light, a share of full power: no less is
+        /// asked of it while it is lit.
+        pub min_power: Fraction = 0.0,
+        /// The least share of the power asked for that power in proportion to the speed (M4) goes
+        /// down to where the tool is slow.
+        pub proportional_floor: Fraction = 0.0,
     }
 }
 

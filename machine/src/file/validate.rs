@@ -160,7 +160,12 @@ fn laser(table: &LaserTable, diagnostics: &mut Diagnostics) -> LaserSource {
             );
         }
     }
-    LaserSource { on_delay: table.on_delay.value, off_delay: table.off_delay.value }
+    LaserSource {
+        on_delay: table.on_delay.value,
+        off_delay: table.off_delay.value,
+        min_power: table.min_power.value,
+        proportional_floor: table.proportional_floor.value,
+    }
 }
 
 /// Refuses a tolerance shorter than a cycle, or longer than any axis could bear.

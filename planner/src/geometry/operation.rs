@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use machine::kinematics::KinematicsError;
 use machine::surface::Surface;
-use machine::{CornerMode, PathLimits};
+use machine::{CornerMode, LaserSource, PathLimits};
 use messages::MAX_EDGES;
 use messages::time::CYCLE_TIME;
 use nalgebra::Vector3;
@@ -16,6 +16,7 @@ use crate::geometry::contour::{Contour, Demand, GAP, Joining};
 use crate::geometry::polyline::{Chord, Polyline, goes_straight};
 use crate::geometry::projected;
 use crate::geometry::track::Track;
+use crate::job::Marking;
 use crate::light::Policy;
 
 /// Shorter moves are not made [m].
@@ -73,6 +74,8 @@ pub(crate) struct Operations<'a> {
     surface: Option<&'a Surface>,
     /// How corners are passed where the job says nothing.
     machine: CornerMode,
+    source: LaserSource,
+    marking: Marking,
     /// How far the path may be from the drawn line [m]; 0 where corners are exact.
     tolerance: f64,
     place: Vector3<f64>,
@@ -81,7 +84,11 @@ pub(crate) struct Operations<'a> {
     done: VecDeque<Operation>,
     /// The last two paths, as they were drawn.
     before: [Option<Extent>; 2],
+    /// Whether the last operation only goes to the dark end of the path before it.
+    leaves_dark_end: bool,
     is_finished: bool,
+    /// Whether some power was raised to the least that the source gives.
+    is_raised: bool,
     /// What a person should know.
     pub(crate) notes: Vec<Note>,
 }
@@ -101,15 +108,24 @@ impl<'a> Operations<'a> {
             limits: *limits,
             surface,
             machine,
+            source: LaserSource::IDEAL,
+            marking: Marking::default(),
             tolerance: Corners::AsMachine.tolerance(machine, limits.tolerance),
             place: start,
             polyline: Polyline::default(),
             contour: None,
             done: VecDeque::new(),
             before: [None; 2],
+            leaves_dark_end: false,
             is_finished: false,
+            is_raised: false,
             notes: Vec::new(),
         }
+    }
+
+    /// Lit by `source`, as `marking` has it.
+    pub(crate) fn lit_by(self, source: LaserSource, marking: Marking) -> Self {
+        Self { source, marking, ..self }
     }
 
     /// The next operation that nothing to come changes; after [`Self::finish`] whatever is left.
@@ -126,9 +142,9 @@ impl<'a> Operations<'a> {
         let line = step.line;
         match &step.action {
             Action::Mark { curve, speed, power } => {
-                let policy =
-                    if power.follows_speed { Policy::Proportional } else { Policy::Constant };
-                let demand = Demand { from: 0.0, power: power.level, speed: *speed, line };
+                let policy = self.marking.policy(power);
+                let power = self.steady(power.level, line);
+                let demand = Demand { from: 0.0, power, speed: *speed, line };
                 self.curve(curve, demand, Some(policy))
             }
             Action::Feed { curve, speed } => {
@@ -143,7 +159,8 @@ impl<'a> Operations<'a> {
             }
             Action::Dwell { time, lit: Some(power) } if *time > 0.0 && *power > 0.0 => {
                 self.flush()?;
-                self.dot((*time, *power), line)
+                let power = self.steady(*power, line);
+                self.dot((*time, power), line)
             }
             Action::Dwell { time, .. } => {
                 self.flush()?;
@@ -239,8 +256,22 @@ impl<'a> Operations<'a> {
         }
         self.flush()?;
         let to = self.placed(&to, line)?;
+        self.leave_dark_end(&to);
         self.done.push_back(Operation { kind: OperationKind::Rapid(to), line });
         Ok(())
+    }
+
+    /// Leaves out the way to the dark end of a path that is at one speed, whose run-out takes the place
+    /// of it, where the tool goes on to `to` at the same height.
+    fn leave_dark_end(&mut self, to: &Vector3<f64>) {
+        if !core::mem::take(&mut self.leaves_dark_end) {
+            return;
+        }
+        if let Some(Operation { kind: OperationKind::Rapid(end), .. }) = self.done.back()
+            && end.z == to.z
+        {
+            self.done.pop_back();
+        }
     }
 
     /// Makes a free move at the end of the polyline a move of its own, unless the path goes straight
@@ -273,6 +304,7 @@ impl<'a> Operations<'a> {
             self.end(contour, false);
         }
         if let Some(Chord { to, demand, .. }) = free {
+            self.leave_dark_end(&to);
             self.done.push_back(Operation { kind: OperationKind::Rapid(to), line: demand.line });
         }
         Ok(())
@@ -337,17 +369,39 @@ impl<'a> Operations<'a> {
         let (mut contour, left) = without_dark_ends(contour, goes_on, &self.limits);
         self.limit_changes(&mut contour);
         if is_first {
-            // Free moves that only lead to a path are left to its approach.
-            if matches!(self.done.back(), Some(Operation { kind: OperationKind::Rapid(_), .. })) {
-                self.done.pop_back();
-            }
+            self.leave_approach();
             self.leave_row_step(&extent);
         }
+        self.leaves_dark_end = left.is_some();
         self.before = if is_first && !goes_on { [self.before[1], Some(extent)] } else { [None; 2] };
         self.done.push_back(Operation { kind: OperationKind::Path(Arc::new(contour)), line });
         if let Some(to) = left {
             self.done.push_back(Operation { kind: OperationKind::Rapid(to), line });
         }
+    }
+
+    /// Leaves a free move that only leads to a path to the approach of that.
+    fn leave_approach(&mut self) {
+        if matches!(self.done.back(), Some(Operation { kind: OperationKind::Rapid(_), .. })) {
+            self.done.pop_back();
+        }
+    }
+
+    /// The power asked for, or the least that the source gives.
+    fn steady(&mut self, power: f64, line: u64) -> f64 {
+        let least = self.source.min_power;
+        if power <= 0.0 || power >= least {
+            return power;
+        }
+        if !core::mem::replace(&mut self.is_raised, true) {
+            let text = format!(
+                "power of {:.3} is marked at {:.3} of full scale, the least that the laser gives \
+                 (min_power)",
+                power, least
+            );
+            self.notes.push(Note { line, text });
+        }
+        least
     }
 
     /// Slows the path where the light would change more often than a cycle can say.
@@ -364,13 +418,14 @@ impl<'a> Operations<'a> {
     /// Leaves out a short step between two rows of a raster: lit at one speed it could only be marked by
     /// two loops, and it lies within the rows' own width; dark it only leads to the next row.
     fn leave_row_step(&mut self, next: &Extent) {
-        let [Some(row), Some(step)] = &self.before else { return };
-        if !is_row_step(row, step, next) {
+        let [Some(row), Some(step)] = self.before else { return };
+        if !is_row_step(&row, &step, next) {
             return;
         }
         let is_path = |operation: &Operation| matches!(operation.kind, OperationKind::Path(_));
         let Some(index) = self.done.iter().rposition(is_path) else { return };
         let Some(Operation { line, .. }) = self.done.remove(index) else { return };
+        self.leave_approach();
         if !step.is_lit {
             return;
         }

@@ -18,6 +18,7 @@ use super::workpiece_table::{self, AttitudeTable, SurfaceTable};
 use super::{Job, JobError, Marking, MarkingSpeed, gcode, points};
 
 use crate::drawing::{Drawing, Power, Turns};
+use crate::light::Policy;
 
 table! {
     /// What to mark, and how: exactly one of `letters`, `points`, `path`, `cloud` and `gcode`.
@@ -94,6 +95,10 @@ table! {
         pub tolerance: Option<Quantity<Length, Positive>>,
         /// Power of the laser, full power when left out.
         pub power: Option<Fraction<Positive>>,
+        /// How the light goes with the speed along lines: `constant` marks at one speed and comes to it
+        /// in the dark, `proportional` lights from rest to rest with power in proportion to the speed.
+        /// When left out, a G-code program's M3 and M4 say it, and other jobs are `constant`.
+        pub policy: Option<Spanned<Policy>>,
     }
 }
 
@@ -357,6 +362,7 @@ fn how(table: &MarkingTable) -> Marking {
         }),
         max_speed: table.max_speed.as_ref().map(|speed| speed.value),
         tolerance: table.tolerance.as_ref().map(|tolerance| tolerance.value),
+        policy: table.policy.as_ref().map(|policy| policy.value),
         turns: Turns::default(),
     }
 }

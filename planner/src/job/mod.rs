@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 use machine::document::{Document, nearest};
 use machine::{DocumentError, Machine, Override};
 
-use crate::drawing::{Action, Drawing, Step, Turns};
+use crate::drawing::{Action, Drawing, Power, Step, Turns};
+use crate::light::Policy;
 use gcode::GcodeError;
 use nalgebra::Vector3;
 
@@ -80,8 +81,18 @@ pub struct Marking {
     /// How far a smoothed join may lie from the drawn line, and the tool from its path between two
     /// setpoints [m].
     pub tolerance: Option<f64>,
+    /// How the light goes with the speed along lines; `None` leaves it to each line of the job.
+    pub policy: Option<Policy>,
     /// How the tool gets from one line to the next.
     pub turns: Turns,
+}
+
+impl Marking {
+    /// How the light goes with the speed along a line that asks for `power`.
+    pub(crate) fn policy(&self, power: &Power) -> Policy {
+        let asked = if power.follows_speed { Policy::Proportional } else { Policy::Constant };
+        self.policy.unwrap_or(asked)
+    }
 }
 
 /// The policy for the speed while the laser is on, constant along each stroke.

@@ -66,12 +66,13 @@ impl<const N: usize> Followed<N> {
     }
 }
 
-/// Whether the tool stays inside `area`.
-pub(crate) fn stays_inside(flight: &Flight, area: &WorkArea) -> bool {
+/// Whether the tool stays inside `area`, and not below `lowest` [m].
+pub(crate) fn stays_inside(flight: &Flight, area: &WorkArea, lowest: f64) -> bool {
     let [lower, upper] = flight.bounds();
-    (0..3).all(|row| {
-        lower[row] >= area.lower[row] - ROUNDING && upper[row] <= area.upper[row] + ROUNDING
-    })
+    lower[2] >= lowest - ROUNDING
+        && (0..3).all(|row| {
+            lower[row] >= area.lower[row] - ROUNDING && upper[row] <= area.upper[row] + ROUNDING
+        })
 }
 
 /// How the joints follow `flight` from `start`, up to where they use more than `most` of a limit; `None`
@@ -84,7 +85,7 @@ pub(crate) fn follow_flight<const N: usize, M: Mechanism<N>>(
     shares: &Tightening,
     most: f64,
 ) -> Option<Followed<N>> {
-    if limits.scope == Scope::Machine && !stays_inside(flight, area) {
+    if limits.scope == Scope::Machine && !stays_inside(flight, area, limits.lowest) {
         return None;
     }
     let mut followed = Followed { end: *start, used: [[0.0; JointLimit::COUNT]; N] };

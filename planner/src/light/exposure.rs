@@ -101,7 +101,8 @@ impl Light {
         Ok(())
     }
 
-    /// Power in proportion to the mean speed of each cycle.
+    /// Power in proportion to the mean speed of each cycle, down to what the source and the policy
+    /// leave.
     fn follow(
         &mut self,
         demand: &Demand,
@@ -110,13 +111,15 @@ impl Light {
         marking: f64,
     ) {
         let asked = demand.speed.unwrap_or(marking);
+        let LaserSource { min_power, proportional_floor, .. } = self.source;
+        let least = (demand.power * proportional_floor).max(min_power).min(demand.power);
         let mut from = begin;
         while from < until {
             let border = ((from / CYCLE_TIME + 1e-6).floor() + 1.0) * CYCLE_TIME;
             let to = border.min(until);
             let [here, there] = [from, to].map(|time| law.at(time - start).position);
             let speed = (there - here) / (to - from);
-            self.to(from, (demand.power * speed / asked).min(demand.power));
+            self.to(from, (demand.power * speed / asked).min(demand.power).max(least));
             from = to;
         }
     }

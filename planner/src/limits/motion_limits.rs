@@ -24,6 +24,8 @@ pub(crate) struct MotionLimits<'a, const N: usize, M: Mechanism<N>> {
     pub(crate) branches: Vec<M::Branch>,
     pub(crate) attitude: AttitudeLaw,
     pub(crate) scope: Scope,
+    /// The least z of the paths that a flight joins, below which it does not go [m].
+    pub(crate) lowest: f64,
 }
 
 impl<'a, const N: usize, M: Mechanism<N>> MotionLimits<'a, N, M> {
@@ -37,7 +39,7 @@ impl<'a, const N: usize, M: Mechanism<N>> MotionLimits<'a, N, M> {
         scope: Scope,
     ) -> Self {
         let branches = configuration::branches(mechanism, near);
-        Self { mechanism, axes, path, branches, attitude, scope }
+        Self { mechanism, axes, path, branches, attitude, scope, lowest: f64::NEG_INFINITY }
     }
 
     /// The joints' motion for `tool`, turned as the job asks, continuous with `previous`.

@@ -84,6 +84,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         match &next {
             Some(contour) => {
                 self.stays_inside(contour)?;
+                self.go_as_low_as(contour);
                 self.front.next += 1;
                 self.front.estimated += self.estimate_of(contour);
                 self.front.place = contour.end().point;

@@ -13,11 +13,13 @@ use super::source::{Source, Steps};
 use super::{Checkpoint, Planning, Task, Window};
 use crate::drawing::{Action, Note, Step};
 use crate::error::PlanError;
+use crate::geometry::attitude::AttitudeLaw;
 use crate::geometry::operation::{Operation, Operations};
 use crate::geometry::track::Track;
 use crate::job::{Job, MarkingSpeed};
 use crate::joint_space::directions::directions_near;
 use crate::law::optimum::Speeds;
+use crate::light::Policy;
 use crate::limits::motion_limits::Scope;
 use crate::plan::PlanFacts;
 use crate::verify::checker::{LimitViolation, Quantity};
@@ -74,8 +76,10 @@ pub(crate) fn plan_windows(
         tolerance: job.marking.tolerance.unwrap_or(machine.path.tolerance),
         ..machine.path
     };
-    let operations =
-        || Operations::new(drawing.start, &limits, machine.corners, job.surface.as_ref());
+    let operations = || {
+        Operations::new(drawing.start, &limits, machine.corners, job.surface.as_ref())
+            .lit_by(machine.laser, job.marking)
+    };
     let mut notes = drawing.notes.clone();
     let open = if leaves_speeds_open(job) {
         all(Source::new(held(job), operations()))?
@@ -95,6 +99,9 @@ pub(crate) fn plan_windows(
         scope,
         speeds,
         turns: job.marking.turns,
+        z_is_height: machine.mechanism.moves_in_z()
+            && job.surface.is_none()
+            && job.attitude == AttitudeLaw::Level,
         attitude: job.attitude,
         standing,
         estimate,
@@ -145,7 +152,7 @@ fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
 fn leaves_speeds_open(job: &Job) -> bool {
     let is_open = |step: &Step| {
         let Action::Mark { speed, power, .. } = &step.action else { return false };
-        speed.is_none() && !power.follows_speed
+        speed.is_none() && job.marking.policy(power) == Policy::Constant
     };
     match job.marking.speed {
         Some(MarkingSpeed::Constant(_)) => false,
