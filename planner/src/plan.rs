@@ -76,7 +76,7 @@ impl<F: FnMut(&[Setpoint])> Outlet for Through<F> {
         false
     }
 
-    fn take(&mut self, window: Window) -> Result<(), Window> {
+    fn take(&mut self, window: Box<Window>) -> Result<(), Box<Window>> {
         (self.0)(&window.setpoints);
         Ok(())
     }
@@ -117,7 +117,7 @@ impl Outlet for Taking<'_> {
         (self.abandoned)()
     }
 
-    fn take(&mut self, window: Window) -> Result<(), Window> {
+    fn take(&mut self, window: Box<Window>) -> Result<(), Box<Window>> {
         self.whole.trajectory.attitude = window.trajectory.attitude;
         self.whole.trajectory.append(&window.trajectory);
         window.strokes.into_iter().for_each(|line| self.whole.artwork.add(line));

@@ -43,8 +43,8 @@ fn goes_on(machine: &Machine, job: &Job, least: f64, few: usize) -> f64 {
     let facts = plan_through(machine, job, |setpoints| {
         for setpoint in setpoints {
             if let Some(before) = before {
-                let way = (0..3).map(|row| (setpoint.tool[row] - before[row]).powi(2)).sum::<f64>();
-                assert!(way.sqrt() <= 1.01e-3 * machine.path.rapid.max(machine.path.speed));
+                let way = messages::artwork::distance(&before, &setpoint.tool);
+                assert!(way <= 1.01e-3 * machine.path.rapid.max(machine.path.speed));
             }
             before = Some(setpoint.tool);
             if setpoint.laser.is_lit() {

@@ -35,8 +35,8 @@ pub struct PlanReport {
 
 /// A plan, or what it comes to where nothing else of it is asked for.
 enum Planned {
-    Whole(Plan),
-    Facts(PlanFacts),
+    Whole(Box<Plan>),
+    Facts(Box<PlanFacts>),
 }
 
 /// Runs the command.
@@ -56,11 +56,12 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
     let refuse = |error: PlanError| request.refuse(&error);
     let is_listed = arguments.samples.is_some() || arguments.pulses.is_some();
     let planned = if arguments.ideal {
-        Planned::Whole(planner::plan_ideal(&input.machine, &job).map_err(refuse)?)
+        Planned::Whole(Box::new(planner::plan_ideal(&input.machine, &job).map_err(refuse)?))
     } else if is_listed {
-        Planned::Whole(planner::plan(&input.machine, &job).map_err(refuse)?)
+        Planned::Whole(Box::new(planner::plan(&input.machine, &job).map_err(refuse)?))
     } else {
-        Planned::Facts(planner::plan_through(&input.machine, &job, |_| ()).map_err(refuse)?)
+        let facts = planner::plan_through(&input.machine, &job, |_| ()).map_err(refuse)?;
+        Planned::Facts(Box::new(facts))
     };
     let plan_time = started.elapsed().as_secs_f64();
     let mut sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
@@ -85,7 +86,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
     }
     let facts = match planned {
         Planned::Whole(plan) => plan.facts,
-        Planned::Facts(facts) => facts,
+        Planned::Facts(facts) => *facts,
     };
     let report = PlanReport {
         machine: input.machine.name.clone(),

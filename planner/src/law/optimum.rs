@@ -88,6 +88,12 @@ impl Speeds {
         speeds
     }
 
+    /// The speed that the job has for a lit stretch that asks for `asked` [m/s], however fast the machine
+    /// is: the measure of power that follows the speed.
+    pub(crate) fn asked(&self, asked: Option<f64>) -> f64 {
+        self.fixed.or(asked).unwrap_or(self.open)
+    }
+
     /// The speed of a lit stretch that asks for `asked` [m/s].
     pub(crate) fn of(&self, asked: Option<f64>) -> f64 {
         self.fixed.or(asked).unwrap_or(self.open).min(self.most)

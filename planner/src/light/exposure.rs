@@ -62,14 +62,15 @@ impl Light {
 
     /// Lights the stretches of `contour` that `law` goes through from `start` on [s]. Power that is
     /// asked for at a speed follows the true one where the policy, or the lack of room for a
-    /// run-in, says so.
+    /// run-in, says so. `asked` gives the speed of a demand as the job has it [m/s], and how much faster it
+    /// is asked for now, which the power makes up for.
     pub(crate) fn path(
         &mut self,
         contour: &Contour,
         law: &TimeLaw,
         start: f64,
         follows: bool,
-        marking: f64,
+        asked: &dyn Fn(&Demand) -> (f64, f64),
     ) -> Result<(), TooShort> {
         let places = law.places();
         let follows = follows || contour.policy == Policy::Proportional;
@@ -88,10 +89,16 @@ impl Light {
             if !self.is_lit {
                 self.stroke += 1;
             }
+            let (speed, faster) = asked(&demand);
             if follows {
-                self.follow(&demand, law, [start, begin, until], marking);
+                self.follow(
+                    [demand.power, demand.power * faster],
+                    speed,
+                    law,
+                    [start, begin, until],
+                );
             } else {
-                self.to(begin, demand.power);
+                self.to(begin, demand.power * faster);
             }
         }
         if places.end >= contour.length() - GAP && self.is_lit {
@@ -101,25 +108,24 @@ impl Light {
         Ok(())
     }
 
-    /// Power in proportion to the mean speed of each cycle, down to what the source and the policy
-    /// leave.
+    /// Power in proportion to the mean speed of each cycle, `power` at the speed `asked` [m/s] and `most`
+    /// at most, down to what the source and the policy leave.
     fn follow(
         &mut self,
-        demand: &Demand,
+        [power, most]: [f64; 2],
+        asked: f64,
         law: &TimeLaw,
         [start, begin, until]: [f64; 3],
-        marking: f64,
     ) {
-        let asked = demand.speed.unwrap_or(marking);
         let LaserSource { min_power, proportional_floor, .. } = self.source;
-        let least = (demand.power * proportional_floor).max(min_power).min(demand.power);
+        let least = (power * proportional_floor).max(min_power).min(power);
         let mut from = begin;
         while from < until {
             let border = ((from / CYCLE_TIME + 1e-6).floor() + 1.0) * CYCLE_TIME;
             let to = border.min(until);
             let [here, there] = [from, to].map(|time| law.at(time - start).position);
             let speed = (there - here) / (to - from);
-            self.to(from, (demand.power * speed / asked).min(demand.power).max(least));
+            self.to(from, (power * speed / asked).min(most).max(least));
             from = to;
         }
     }

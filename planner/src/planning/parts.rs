@@ -207,7 +207,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let mut speeds = self.limits_for(&run.contour, run.most);
         if let End::Moving { speed, acceleration } = run.begin {
             // What it still gains before its acceleration is gone.
-            let gained = acceleration.max(0.0).powi(2) / self.limits.path.jerk;
+            let quickening = acceleration.max(0.0);
+            let gained = quickening * quickening / self.limits.path.jerk;
             let to = run.at + self.way_to_slow_down(speed + gained);
             keep_up(&mut speeds, run.at, to, speed + gained);
         }

@@ -9,7 +9,7 @@ use super::windows::Timed;
 use super::{Draft, Planning};
 use crate::drawing::Note;
 use crate::error::{Place, PlanError};
-use crate::geometry::contour::Contour;
+use crate::geometry::contour::{Contour, Demand};
 use crate::geometry::path::Path;
 use crate::joint_space::configuration::{
     Configuration, PathFunction, Refused, candidates, trail, walk,
@@ -141,6 +141,14 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         Ok(())
     }
 
+    /// How much faster than the job asks for a stretch of light is marked: as much as the override says,
+    /// the largest speed allows, and the power can make up for.
+    pub(super) fn faster(&self, demand: &Demand) -> f64 {
+        let speeds = &self.task.speeds;
+        let asked = speeds.of(demand.speed);
+        (asked * self.rate.min(1.0 / demand.power)).min(speeds.most) / asked
+    }
+
     /// The speed limits along a contour, stretch by stretch.
     pub(super) fn speed_limits(&self, contour: &Contour) -> Vec<SpeedLimit> {
         let path = &self.limits.path;
@@ -149,7 +157,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         for (demand, least) in contour.demands().iter().zip(by_source) {
             let (speed, source) = if demand.power > 0.0 {
                 let most = self.task.speeds.most;
-                let asked = (self.task.speeds.of(demand.speed) * self.rate).min(most);
+                let asked = self.task.speeds.of(demand.speed) * self.faster(demand);
                 (asked, if asked < most { Source::FEED } else { Source::MARKING_SPEED })
             } else {
                 match demand.speed {

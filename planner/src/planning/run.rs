@@ -36,7 +36,7 @@ pub(crate) trait Outlet {
     fn forget(&mut self) {}
 
     /// Takes the next window; gives it back when there is no room for it yet.
-    fn take(&mut self, window: Window) -> Result<(), Window>;
+    fn take(&mut self, window: Box<Window>) -> Result<(), Box<Window>>;
 
     /// How many setpoints may be planned before they can be taken.
     fn ahead(&self) -> usize {
@@ -249,7 +249,7 @@ fn windows<const N: usize, M: Mechanism<N>>(
     outlet: &mut dyn Outlet,
     facts: &Facts<'_>,
 ) -> Result<(), PlanError> {
-    let mut waiting: VecDeque<(Checkpoint<N, M>, Window)> = VecDeque::new();
+    let mut waiting: VecDeque<(Checkpoint<N, M>, Box<Window>)> = VecDeque::new();
     let mut setpoints = 0;
     let mut is_over = false;
     loop {
@@ -284,7 +284,7 @@ fn windows<const N: usize, M: Mechanism<N>>(
                 Some(window) => {
                     setpoints += window.setpoints.len();
                     outlet.note(&window);
-                    waiting.push_back((checkpoint, window));
+                    waiting.push_back((checkpoint, Box::new(window)));
                     outlet.heed(&|| facts.of(planning), false);
                 }
                 None => {

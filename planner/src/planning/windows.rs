@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use super::paths::PathRun;
 use super::{Draft, Planning, Slowed, plateau};
 use crate::error::PlanError;
-use crate::geometry::contour::Contour;
+use crate::geometry::contour::{Contour, Demand};
 use crate::joint_space::configuration::{Configuration, Refused};
 use crate::joint_space::follow_flight::uses;
 use crate::law::flight::State;
@@ -267,11 +267,14 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let start = self.front.time;
         let before = self.front.light.stroke;
         let begins = run.at == 0.0;
-        let marking = self.task.speeds.of(None);
         // A stop in the light would burn.
         let stops = next == Some(End::Rest) || (run.at > 0.0 && run.begin == End::Rest);
         let follows = run.follows || stops;
-        let lit = self.front.light.path(&run.contour, &law, start, follows, marking);
+        let speeds = &self.task.speeds;
+        let asked = |demand: &Demand| (speeds.asked(demand.speed), self.faster(demand));
+        let mut light = self.front.light.clone();
+        let lit = light.path(&run.contour, &law, start, follows, &asked);
+        self.front.light = light;
         lit.map_err(|short| self.too_short(short))?;
         let stroke = if run.contour.is_lit() {
             (before + 1).min(self.front.light.stroke.max(1))

@@ -31,7 +31,7 @@ pub(super) enum Planned {
     /// The setpoints of the next window, checked, and what is known with them.
     Window(Vec<Setpoint>, Known),
     /// The plan is complete; all its windows came before.
-    Complete(PlanFacts),
+    Complete(Box<PlanFacts>),
     /// The job cannot be done.
     Refused(Refusal),
 }
@@ -86,7 +86,7 @@ impl PlanningThread {
         let thread = std::thread::Builder::new().name("plan".to_owned());
         let thread = thread.spawn(move || {
             let last = match task.plan(&sender) {
-                Ok(facts) => Planned::Complete(facts),
+                Ok(facts) => Planned::Complete(Box::new(facts)),
                 Err(refusal) => Planned::Refused(refusal),
             };
             // Nobody listens any more when the offer was withdrawn.
@@ -162,7 +162,7 @@ impl Outlet for Nowhere<'_> {
         self.shared.abandoned.load()
     }
 
-    fn take(&mut self, _window: Window) -> Result<(), Window> {
+    fn take(&mut self, _window: Box<Window>) -> Result<(), Box<Window>> {
         Ok(())
     }
 }
@@ -197,13 +197,13 @@ impl Outlet for Sending<'_> {
         }
     }
 
-    fn take(&mut self, window: Window) -> Result<(), Window> {
+    fn take(&mut self, window: Box<Window>) -> Result<(), Box<Window>> {
         if self.sender.is_full() {
             return Err(window);
         }
         self.files.keep();
         self.strokes += window.strokes.iter().filter(|line| !line.goes_on).count() as u64;
-        let Window { setpoints, end, estimate, .. } = window;
+        let Window { setpoints, end, estimate, .. } = *window;
         let known = Known { end, estimate, strokes: self.strokes };
         // Nobody listens any more: it will be abandoned.
         let _ = self.sender.send(Planned::Window(setpoints, known));
