@@ -32,10 +32,6 @@ const RESERVE: StreamTime = StreamTime(4 * ONE);
 /// no longer.
 const HINDRANCE: i64 = 2;
 
-/// How much further than an unhindered way up to rate a resume goes back, in quarters. Where it is
-/// hindered more, light comes back before the rate is reached, with its power in proportion.
-const UP_TO_RATE: i64 = 5;
-
 /// Cycles after which a stop is hindered no longer. Planned motion, however it uses the limits, lets it
 /// rest within half of them.
 const PATIENCE: u32 = 400;
@@ -45,7 +41,7 @@ const PLENTY: StreamTime = StreamTime(512 * ONE);
 
 /// Setpoints that a rewind goes further back than the way up to rate, so that the rate is steady
 /// where the light comes back.
-const STEADY: StreamTime = StreamTime(4 * ONE);
+const STEADY: StreamTime = StreamTime(16 * ONE);
 
 /// One deadline and what of the stream belongs to it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -246,8 +242,8 @@ impl Player {
             return;
         }
         let here = self.after.time;
-        let start = UP_TO_RATE * Ramp::starting_distance(self.wanted()).0 / 4;
-        let start = StreamTime(start) + STEADY;
+        // Where the limits hinder it, light comes back before that, with its power in proportion.
+        let start = Ramp::starting_distance(self.wanted()) + STEADY;
         let resting = self.at_planned_rest || lookahead.is_resting(here);
         let light_ahead = !resting && lookahead.may_be_lit(here, here + start);
         let light_from = self.unlit_from.or(light_ahead.then_some(here));

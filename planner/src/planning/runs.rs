@@ -41,6 +41,9 @@ type Make<'a> = dyn Fn(&FlightLimits, &[DirectionLimit]) -> Option<Flight> + 'a;
 /// Says how the joints follow it.
 type Follow<'a, const N: usize> = dyn Fn(&Flight) -> Option<Followed<N>> + 'a;
 
+/// What of acceleration, and squared of jerk, a run-in from rest takes where joints turn.
+const GENTLE: f64 = 0.5;
+
 impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     /// Comes to rest, if the tool moves.
     pub(super) fn halt(&mut self, draft: &mut Draft<'_>) -> Result<(), PlanError> {
@@ -114,14 +117,23 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         start: &Configuration<N>,
         shares: &Tightening,
     ) -> Option<Flight> {
-        let make = |limits: &FlightLimits, directions: &[DirectionLimit]| {
-            Flight::run_in(state, limits, directions)
-        };
         let follow = |flight: &Flight| {
             let first = self.before(flight, start)?;
             follow_flight(&self.limits, self.area, &first, flight, shares, FAR_BEYOND)
         };
-        self.flown(&[*start], shares, &make, &follow).ok().map(|(flight, _)| flight)
+        // Joints that turn may turn back on the way, and need a moment until friction is against them.
+        let gentle = if self.limits.mechanism.is_linear() { 1.0 } else { GENTLE };
+        [gentle, 1.0].into_iter().find_map(|share| {
+            let make = |limits: &FlightLimits, directions: &[DirectionLimit]| {
+                let limits = FlightLimits {
+                    acceleration: share * limits.acceleration,
+                    jerk: share * share * limits.jerk,
+                    ..*limits
+                };
+                Flight::run_in(state, &limits, directions)
+            };
+            self.flown(&[*start], shares, &make, &follow).ok().map(|(flight, _)| flight)
+        })
     }
 
     /// The flight that `make` finds within the limits of the tool, or within those and the ones of the
