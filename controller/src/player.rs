@@ -41,7 +41,7 @@ const PLENTY: StreamTime = StreamTime(512 * ONE);
 
 /// Setpoints that a rewind goes further back than the way up to rate, so that the rate is steady
 /// where the light comes back.
-const STEADY: StreamTime = StreamTime(16 * ONE);
+const STEADY: StreamTime = StreamTime(6 * ONE);
 
 /// One deadline and what of the stream belongs to it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
