@@ -1,13 +1,19 @@
 //! The planning of a job, window by window: each is timed, sampled and checked before it is handed
 //! on, and from the end of each there is a way to rest.
 
+mod account;
+mod ahead;
 mod entry;
+mod estimate;
+mod height;
 mod parts;
 mod paths;
 mod plateau;
+mod refusals;
 pub(crate) mod run;
 mod runs;
 pub(crate) mod source;
+mod trials;
 mod windows;
 
 use std::collections::VecDeque;
@@ -22,23 +28,25 @@ use nalgebra::Vector3;
 
 use crate::drawing::{Note, Turns};
 use crate::error::{Place, PlanError};
-use crate::geometry::contour::{Contour, Demand};
+use crate::geometry::contour::Contour;
 use crate::geometry::operation::OperationKind;
 use crate::joint_space::configuration::{Configuration, Refused};
 use crate::joint_space::joint_move::JointMove;
 use crate::joint_space::route::{Router, still};
 use crate::law::flight::State;
 use crate::law::optimum::Speeds;
-use crate::light::exposure::{Light, TooShort, told_ahead};
+use crate::light::exposure::{Light, told_ahead};
 use crate::limits::motion_limits::{MotionLimits, Scope};
 use crate::limits::source::{Shares, Source};
 use crate::limits::tightening::Tightening;
 use crate::sampling::sampler::{Sampler, Unreachable};
 use crate::trajectory::{BEFORE, Motion, Piece, Trajectory};
-use crate::verify::checker::{Checker, LimitViolation, Quantity};
+use crate::verify::checker::{Checker, LimitViolation};
 use crate::verify::interpolation::InterpolationCheck;
+use account::{Account, Slowed};
 use paths::PathRun;
 use source::Source as Operations;
+pub(crate) use trials::{Failure, Trials};
 use windows::dot as dot_of;
 
 /// Rest before and after an output changes [s]: a cycle each.
@@ -50,21 +58,18 @@ const PAUSE_REST: f64 = 0.1;
 /// Jobs that last longer are refused, most likely for a wrong number [s].
 const LONGEST: f64 = 7.0 * 86_400.0;
 
-/// The share of a job that counts as done as estimated when its time is told.
-const LITTLE: f64 = 0.05;
-
-/// How often a window that breaks a limit is planned again with less of it, and how often after that
-/// slower as a whole.
-const TRIALS: [usize; 2] = [24, 40];
-
-/// How much slower each of the latter is.
-const SLOWER: f64 = 0.85;
-
-/// How far a chord may lie from a curve whose depth is told [m].
-const CHORD: f64 = 1e-6;
+/// How long after it the samples still tell of a motion [s]: differences over the cycles before, and the
+/// mean over one.
+const REMEMBERED: f64 = 2.0 * CYCLE_TIME;
 
 /// Samples checked between two questions whether anybody still waits for the plan.
 const ASK: u64 = 4096;
+
+/// The rest before the first motion [s]: whole cycles, so that a source that is told ahead of the first
+/// light is told at rest.
+fn first_rest(machine: &Machine) -> f64 {
+    BEFORE + (machine.laser.on_delay / CYCLE_TIME).ceil() * CYCLE_TIME
+}
 
 /// What a job does, read and understood.
 pub(crate) struct Task<'a> {
@@ -98,15 +103,6 @@ pub(crate) struct Window {
     pub(crate) estimate: f64,
 }
 
-/// A line that the limits slow below what was asked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Slowed {
-    pub(crate) line: u64,
-    pub(crate) asked: f64,
-    pub(crate) speed: f64,
-    pub(crate) place: Vector3<f64>,
-}
-
 /// What the planning of a window changes.
 #[derive(Clone)]
 struct Front<const N: usize, M: Mechanism<N>> {
@@ -118,7 +114,7 @@ struct Front<const N: usize, M: Mechanism<N>> {
     goes_on: bool,
     /// Number of the next operation, and parts of a path that was divided.
     next: usize,
-    parts: VecDeque<Arc<crate::geometry::contour::Contour>>,
+    parts: VecDeque<Arc<Contour>>,
     time: f64,
     outputs: u64,
     light: Light,
@@ -137,28 +133,18 @@ struct Front<const N: usize, M: Mechanism<N>> {
     lowest: [f64; 2],
 }
 
-/// What is told of the windows so far.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Account {
-    pub(crate) shares: Shares,
-    /// The line that is slowed most, and how many are.
-    slowed: Option<Slowed>,
-    slowed_lines: u64,
-    pub(crate) notes: Vec<Note>,
-    /// The largest speed while the laser is on [m/s].
-    pub(crate) speed: f64,
-    /// The largest that the job asks for while the laser is on [m/s].
-    pub(crate) asked: f64,
-    /// Length that is marked [m], and the number of lines and dots.
-    pub(crate) length: f64,
-    pub(crate) strokes: u64,
-}
-
 /// Where planning can go back to.
 #[derive(Clone)]
 pub(crate) struct Checkpoint<const N: usize, M: Mechanism<N>> {
     front: Front<N, M>,
     account: Account,
+}
+
+impl<const N: usize, M: Mechanism<N>> Checkpoint<N, M> {
+    /// Stream time at which the next window begins [s].
+    pub(crate) fn time(&self) -> f64 {
+        self.front.time
+    }
 }
 
 /// A job under way.
@@ -199,9 +185,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         let limits = MotionLimits::new(mechanism, &machine.axes, limits, &joints, attitude, scope);
         let now = Configuration { joints, branch: 0 };
         let rest = JointMove::standing(&joints, 0);
-        // Whole cycles, so that a source that is told ahead of the first light is told at rest.
-        let cycles = (machine.laser.on_delay / CYCLE_TIME).ceil();
-        let before = BEFORE + cycles * CYCLE_TIME;
+        let before = first_rest(machine);
         if before.is_nan() || before >= LONGEST {
             return Err(PlanError::TooLong { duration: before });
         }
@@ -246,43 +230,43 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         Ok(Self { limits, area: &machine.area, task, operations, front, account, rate: 1.0 })
     }
 
-    /// The next window; `None` after the last.
+    /// The next window, with less and less of the limits that it breaks, from `trials` on; `None` after
+    /// the last. `may_go_back` says whether the window before can still be planned again.
     ///
     /// # Errors
-    /// What no speed can do, with its place.
+    /// What no speed can do, with its place; or what only the window before can mend.
     pub(crate) fn next_window(
         &mut self,
+        mut trials: Trials,
+        may_go_back: bool,
         abandoned: &dyn Fn() -> bool,
-    ) -> Result<Option<Window>, PlanError> {
+    ) -> Result<Option<Window>, Failure> {
         if self.front.sampler.has_ended() {
             return Ok(None);
         }
         let checkpoint = self.front.clone();
-        let mut shares = Tightening::none(N);
-        let mut trial = 0;
+        let mut before: Option<LimitViolation> = None;
         loop {
-            let error = match self.attempt(&shares, abandoned) {
+            let error = match self.attempt(trials.shares(), abandoned) {
                 Ok(draft) => return Ok(Some(self.keep(draft))),
                 Err(error) => error,
             };
-            let PlanError::Limit { violation, .. } = &error else { return Err(error) };
-            trial += 1;
-            if trial > TRIALS[0] + TRIALS[1] || violation.quantity.is_place() {
-                return Err(error);
+            let PlanError::Limit { violation, .. } = &error else {
+                return Err(Failure::Here(error));
+            };
+            let is_early = violation.time < checkpoint.time + REMEMBERED;
+            let is_the_same = before.as_ref() == Some(violation);
+            if may_go_back && is_early && is_the_same && trials.has_been_slowed() {
+                return Err(Failure::Before(error));
             }
-            if trial > TRIALS[0] || violation.quantity == Quantity::HeatingCurrent {
-                shares.slow(SLOWER);
-            } else {
-                let axis = violation.axis.as_ref();
-                let index = axis.and_then(|name| self.index_of(name));
-                shares.tighten(violation, index);
+            if may_go_back && is_early && is_the_same {
+                trials.slow();
+            } else if !trials.tighten(violation, self.limits.axes) {
+                return Err(Failure::Here(error));
             }
+            before = Some(violation.clone());
             self.front = checkpoint.clone();
         }
-    }
-
-    fn index_of(&self, axis: &str) -> Option<usize> {
-        self.limits.axes.iter().position(|other| other.name == axis)
     }
 
     fn keep(&mut self, (draft, setpoints): (Draft<'_>, Vec<Setpoint>)) -> Window {
@@ -299,43 +283,9 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         Window { setpoints, trajectory, strokes, end, estimate }
     }
 
-    /// Stream time at the end of the job, as far as it can be told now [s].
-    fn estimate(&self) -> f64 {
-        let Front { time, estimated, .. } = self.front;
-        if self.front.sampler.has_ended() {
-            return time;
-        }
-        let run = self.front.run.as_ref();
-        let ahead = run.map_or(0.0, |run| {
-            self.estimate_of(&run.contour) * (1.0 - run.at / run.contour.length())
-        });
-        let parts = self.front.parts.iter().map(|part| self.estimate_of(part));
-        let ahead = parts.fold(ahead, |sum, part| sum + part);
-        let done = (estimated - ahead).max(0.0);
-        let left = (self.task.estimate - done).max(0.0);
-        // What is still to come is slower than estimated in the same measure as what has been planned, of
-        // which a little says little.
-        let little = LITTLE * self.task.estimate + f64::MIN_POSITIVE;
-        let slower = (time - self.first_rest() + little) / (done / self.rate + little);
-        time + left / self.rate * slower
-    }
-
-    /// How long a path takes at the speeds asked for [s].
-    fn estimate_of(&self, contour: &Contour) -> f64 {
-        let rapid = self.limits.path.rapid;
-        let time = |(demand, end): (Demand, f64)| {
-            let speed = match demand.speed {
-                asked if demand.power > 0.0 => self.task.speeds.of(asked),
-                asked => asked.map_or(rapid, |speed| speed.min(rapid)),
-            };
-            (end - demand.from) / speed
-        };
-        contour.stretches().map(time).sum()
-    }
-
     /// From the first motion to the end of the last window [s].
     pub(crate) fn duration(&self) -> f64 {
-        self.front.time - self.first_rest()
+        self.front.time - first_rest(self.task.machine)
     }
 
     /// Setpoints so far.
@@ -356,6 +306,13 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     /// Goes back to where `checkpoint` was taken.
     pub(crate) fn restore(&mut self, checkpoint: Checkpoint<N, M>) {
         (self.front, self.account) = (checkpoint.front, checkpoint.account);
+    }
+
+    /// Lets a window that is planned again use less of what `error` says was broken. Says whether that is
+    /// worth another trial.
+    pub(crate) fn tighten(&self, trials: &mut Trials, error: &PlanError) -> bool {
+        let PlanError::Limit { violation, .. } = error else { return false };
+        trials.tighten(violation, self.limits.axes)
     }
 
     /// Lets go of what is needed no more when planning goes back to `oldest` at most.
@@ -463,31 +420,6 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         Ok(true)
     }
 
-    /// Lets the tool go as low as `contour` is written.
-    fn go_as_low_as(&mut self, contour: &Contour) {
-        if !self.task.z_is_height {
-            return;
-        }
-        let points = contour.points(0.0, contour.length(), CHORD);
-        let lowest = &mut self.front.lowest[1];
-        *lowest = points.iter().fold(*lowest, |lowest, point| lowest.min(point[2]));
-        self.hold_height();
-    }
-
-    /// Keeps flights from going lower than the paths that they join.
-    fn hold_height(&mut self) {
-        if self.task.z_is_height {
-            self.limits.lowest = self.front.lowest[0].min(self.front.lowest[1]);
-        }
-    }
-
-    /// Notes how long a free move to `to` is estimated to take.
-    fn note_rapid(&mut self, to: &Vector3<f64>) {
-        let way = (to - self.front.place).norm();
-        self.front.estimated += way / self.limits.path.rapid;
-        self.front.place = *to;
-    }
-
     /// Adds a piece of motion.
     fn push(&mut self, duration: f64, motion: Motion, stroke: u64, draft: &mut Draft<'_>) {
         let line = self.front.line;
@@ -575,82 +507,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         self.front.checker.utilization()
     }
 
-    fn place(&self, time: f64) -> (u64, Place) {
-        let piece = self.front.sampler.piece_at(time);
-        let stroke = piece.map_or(0, |piece| piece.stroke);
-        (piece.map_or(0, |piece| piece.line), Place { stroke, time })
-    }
-
-    fn limit(&self, violation: LimitViolation) -> PlanError {
-        let (line, place) = self.place(violation.time);
-        PlanError::Limit { line, place, violation }
-    }
-
-    fn unreachable(&self, found: Unreachable) -> PlanError {
-        let (line, place) = self.place(found.time);
-        PlanError::Unreachable { line, place, cause: found.cause }
-    }
-
-    fn too_short(&self, short: TooShort) -> PlanError {
-        PlanError::TooShort { line: self.front.line, duration: short.duration }
-    }
-
-    /// What it means that nothing can be done from where the job is now.
-    fn refusal(&self, cause: Refused) -> PlanError {
-        let line = self.front.line;
-        let time = self.front.time - self.first_rest();
-        let place = Place { stroke: self.front.light.stroke + 1, time };
-        match cause {
-            Refused::Kinematics(cause) => PlanError::Unreachable { line, place, cause },
-            Refused::NoConfiguration { tried } => PlanError::NoConfiguration { line, place, tried },
-            Refused::Position { axis, value, limit } => {
-                let axis = self.limits.axes.get(axis);
-                let unit = axis.map_or("", |axis| axis.unit.name());
-                let axis = axis.map(|axis| axis.name.clone());
-                let quantity = Quantity::JointPosition;
-                let violation =
-                    LimitViolation { time: place.time, axis, quantity, value, limit, unit };
-                PlanError::Limit { line, place, violation }
-            }
-        }
-    }
-
-    fn first_rest(&self) -> f64 {
-        BEFORE + (self.task.machine.laser.on_delay / CYCLE_TIME).ceil() * CYCLE_TIME
-    }
-
     /// What a person should know of the job so far.
     pub(crate) fn notes(&self) -> Vec<Note> {
         let mut notes = self.operations.notes().to_vec();
         notes.extend_from_slice(&self.account.notes);
         notes.extend(self.account.slowed_note());
         notes
-    }
-}
-
-impl Account {
-    fn note_slowed(&mut self, slowed: &[Slowed]) {
-        let share = |slowed: &Slowed| slowed.speed / slowed.asked;
-        for slowed in slowed {
-            self.slowed_lines += 1;
-            if self.slowed.as_ref().is_none_or(|worst| share(slowed) < share(worst)) {
-                self.slowed = Some(*slowed);
-            }
-        }
-    }
-
-    /// One note for all lines that the limits slow down.
-    fn slowed_note(&self) -> Option<Note> {
-        let Slowed { line, asked, speed, place } = self.slowed?;
-        let mut text = format!(
-            "slowed to {speed:.4} m/s instead of {asked:.4} m/s near x {:.3} mm, y {:.3} mm: the \
-             limits allow no more there",
-            place.x * 1e3,
-            place.y * 1e3
-        );
-        if self.slowed_lines > 1 {
-            text.push_str(&format!("; {} lines are slowed somewhere", self.slowed_lines));
-        }
-        Some(Note { line, text })
     }
 }

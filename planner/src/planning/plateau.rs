@@ -17,7 +17,7 @@ const SHARE: f64 = 0.999;
 
 /// The time of one step along a plateau, and of the longest that is handed on [s].
 const STEP: f64 = 0.5;
-pub(super) const LONGEST: f64 = 4.0;
+pub(super) const LONGEST: f64 = 2.0;
 
 impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     /// The next stretch of `run` at an even speed, where it begins at one and can go on at it for long

@@ -1,16 +1,15 @@
 //! A job from its first window to its last: as far ahead of whoever takes the windows as they let it
 //! be, and planned anew from where they are when the job shall be faster.
 
-use std::collections::VecDeque;
-
 use machine::kinematics::Joints;
 use machine::{Machine, Mechanism, MechanismVisitor, PathLimits, Pose};
 use messages::AxisArray;
 use messages::axis::axis_array;
 use nalgebra::Vector3;
 
+use super::ahead::Ahead;
 use super::source::{Source, Steps};
-use super::{Checkpoint, Planning, Task, Window};
+use super::{Planning, Task, Window};
 use crate::drawing::{Action, Note, Step};
 use crate::error::PlanError;
 use crate::geometry::attitude::AttitudeLaw;
@@ -32,8 +31,8 @@ pub(crate) trait Outlet {
     /// Notes that a window has been planned, which will be taken after those before it.
     fn note(&mut self, _window: &Window) {}
 
-    /// Forgets the windows that were noted and not taken: they are planned anew.
-    fn forget(&mut self) {}
+    /// Forgets the last `count` windows that were noted: they are planned anew.
+    fn forget(&mut self, _count: usize) {}
 
     /// Takes the next window; gives it back when there is no room for it yet.
     fn take(&mut self, window: Box<Window>) -> Result<(), Box<Window>>;
@@ -238,64 +237,7 @@ impl MechanismVisitor for Run<'_, '_> {
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
         let Self { task, source, stream, outlet, facts } = self;
         let mut planning = Planning::new(&mechanism, task, source, stream)?;
-        windows(&mut planning, outlet, &facts)?;
+        Ahead::default().run(&mut planning, outlet, &|planning| facts.of(planning))?;
         Ok(facts.of(&planning))
-    }
-}
-
-/// Plans windows and hands them on until the last is taken.
-fn windows<const N: usize, M: Mechanism<N>>(
-    planning: &mut Planning<'_, N, M>,
-    outlet: &mut dyn Outlet,
-    facts: &Facts<'_>,
-) -> Result<(), PlanError> {
-    let mut waiting: VecDeque<(Checkpoint<N, M>, Box<Window>)> = VecDeque::new();
-    let mut setpoints = 0;
-    let mut is_over = false;
-    loop {
-        if outlet.is_abandoned() {
-            return Err(PlanError::Abandoned);
-        }
-        // First what there is room for: a rate that changes all the time must not hold the job up.
-        while let Some((checkpoint, window)) = waiting.pop_front() {
-            let count = window.setpoints.len();
-            match outlet.take(window) {
-                Ok(()) => setpoints -= count,
-                Err(window) => {
-                    waiting.push_front((checkpoint, window));
-                    break;
-                }
-            }
-        }
-        let rate = outlet.rate();
-        if rate != planning.rate() {
-            if let Some((checkpoint, _)) = waiting.pop_front() {
-                planning.restore(checkpoint);
-                waiting.clear();
-                outlet.forget();
-                (setpoints, is_over) = (0, false);
-            }
-            planning.set_rate(rate);
-        }
-        if !is_over && (waiting.is_empty() || setpoints < outlet.ahead()) {
-            let checkpoint = planning.checkpoint();
-            planning.release(waiting.front().map_or(&checkpoint, |(oldest, _)| oldest));
-            match planning.next_window(&|| outlet.is_abandoned())? {
-                Some(window) => {
-                    setpoints += window.setpoints.len();
-                    outlet.note(&window);
-                    waiting.push_back((checkpoint, Box::new(window)));
-                    outlet.heed(&|| facts.of(planning), false);
-                }
-                None => {
-                    is_over = true;
-                    outlet.heed(&|| facts.of(planning), true);
-                }
-            }
-        } else if waiting.is_empty() {
-            return Ok(());
-        } else {
-            outlet.wait();
-        }
     }
 }

@@ -64,10 +64,10 @@ impl PlanFiles {
         self.begins.pop_front();
     }
 
-    /// Takes back the lines of all windows that were not kept.
-    pub(super) fn take_back(&mut self) -> Result<(), Refusal> {
-        let Some(begin) = self.begins.pop_front() else { return Ok(()) };
-        self.begins.clear();
+    /// Takes back the lines of the last `count` windows, none of which was kept.
+    pub(super) fn take_back(&mut self, count: usize) -> Result<(), Refusal> {
+        let first = self.begins.len().saturating_sub(count);
+        let Some(begin) = self.begins.drain(first..).next() else { return Ok(()) };
         self.end = begin;
         let mut cut = || -> io::Result<u64> {
             self.artwork.flush()?;

@@ -191,8 +191,8 @@ impl Outlet for Sending<'_> {
         }
     }
 
-    fn forget(&mut self) {
-        if let Err(refusal) = self.files.take_back() {
+    fn forget(&mut self, count: usize) {
+        if let Err(refusal) = self.files.take_back(count) {
             self.failed = Some(refusal);
         }
     }

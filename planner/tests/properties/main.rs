@@ -11,7 +11,7 @@
 mod cases;
 mod checks;
 
-use cases::{CURVED, Case, Element, LINEAR, case};
+use cases::{CURVED, Case, Element, LINEAR, Limits, case};
 use machine::Machine;
 use messages::Setpoint;
 use planner::drawing::{Action, Step};
@@ -218,4 +218,31 @@ fn a_raised_limit_never_costs_time_on_turning_joints() {
 #[test]
 fn a_lowered_feed_never_saves_time() {
     for_cases(90, linear(), 5, lowered_feeds_never_save_time);
+}
+
+/// What springs make of the jerk at the end of a line is seen only with the samples after it, when only the
+/// line itself can still mend it.
+#[test]
+fn the_end_of_a_line_that_breaks_a_limit_is_planned_again() {
+    let case = Case {
+        machine: 0,
+        limits: Limits {
+            speed: 0.0,
+            rapid: 0.0,
+            acceleration: 0.487_456_937_831_558_36,
+            jerk: 1.341_557_108_086_386_5,
+            axis_velocity: -0.976_853_527_841_121,
+            axis_acceleration: None,
+            axis_jerk: None,
+            current: 1.0,
+            voltage: 0.503_542_631_282_977_2,
+        },
+        exact: false,
+        delays: [0.0; 2],
+        size: 0.0,
+        elements: vec![Element::Chords(13, 8.881e-5, -2.280_034, 0.0, 0.0, 0)],
+    };
+    let machine = case.machine();
+    plan(&machine, &case.job(&machine)).unwrap();
+    keeps_everything(&case).unwrap();
 }

@@ -1,0 +1,59 @@
+//! What is told of the windows so far.
+
+use nalgebra::Vector3;
+
+use crate::drawing::Note;
+use crate::limits::source::Shares;
+
+/// A line that the limits slow below what was asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Slowed {
+    pub(crate) line: u64,
+    pub(crate) asked: f64,
+    pub(crate) speed: f64,
+    pub(crate) place: Vector3<f64>,
+}
+
+/// What is told of the windows so far.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Account {
+    pub(crate) shares: Shares,
+    /// The line that is slowed most, and how many are.
+    pub(super) slowed: Option<Slowed>,
+    slowed_lines: u64,
+    pub(crate) notes: Vec<Note>,
+    /// The largest speed while the laser is on [m/s].
+    pub(crate) speed: f64,
+    /// The largest that the job asks for while the laser is on [m/s].
+    pub(crate) asked: f64,
+    /// Length that is marked [m], and the number of lines and dots.
+    pub(crate) length: f64,
+    pub(crate) strokes: u64,
+}
+
+impl Account {
+    pub(super) fn note_slowed(&mut self, slowed: &[Slowed]) {
+        let share = |slowed: &Slowed| slowed.speed / slowed.asked;
+        for slowed in slowed {
+            self.slowed_lines += 1;
+            if self.slowed.as_ref().is_none_or(|worst| share(slowed) < share(worst)) {
+                self.slowed = Some(*slowed);
+            }
+        }
+    }
+
+    /// One note for all lines that the limits slow down.
+    pub(super) fn slowed_note(&self) -> Option<Note> {
+        let Slowed { line, asked, speed, place } = self.slowed?;
+        let mut text = format!(
+            "slowed to {speed:.4} m/s instead of {asked:.4} m/s near x {:.3} mm, y {:.3} mm: the \
+             limits allow no more there",
+            place.x * 1e3,
+            place.y * 1e3
+        );
+        if self.slowed_lines > 1 {
+            text.push_str(&format!("; {} lines are slowed somewhere", self.slowed_lines));
+        }
+        Some(Note { line, text })
+    }
+}
