@@ -105,3 +105,29 @@ fn a_folder_is_no_program() {
     let error = Job::open(&path, &[], &Machine::builtin()).unwrap_err();
     assert!(matches!(error, JobError::Unreadable { .. }), "{error}");
 }
+
+/// A free move that goes straight on belongs to the path only if the next mark does: else that begins where
+/// the move ended.
+#[test]
+fn a_mark_back_after_a_free_move_straight_on_is_marked_whole() {
+    let machine = Machine::builtin();
+    for policy in ["M3", "M4"] {
+        let text = format!(
+            "G21 G90\n{policy} S500 F3000\nG0 X10\nG1 X20\nG0 X30\nG1 X5\nG0 X0\nG1 X15 Y5\n"
+        );
+        let program = gcode::read("back.nc", &text, &machine).unwrap();
+        let plan = planner::plan(&machine, &Job::of(program.drawing)).unwrap();
+        let ends: Vec<[f64; 2]> = plan
+            .artwork
+            .strokes
+            .iter()
+            .map(|stroke| {
+                let at = |point: &[f64; 3]| ((point[0] - machine.home[0]) * 1e6).round() / 1e3;
+                [at(&stroke.points[0]), at(stroke.points.last().unwrap())]
+            })
+            .collect();
+        assert_eq!(ends, [[10.0, 20.0], [30.0, 5.0], [0.0, 15.0]], "{policy}");
+        let length = 0.01 + 0.025 + messages::math::hypot(0.015, 0.005);
+        assert!((plan.facts.length - length).abs() < 1e-9, "{policy}: {} m", plan.facts.length);
+    }
+}

@@ -52,7 +52,7 @@ pub(crate) type Drawn = (Track, Vec<Demand>);
 
 impl Polyline {
     pub(crate) fn is_empty(&self) -> bool {
-        self.chords.is_empty()
+        self.chords.is_empty() && self.fitter.is_none()
     }
 
     /// Goes on from `from`, where the polyline ends or begins.
@@ -73,7 +73,12 @@ impl Polyline {
     /// Takes the last move off again.
     pub(crate) fn pop(&mut self) -> Option<Chord> {
         self.vertices.pop();
-        self.chords.pop()
+        let last = self.chords.pop();
+        if self.is_empty() {
+            // What comes next begins anywhere.
+            self.vertices.clear();
+        }
+        last
     }
 
     /// The policy of its light; `None` where all is dark so far.
