@@ -50,7 +50,7 @@ pub use overrides::{MalformedOverride, Override};
 pub use position::Position;
 pub use schema::schema_text;
 #[doc(hidden)]
-pub use schemars::{JsonSchema, Schema, SchemaGenerator};
+pub use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 #[doc(hidden)]
 pub use table::table_schema;
 pub use table::{Field, TableReader};

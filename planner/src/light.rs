@@ -2,9 +2,6 @@
 
 pub(crate) mod exposure;
 
-use machine::document::Keyword;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-
 /// How light and speed go together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Policy {
@@ -15,22 +12,8 @@ pub enum Policy {
     Proportional,
 }
 
-impl Keyword for Policy {
-    const NAME: &'static str = "a policy of the light";
-    const WORDS: &'static [(&'static str, Self)] =
-        &[("constant", Self::Constant), ("proportional", Self::Proportional)];
-}
-
-impl JsonSchema for Policy {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Policy".into()
-    }
-
-    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": ["constant", "proportional"] })
-    }
+machine::keyword! {
+    Policy, "a policy of the light",
+    "constant" => Self::Constant,
+    "proportional" => Self::Proportional,
 }

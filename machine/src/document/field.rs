@@ -318,6 +318,44 @@ pub trait Keyword: Copy + 'static {
     const WORDS: &'static [(&'static str, Self)];
 }
 
+/// Makes a type a [`Keyword`](crate::document::Keyword), in documents and in their schema: the type, what
+/// it chooses, and its words.
+///
+/// ```
+/// #[derive(Debug, Clone, Copy)]
+/// enum Side {
+///     Left,
+///     Right,
+/// }
+///
+/// machine::keyword! { Side, "a side", "left" => Self::Left, "right" => Self::Right }
+/// ```
+#[macro_export]
+macro_rules! keyword {
+    ($type:ty, $name:literal, $($word:literal => $value:expr),+ $(,)?) => {
+        impl $crate::document::Keyword for $type {
+            const NAME: &'static str = $name;
+            const WORDS: &'static [(&'static str, Self)] = &[$(($word, $value)),+];
+        }
+
+        impl $crate::document::JsonSchema for $type {
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($type).into()
+            }
+
+            fn json_schema(
+                _generator: &mut $crate::document::SchemaGenerator,
+            ) -> $crate::document::Schema {
+                $crate::document::json_schema!({ "enum": [$($word),+] })
+            }
+        }
+    };
+}
+
 impl<K: Keyword> Decode for Spanned<K>
 where
     Spanned<K>: JsonSchema,

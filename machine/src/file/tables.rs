@@ -5,15 +5,11 @@
 //!
 //! Their documentation becomes the schema's, so it speaks to whoever writes a machine file.
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-
 use super::mechanism::{
     five_bar::FiveBarTable, mcm::McmTable, polar::PolarTable, prrrp::PrrrpTable,
     serial::SerialTable, tri_planar::TriPlanarTable, twin_actuator::TwinActuatorTable,
 };
-use crate::document::{
-    Either, Fraction, Keyword, Named, NonNegative, Number, Point, Positive, Spanned,
-};
+use crate::document::{Either, Fraction, Named, NonNegative, Number, Point, Positive, Spanned};
 use crate::gcode_settings::ZMeaning;
 use crate::limits::CornerMode;
 use crate::quantity as unit;
@@ -517,61 +513,19 @@ pub enum Unlimited {
     Unlimited,
 }
 
-impl Keyword for Unlimited {
-    const NAME: &'static str = "a range";
-    const WORDS: &'static [(&'static str, Self)] = &[("unlimited", Self::Unlimited)];
+crate::keyword! {
+    Unlimited, "a range",
+    "unlimited" => Self::Unlimited,
 }
 
-impl JsonSchema for Unlimited {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Unlimited".into()
-    }
-
-    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": ["unlimited"] })
-    }
+crate::keyword! {
+    ZMeaning, "a meaning of Z",
+    "ignored" => Self::Ignored,
+    "focus" => Self::Focus,
 }
 
-impl Keyword for ZMeaning {
-    const NAME: &'static str = "a meaning of Z";
-    const WORDS: &'static [(&'static str, Self)] =
-        &[("ignored", Self::Ignored), ("focus", Self::Focus)];
-}
-
-impl JsonSchema for ZMeaning {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "ZMeaning".into()
-    }
-
-    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": ["ignored", "focus"] })
-    }
-}
-
-impl Keyword for CornerMode {
-    const NAME: &'static str = "a way to pass corners";
-    const WORDS: &'static [(&'static str, Self)] =
-        &[("blend", Self::Blend), ("exact", Self::Exact)];
-}
-
-impl JsonSchema for CornerMode {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "CornerMode".into()
-    }
-
-    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": ["blend", "exact"] })
-    }
+crate::keyword! {
+    CornerMode, "a way to pass corners",
+    "blend" => Self::Blend,
+    "exact" => Self::Exact,
 }

@@ -3,13 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use machine::document::{
-    Diagnostics, Document, Either, Fraction, Keyword, Point, Positive, Quantity, Spanned,
-    schema_text,
+    Diagnostics, Document, Either, Fraction, Point, Positive, Quantity, Spanned, schema_text,
 };
 use machine::quantity::{Duration, Length, Speed};
 use machine::{DocumentError, Machine, Override, table};
 use nalgebra::Vector3;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use super::cloud_table::{self, CloudTable};
 use super::letters::{self, Letter, Style};
@@ -109,23 +107,9 @@ pub enum Optimum {
     Optimum,
 }
 
-impl Keyword for Optimum {
-    const NAME: &'static str = "a speed";
-    const WORDS: &'static [(&'static str, Self)] = &[("optimum", Self::Optimum)];
-}
-
-impl JsonSchema for Optimum {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Optimum".into()
-    }
-
-    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": ["optimum"] })
-    }
+machine::keyword! {
+    Optimum, "a speed",
+    "optimum" => Self::Optimum,
 }
 
 /// Why style h2 is for paper only.

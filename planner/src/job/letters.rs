@@ -6,9 +6,7 @@
 
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use machine::document::Keyword;
 use nalgebra::Vector3;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use crate::drawing::{Action, Curve, Drawing, Power, Step};
 
@@ -32,25 +30,11 @@ pub enum Style {
     H2,
 }
 
-impl Keyword for Style {
-    const NAME: &'static str = "a style";
-    const WORDS: &'static [(&'static str, Self)] =
-        &[("curves", Self::Curves), ("h1", Self::H1), ("h2", Self::H2)];
-}
-
-impl JsonSchema for Style {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Style".into()
-    }
-
-    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
-        let words: Vec<&str> = Self::WORDS.iter().map(|(word, _)| *word).collect();
-        json_schema!({ "enum": words })
-    }
+machine::keyword! {
+    Style, "a style",
+    "curves" => Self::Curves,
+    "h1" => Self::H1,
+    "h2" => Self::H2,
 }
 
 /// One of the letters that the source draws.

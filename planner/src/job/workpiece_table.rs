@@ -1,11 +1,10 @@
 //! The job file's tables of the surface that is marked and of how the tool is turned.
 
-use machine::document::{Diagnostics, Keyword, Point, Positive, Quantity, Spanned};
+use machine::document::{Diagnostics, Point, Positive, Quantity, Spanned};
 use machine::quantity::{Angle, Length};
 use machine::surface::{Cone, Placement, Projection, Shape, Surface};
 use machine::table;
 use nalgebra::Vector3;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use super::Job;
 use crate::geometry::attitude::{AttitudeLaw, turned};
@@ -83,29 +82,12 @@ table! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ProjectionWord(Projection);
 
-impl Keyword for ProjectionWord {
-    const NAME: &'static str = "a projection";
-    const WORDS: &'static [(&'static str, Self)] = &[
-        ("develop", Self(Projection::Developed)),
-        ("arc", Self(Projection::Arc)),
-        ("central", Self(Projection::Central)),
-        ("ortho", Self(Projection::Orthographic)),
-    ];
-}
-
-impl JsonSchema for ProjectionWord {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Projection".into()
-    }
-
-    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
-        let words: Vec<&str> = Self::WORDS.iter().map(|(word, _)| *word).collect();
-        json_schema!({ "enum": words })
-    }
+machine::keyword! {
+    ProjectionWord, "a projection",
+    "develop" => Self(Projection::Developed),
+    "arc" => Self(Projection::Arc),
+    "central" => Self(Projection::Central),
+    "ortho" => Self(Projection::Orthographic),
 }
 
 /// The surface of a table; what is wrong with it goes to `diagnostics`.

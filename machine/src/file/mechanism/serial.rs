@@ -1,11 +1,10 @@
 //! The table of a serial arm.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use super::chain;
 use super::{BuildContext, Built};
-use crate::document::{Diagnostics, Keyword, NonNegative, Point, Positive, Quantity, Spanned};
+use crate::document::{Diagnostics, NonNegative, Point, Positive, Quantity, Spanned};
 use crate::file::axes::{Joint, JointUnit};
 use crate::kinematics::{Mechanism, Pose, STANDARD_GRAVITY, TaskSpace};
 use crate::mechanisms::MechanismKind;
@@ -155,46 +154,16 @@ fn frame(table: &FrameTable) -> Pose {
     }
 }
 
-impl Keyword for JointKind {
-    const NAME: &'static str = "a kind of joint";
-    const WORDS: &'static [(&'static str, Self)] =
-        &[("revolute", Self::Revolute), ("prismatic", Self::Prismatic)];
+crate::keyword! {
+    JointKind, "a kind of joint",
+    "revolute" => Self::Revolute,
+    "prismatic" => Self::Prismatic,
 }
 
-impl JsonSchema for JointKind {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "JointKind".into()
-    }
-
-    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": ["revolute", "prismatic"] })
-    }
-}
-
-impl Keyword for TaskSpace {
-    const NAME: &'static str = "a freedom of the tool";
-    const WORDS: &'static [(&'static str, Self)] = &[
-        ("plane", Self::Plane),
-        ("space", Self::Space),
-        ("axis", Self::Axis),
-        ("pose", Self::Pose),
-    ];
-}
-
-impl JsonSchema for TaskSpace {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "TaskSpace".into()
-    }
-
-    fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": ["plane", "space", "axis", "pose"] })
-    }
+crate::keyword! {
+    TaskSpace, "a freedom of the tool",
+    "plane" => Self::Plane,
+    "space" => Self::Space,
+    "axis" => Self::Axis,
+    "pose" => Self::Pose,
 }
