@@ -124,6 +124,12 @@ pub enum Command {
         /// The summary.
         file: PathBuf,
     },
+    /// Print the JSON schema of the files that people write, for editors and generators.
+    Schema {
+        /// Which file.
+        #[arg(value_enum)]
+        file: SchemaFile,
+    },
     /// Print a shell completion script.
     Completions {
         /// The shell.
@@ -134,6 +140,15 @@ pub enum Command {
         /// The folder.
         folder: PathBuf,
     },
+}
+
+/// A file that people write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SchemaFile {
+    /// The machine file.
+    Machine,
+    /// The job file.
+    Job,
 }
 
 /// The machine and the changes to it.

@@ -11,7 +11,6 @@ pub mod files;
 pub mod inputs;
 pub mod output;
 pub mod pipeline;
-pub mod simulation;
 
 use arguments::{Arguments, BenchCommand, Command};
 use clap::Parser;
@@ -61,6 +60,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Controller(arguments) => service::run(Role::Controller, arguments),
         Command::Drives(arguments) => service::run(Role::Drives, arguments),
         Command::Monitor(arguments) => service::run(Role::Monitor, arguments),
+        Command::Schema { file } => manual::schema(*file),
         Command::Completions { shell } => manual::completions(*shell),
         Command::Manual { folder } => manual::pages(folder),
         Command::VerifySummary { file } => verify::run(file),

@@ -7,7 +7,6 @@
 mod support;
 
 use drives::PlantOptions;
-use graver::simulation::simulate;
 use machine::Machine;
 use messages::ControllerReport;
 use messages::artwork::{Artwork, distance};
@@ -17,6 +16,7 @@ use monitor::marks::{MarkEvaluation, MarkEvaluator, StreamEnd};
 use monitor::recording::CycleRecord;
 use planner::Job;
 use support::Place;
+use workbench::simulation::simulate;
 
 struct Recorded {
     artwork: Artwork,

@@ -11,7 +11,6 @@ mod support;
 use std::path::{Path, PathBuf};
 
 use drives::{PlantOptions, SimulatedPlant};
-use graver::simulation::simulate;
 use machine::Machine;
 use messages::finite::first_not_finite;
 use messages::random::SplitMix64;
@@ -21,6 +20,7 @@ use monitor::run_analysis::{Clock, RunAnalysis};
 use monitor::summary::Outcome;
 use planner::request::JobRequest;
 use support::Place;
+use workbench::simulation::simulate;
 
 /// What a mark may be off its line beyond the path's tolerance [m]: what the sample jobs of the files
 /// as they are come to (docs/accuracy.md), and as much again.

@@ -47,6 +47,16 @@ fn the_committed_schemas_are_the_generated_ones() {
 }
 
 #[test]
+fn the_schemas_of_files_are_printed_as_they_are_committed() {
+    let place = Place::new();
+    for (file, committed) in [("machine", "machines/schema.json"), ("job", "jobs/schema.json")] {
+        let ended = place.graver(&["schema", file]);
+        ended.accepted();
+        assert_eq!(ended.output, std::fs::read_to_string(support::source(committed)).unwrap());
+    }
+}
+
+#[test]
 fn a_schema_refuses_what_it_does_not_describe() {
     for (name, schema) in schemas() {
         let validator = jsonschema::validator_for(schema.as_value()).unwrap();

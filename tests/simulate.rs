@@ -8,13 +8,13 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use drives::PlantOptions;
-use graver::simulation::simulate;
 use machine::{Machine, Override};
 use messages::ControllerReport;
 use messages::time::CYCLE_TIME;
 use monitor::marks::{Marks, StreamEnd};
 use monitor::run_analysis::{Clock, RunAnalysis};
 use planner::Job;
+use workbench::simulation::simulate;
 
 const MACHINES: [&str; 2] = ["cartesian", "corexy"];
 const LETTERS: [&str; 4] = ["N", "A", "S", "O"];

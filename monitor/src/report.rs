@@ -1,6 +1,7 @@
 //! The report of a run: one page that opens offline, and the picture of the path by itself.
 
 pub mod chart;
+pub mod html;
 pub mod page;
 pub mod path;
 pub mod workspace;

@@ -250,7 +250,7 @@ pub fn simulate(arguments: &BenchArguments) -> Result<Exit, Failure> {
     );
     let planned = request.plan(&input.machine)?;
     speed(arguments, || {
-        let simulated = crate::simulation::simulate(
+        let simulated = workbench::simulation::simulate(
             &input.machine,
             &input.plant,
             &planned,

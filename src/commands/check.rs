@@ -2,12 +2,10 @@
 
 pub mod axes;
 pub mod job;
-pub mod reach;
 mod text;
 
 use self::axes::AxisReport;
 use self::job::JobReport;
-use self::reach::{ReachReport, Surveyed};
 use crate::arguments::CheckArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::Sources;
@@ -24,6 +22,7 @@ use planner::request::JobRequest;
 use serde::Serialize;
 use std::io::Write;
 use std::path::{Component, Path, PathBuf};
+use workbench::reach::{self, ReachReport, Surveyed};
 
 /// What `check --json` prints.
 #[derive(Debug, Serialize, schemars::JsonSchema)]

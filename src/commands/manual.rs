@@ -1,6 +1,6 @@
-//! Shell completions and man pages, generated from the command line itself.
+//! What is generated from the code: shell completions, man pages, and the schemas of files.
 
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, SchemaFile};
 use crate::exit::{Exit, Failure};
 use crate::output;
 use clap::CommandFactory;
@@ -16,6 +16,19 @@ pub fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
     // Into memory: it panics where it cannot write.
     clap_complete::generate(shell, &mut Arguments::command(), "graver", &mut script);
     output::printed(std::io::stdout().lock().write_all(&script))?;
+    Ok(Exit::Done)
+}
+
+/// Prints the JSON schema of a file that people write.
+///
+/// # Errors
+/// When standard output cannot be written.
+pub fn schema(file: SchemaFile) -> Result<Exit, Failure> {
+    let schema = match file {
+        SchemaFile::Machine => machine::file::schema(),
+        SchemaFile::Job => planner::job::file::schema(),
+    };
+    output::printed(std::io::stdout().lock().write_all(schema.as_bytes()))?;
     Ok(Exit::Done)
 }
 

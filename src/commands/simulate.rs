@@ -3,7 +3,6 @@
 use crate::arguments::SimulateArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::Claim;
-use crate::simulation::simulate;
 use crate::{inputs, output};
 use drives::PlantOptions;
 use messages::run_folder;
@@ -18,6 +17,7 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::PathBuf;
 use std::time::Instant;
+use workbench::simulation::simulate;
 
 /// Runs the command.
 ///

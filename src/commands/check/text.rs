@@ -2,10 +2,10 @@
 
 use super::axes::{AxisReport, Unit};
 use super::job::{JobReport, MotorUse};
-use super::reach::{Obstacle, ReachReport};
 use super::{CheckReport, CheckWarning};
 use crate::output::say;
 use monitor::summary::MachineSummary;
+use workbench::reach::{Obstacle, ReachReport};
 
 /// Prints it on standard error.
 pub(super) fn print(report: &CheckReport) {

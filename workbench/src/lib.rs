@@ -1,0 +1,8 @@
+//! The workbench of the machine builder: what a job asks of a machine's motors, and what the machine gives.
+//!
+//! It plans and simulates with the stages that run the machine, and looks at what they did. Nothing here is
+//! on the real-time path.
+
+pub mod operating;
+pub mod reach;
+pub mod simulation;
