@@ -11,28 +11,28 @@ pub(crate) mod windows;
 mod build;
 mod cell;
 mod cells;
+mod check;
+mod end_speed;
 mod ends;
 mod estimate;
 mod passes;
-mod plan;
 mod program;
-mod reach;
 mod settings;
 mod solver;
 mod spline;
 mod stretch;
-mod verify;
+mod stretch_planner;
 
 #[cfg(test)]
 mod tests;
 
-pub(crate) use plan::Planner;
 pub(crate) use settings::Settings;
 pub(crate) use stretch::{End, Infeasible};
+pub(crate) use stretch_planner::Planner;
 #[cfg(test)]
 pub(crate) use {
-    plan::plan,
     profile::Along,
     row::{Limits, Row, Side, Site},
+    stretch_planner::plan,
     time_law::TimeLaw,
 };

@@ -1,8 +1,16 @@
-//! Job readers, paths, the time law, laser timing, sampling.
+//! Turns a job file into checked setpoints.
 //!
-//! [`job::Job::read`] turns a file into a drawing, [`plan()`] times it and checks every sample of
-//! it, [`Plan::setpoints`] hands the samples out; [`plan_through`] does both as it goes, and keeps
-//! nothing. Nothing here but [`service`] waits, locks or reads a clock.
+//! - [`job`]: readers of G-code, letters, points, clouds and paths; each makes a [`drawing`].
+//! - [`geometry`]: the drawing's curves, fitted and rounded into paths.
+//! - [`limits`]: what tool, joints, motors and laser allow at each place of a path.
+//! - [`law`]: the time law (velocity profile) of a path, the fastest within them, and flights in the dark.
+//! - [`joint_space`]: configurations, moves of the joints, unwinding.
+//! - [`light`]: gate and power along a path.
+//! - `planning`: puts these together, window by window. [`trajectory`]: the result, as functions of time.
+//! - [`sampling`]: one setpoint each millisecond, with deflection and backlash. [`verify`]: their checker.
+//! - [`service`]: the planner process. It alone waits, locks or reads a clock.
+//!
+//! [`plan()`] keeps the whole plan, [`plan_through`] hands it on window by window and keeps nothing.
 
 pub mod drawing;
 pub mod error;

@@ -6,13 +6,13 @@ mod ahead;
 mod entry;
 mod estimate;
 mod height;
+pub(crate) mod operations;
 mod parts;
 mod paths;
 mod plateau;
 mod refusals;
 pub(crate) mod run;
-mod runs;
-pub(crate) mod source;
+mod run_in_out;
 mod trials;
 mod windows;
 
@@ -36,16 +36,16 @@ use crate::joint_space::route::{Router, still};
 use crate::law::flight::State;
 use crate::law::optimum::Speeds;
 use crate::light::exposure::{Light, told_ahead};
+use crate::limits::limit_id::{BindingTimes, LimitId};
 use crate::limits::motion_limits::{MotionLimits, Scope};
-use crate::limits::source::{Shares, Source};
 use crate::limits::tightening::Tightening;
 use crate::sampling::sampler::{Sampler, Unreachable};
 use crate::trajectory::{BEFORE, Motion, Piece, Trajectory};
 use crate::verify::checker::{Checker, LimitViolation};
 use crate::verify::interpolation::InterpolationCheck;
 use account::{Account, Slowed};
+use operations::OperationQueue;
 use paths::PathRun;
-use source::Source as Operations;
 pub(crate) use trials::{Failure, Trials};
 use windows::dot as dot_of;
 
@@ -152,7 +152,7 @@ pub(crate) struct Planning<'a, const N: usize, M: Mechanism<N>> {
     limits: MotionLimits<'a, N, M>,
     area: &'a WorkArea,
     task: &'a Task<'a>,
-    operations: Operations<'a>,
+    operations: OperationQueue<'a>,
     front: Front<N, M>,
     pub(crate) account: Account,
     /// How much faster than the job asks for it is marked, 1 as it asks.
@@ -168,7 +168,7 @@ struct Draft<'s> {
     shares: &'s Tightening,
     slowed: Vec<Slowed>,
     notes: Vec<Note>,
-    bound: Shares,
+    bound: BindingTimes,
     speed: f64,
 }
 
@@ -177,7 +177,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     pub(crate) fn new(
         mechanism: &'a M,
         task: &'a Task<'a>,
-        operations: Operations<'a>,
+        operations: OperationQueue<'a>,
         stream: u64,
     ) -> Result<Self, PlanError> {
         let Task { machine, limits, scope, attitude, .. } = *task;
@@ -334,7 +334,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             shares,
             slowed: Vec::new(),
             notes: Vec::new(),
-            bound: Shares::default(),
+            bound: BindingTimes::default(),
             speed: 0.0,
         };
         draft.trajectory.pieces.extend(self.front.lead_in.take());
@@ -427,12 +427,12 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         match &motion {
             Motion::Flight(flight) => {
                 let position = flight.at(duration / 2.0).position.into();
-                draft.bound.add(Source::DARK_TURN, duration, line, position);
+                draft.bound.add(LimitId::DARK_TURN, duration, line, position);
             }
             Motion::Joints(JointMove { law: Some(law), .. })
             | Motion::Path { law, is_lit: false, .. } => {
                 for part in law.binding() {
-                    draft.bound.add(Source(part.limit), part.duration, line, [0.0; 3]);
+                    draft.bound.add(LimitId(part.limit), part.duration, line, [0.0; 3]);
                 }
             }
             _ => {}

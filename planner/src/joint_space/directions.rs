@@ -10,11 +10,11 @@ use nalgebra::{SMatrix, Vector3};
 use crate::geometry::attitude::AttitudeLaw;
 use crate::joint_space::configuration::Configuration;
 use crate::law::flight::DirectionLimit;
+use crate::limits::limit_id::JointLimit;
 use crate::limits::motion_limits::{MotionLimits, Scope};
-use crate::limits::source::JointLimit;
 use crate::limits::tightening::{AxisShares, Tightening};
 
-/// Shares of what is left of each joint's limits, by [`JointLimit`].
+/// BindingTimes of what is left of each joint's limits, by [`JointLimit`].
 pub(crate) type Parts<const N: usize> = [[f64; JointLimit::COUNT]; N];
 
 /// What of its torque a motor has in any case, though friction and load take all of the share: [1].

@@ -6,9 +6,9 @@ use machine::{Mechanism, WorkArea};
 use crate::joint_space::configuration::{Configuration, keeps_margins};
 use crate::law::flight::Flight;
 use crate::law::row::Row;
+use crate::limits::limit_id::{JointLimit, LimitId};
 use crate::limits::local::Local;
 use crate::limits::motion_limits::{MotionLimits, Scope};
-use crate::limits::source::{JointLimit, Source};
 use crate::limits::tightening::Tightening;
 
 /// Time between two looks at a flight [s], and how many there are at least: a joint's speed peaks
@@ -55,7 +55,7 @@ impl<const N: usize> Followed<N> {
         self.used.iter().flatten().all(|used| *used <= 1.0)
     }
 
-    fn note(&mut self, source: Source, used: f64) {
+    fn note(&mut self, source: LimitId, used: f64) {
         if let Some((axis, limit)) = source.joint_limit()
             && axis < N
         {
@@ -159,7 +159,7 @@ fn step<const N: usize, M: Mechanism<N>>(
         let state = limits.solve(&motion.position, branch, None)?;
         keeps_margins(limits.mechanism, &state)?;
         rows.clear();
-        let mut local = Local::new(f64::INFINITY, Source::RAPID, 1.0, f64::INFINITY);
+        let mut local = Local::new(f64::INFINITY, LimitId::RAPID, 1.0, f64::INFINITY);
         limits.joint_rows(&motion, &state, shares, &mut local, rows)?;
         Ok(local)
     };
@@ -169,7 +169,7 @@ fn step<const N: usize, M: Mechanism<N>>(
         let used = row.base[2] + row.by_speed[2];
         let room = row.top + row.top_by_speed;
         // Where the speed alone leaves nothing, only less of it helps.
-        followed.note(Source(row.limit), if room > 0.0 { used / room } else { f64::INFINITY });
+        followed.note(LimitId(row.limit), if room > 0.0 { used / room } else { f64::INFINITY });
     }
     Some(())
 }

@@ -15,8 +15,8 @@ use crate::joint_space::joint_move::JointMove;
 use crate::law::End;
 use crate::law::windows::{between, straight};
 use crate::limits::along::{AlongPath, SpeedLimit};
+use crate::limits::limit_id::LimitId;
 use crate::limits::motion_limits::{MotionLimits, Scope};
-use crate::limits::source::Source;
 use crate::limits::tightening::Tightening;
 use crate::trajectory::Motion;
 
@@ -192,7 +192,7 @@ fn straight_move<const N: usize, M: Mechanism<N>>(
     shares: &Tightening,
 ) -> Result<(f64, Motion), Refused> {
     let trail = trail(limits, now, &path)?;
-    let speeds = [SpeedLimit { from: 0.0, speed: limits.path.rapid, source: Source::RAPID }];
+    let speeds = [SpeedLimit { from: 0.0, speed: limits.path.rapid, source: LimitId::RAPID }];
     let mut along = AlongPath::new(limits, &path, &speeds, &trail, shares);
     along.is_exact = true;
     let law = match straight(&mut along, path.length()) {

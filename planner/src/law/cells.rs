@@ -1,6 +1,6 @@
 //! Where the cells of a stretch begin and end.
 
-use super::{estimate::Estimate, reach::Reach};
+use super::{end_speed::EndSpeed, estimate::Estimate};
 
 /// The times of launch cells to try, in times of a cell; the last is always taken.
 pub(super) const LAUNCHES: [f64; 3] = [8.0, 5.0, 3.0];
@@ -24,7 +24,7 @@ const FEWEST: usize = 8;
 /// for `time` [s], but no longer than until ü comes to `most`, the largest from rest [m/s²]. `span` is the length of the
 /// span at the end, which is left whole to the launch when not much remains of it.
 pub(super) fn launch(
-    end: &Reach,
+    end: &EndSpeed,
     most: f64,
     [time, cell_time]: [f64; 2],
     [span, length]: [f64; 2],
@@ -36,7 +36,7 @@ pub(super) fn launch(
 
 /// The length of the first cell of a moving end [m], short enough for the speed not to come to
 /// nothing on it.
-pub(super) fn moving(end: &Reach, usual: f64) -> f64 {
+pub(super) fn moving(end: &EndSpeed, usual: f64) -> f64 {
     if end.acceleration < 0.0 {
         usual.min(BRAKING * end.speed * end.speed / -end.acceleration)
     } else {

@@ -5,7 +5,7 @@
 //! start. Stages are put closer together until an interval takes no more than a cell's time.
 
 use super::{
-    reach::Reach,
+    end_speed::EndSpeed,
     row::{Limits, Row, Side, site},
 };
 
@@ -47,7 +47,7 @@ pub(super) struct Estimate {
     looked: Vec<Row>,
     /// The time from the start to each stage [s].
     times: Vec<f64>,
-    ends: [Reach; 2],
+    ends: [EndSpeed; 2],
     length: f64,
     /// The time of a cell [s].
     pub(super) cell_time: f64,
@@ -62,7 +62,7 @@ impl Estimate {
         from: f64,
         length: f64,
         borders: &[f64],
-        ends: [Reach; 2],
+        ends: [EndSpeed; 2],
         cell_time: f64,
     ) {
         self.stages.clear();

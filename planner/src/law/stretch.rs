@@ -2,10 +2,10 @@
 
 use super::{
     build::square,
+    check::{LAUNCH_TIMES, along, nearest},
+    end_speed::EndSpeed,
     ends::Tie,
-    reach::Reach,
     row::{Limits, Row, Side, site},
-    verify::{LAUNCH_TIMES, along, nearest},
 };
 
 /// How much of a limit of the third order the bends of the path may take in a long launch.
@@ -56,8 +56,8 @@ pub(super) fn reaches(
     length: f64,
     ends: [End; 2],
     rows: &mut Vec<Row>,
-) -> ([Reach; 2], [f64; 2]) {
-    let (mut reaches, mut most) = ([Reach::default(); 2], [1e9_f64; 2]);
+) -> ([EndSpeed; 2], [f64; 2]) {
+    let (mut reaches, mut most) = ([EndSpeed::default(); 2], [1e9_f64; 2]);
     let places = [(0.0, Side::After, 1.0), (length, Side::Before, -1.0)];
     for (end, (place, side, sign)) in places.into_iter().enumerate() {
         rows.clear();

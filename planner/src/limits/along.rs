@@ -8,9 +8,9 @@ use crate::joint_space::configuration::Configuration;
 use crate::joint_space::joint_move::JointLine;
 use crate::law::profile::Along;
 use crate::law::row::{Limits, Row, Side, Site};
+use crate::limits::limit_id::LimitId;
 use crate::limits::local::{Local, derivatives, tool_rows};
 use crate::limits::motion_limits::{MotionLimits, Scope};
-use crate::limits::source::Source;
 use crate::limits::tightening::Tightening;
 
 /// How far beside a border its sides are looked at [m]: more than rounding, less than any span.
@@ -23,7 +23,7 @@ pub(crate) struct SpeedLimit {
     pub(crate) from: f64,
     /// Of the tool [m/s].
     pub(crate) speed: f64,
-    pub(crate) source: Source,
+    pub(crate) source: LimitId,
 }
 
 /// The limits along a path of the tool.
@@ -145,7 +145,7 @@ impl<const N: usize, M: Mechanism<N>> AlongJointLine<'_, '_, N, M> {
         let (acceleration, jerk) = (acceleration * path.acceleration, jerk * path.jerk);
         let stretch = tool.velocity.norm();
         let speed = shares.speed * path.rapid;
-        let mut local = Local::new(speed, Source::RAPID, stretch, jerk);
+        let mut local = Local::new(speed, LimitId::RAPID, stretch, jerk);
         if stretch > 0.0 {
             tool_rows(derivatives(&tool), acceleration, jerk, rows);
         }

@@ -6,9 +6,9 @@ use messages::math;
 use nalgebra::Vector3;
 
 use crate::law::row::Row;
+use crate::limits::limit_id::LimitId;
 use crate::limits::motion_limits::MotionLimits;
 use crate::limits::motor_rows::{AxisMotion, Overload, motor_rows};
-use crate::limits::source::Source;
 use crate::limits::tightening::Tightening;
 
 /// Directions in which the acceleration's norm is held: a polygon inside the circle, with corners
@@ -23,31 +23,31 @@ const STRAIGHT: f64 = 1e-9;
 pub(crate) struct Local {
     /// The largest u̇ [m/s].
     pub(crate) speed: f64,
-    pub(crate) speed_source: Source,
+    pub(crate) speed_source: LimitId,
     /// The largest third derivative of u from rest [m/s³].
     pub(crate) launch: f64,
-    pub(crate) launch_source: Source,
+    pub(crate) launch_source: LimitId,
 }
 
 impl Local {
     /// With the speed of the tool `speed` [m/s] that `source` allows, where it goes |p′| = `stretch`
     /// as fast as u.
-    pub(crate) fn new(speed: f64, source: Source, stretch: f64, jerk: f64) -> Self {
+    pub(crate) fn new(speed: f64, source: LimitId, stretch: f64, jerk: f64) -> Self {
         Self {
             speed: speed / stretch,
             speed_source: source,
             launch: jerk / stretch,
-            launch_source: Source::TOOL_JERK,
+            launch_source: LimitId::TOOL_JERK,
         }
     }
 
-    fn cap(&mut self, speed: f64, source: Source) {
+    fn cap(&mut self, speed: f64, source: LimitId) {
         if speed < self.speed {
             (self.speed, self.speed_source) = (speed, source);
         }
     }
 
-    fn launch(&mut self, jerk: f64, source: Source) {
+    fn launch(&mut self, jerk: f64, source: LimitId) {
         if jerk < self.launch {
             (self.launch, self.launch_source) = (jerk, source);
         }
@@ -94,7 +94,7 @@ pub(crate) fn tool_rows(
                 by_speed: [0.0; 3],
                 top: acceleration * inside,
                 top_by_speed: 0.0,
-                limit: Source::TOOL_ACCELERATION.0,
+                limit: LimitId::TOOL_ACCELERATION.0,
             });
         }
         rows.push(Row {
@@ -102,7 +102,7 @@ pub(crate) fn tool_rows(
             by_speed: [w1, 3.0 * w2, w3 + aside],
             top: jerk * inside,
             top_by_speed: 0.0,
-            limit: Source::TOOL_JERK.0,
+            limit: LimitId::TOOL_JERK.0,
         });
     }
 }
@@ -126,10 +126,10 @@ impl<const N: usize, M: Mechanism<N>> MotionLimits<'_, N, M> {
             let [q1, q2, q3] =
                 [motion.velocity[index], motion.acceleration[index], motion.jerk[index]];
             let velocity = share.velocity * axis.velocity_limit().plan;
-            local.cap(velocity / q1.abs(), Source::joint_velocity(index));
+            local.cap(velocity / q1.abs(), LimitId::joint_velocity(index));
             let acceleration = share.acceleration * axis.acceleration_limit().plan;
             let jerk = share.jerk * axis.jerk_limit().plan;
-            local.launch(jerk / q1.abs(), Source::joint_jerk(index));
+            local.launch(jerk / q1.abs(), LimitId::joint_jerk(index));
             for sign in [1.0, -1.0] {
                 if acceleration.is_finite() {
                     rows.push(Row {
@@ -137,7 +137,7 @@ impl<const N: usize, M: Mechanism<N>> MotionLimits<'_, N, M> {
                         by_speed: [0.0; 3],
                         top: acceleration,
                         top_by_speed: 0.0,
-                        limit: Source::joint_acceleration(index).0,
+                        limit: LimitId::joint_acceleration(index).0,
                     });
                 }
                 if jerk.is_finite() {
@@ -146,7 +146,7 @@ impl<const N: usize, M: Mechanism<N>> MotionLimits<'_, N, M> {
                         by_speed: [sign * q1, sign * 3.0 * q2, sign * q3],
                         top: jerk,
                         top_by_speed: 0.0,
-                        limit: Source::joint_jerk(index).0,
+                        limit: LimitId::joint_jerk(index).0,
                     });
                 }
             }
@@ -191,7 +191,7 @@ impl<const N: usize, M: Mechanism<N>> MotionLimits<'_, N, M> {
                     limit,
                     detail: "the motor's torque in N·m cannot hold the load here",
                 })?;
-            local.cap(speed, Source::voltage(index));
+            local.cap(speed, LimitId::voltage(index));
         }
         Ok(())
     }

@@ -12,7 +12,7 @@
 use machine::{Axis, DcMotor, Motor, StepperMotor};
 
 use crate::law::row::Row;
-use crate::limits::source::Source;
+use crate::limits::limit_id::LimitId;
 use crate::limits::tightening::AxisShares;
 
 /// Where on a stepper's curve of torque over speed its tangent is taken, as a share of the speed that
@@ -57,12 +57,12 @@ pub(crate) fn motor_rows(
     speed: f64,
     rows: &mut Vec<Row>,
 ) -> Result<f64, Overload> {
-    let torque = Source::torque(index).0;
+    let torque = LimitId::torque(index).0;
     match &axis.motor {
         Motor::Dc(motor) => {
             let most = motor.current_limit().plan * motor.torque_constant;
             torque_rows(axis, motion, [most, 0.0], shares.torque, torque, rows)?;
-            voltage_rows(axis, motor, motion, shares, Source::voltage(index).0, rows);
+            voltage_rows(axis, motor, motion, shares, LimitId::voltage(index).0, rows);
             Ok(f64::INFINITY)
         }
         Motor::Stepper(motor) => {

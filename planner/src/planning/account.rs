@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::drawing::Note;
-use crate::limits::source::Shares;
+use crate::limits::limit_id::BindingTimes;
 
 /// A line that the limits slow below what was asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,7 +17,7 @@ pub(crate) struct Slowed {
 /// What is told of the windows so far.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Account {
-    pub(crate) shares: Shares,
+    pub(crate) shares: BindingTimes,
     /// The line that is slowed most, and how many are.
     pub(super) slowed: Option<Slowed>,
     slowed_lines: u64,

@@ -8,7 +8,7 @@ use machine::Mechanism;
 use super::run::Outlet;
 use super::{Checkpoint, Failure, Planning, Trials, Window};
 use crate::error::PlanError;
-use crate::plan::PlanFacts;
+use messages::plan::PlanFacts;
 
 /// What a plan comes to.
 type FactsOf<'f, const N: usize, M> = dyn Fn(&Planning<'_, N, M>) -> PlanFacts + 'f;

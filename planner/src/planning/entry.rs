@@ -7,7 +7,7 @@ use machine::kinematics::ToolMotion;
 
 use super::Planning;
 use super::paths::PathRun;
-use super::runs::{FAR_BEYOND, FOLLOW_TRIALS, Unfit, state};
+use super::run_in_out::{FAR_BEYOND, FOLLOW_TRIALS, Unfit, state};
 use crate::drawing::Turns;
 use crate::geometry::jet::Jet;
 use crate::joint_space::configuration::{Configuration, PathFunction, Refused, candidates, walk};

@@ -266,11 +266,11 @@ fn keep_up(speeds: &mut Vec<SpeedLimit>, from: f64, to: f64, least: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::limits::source::Source;
+    use crate::limits::limit_id::LimitId;
 
     #[test]
     fn a_speed_that_the_tool_has_is_kept_for_a_while() {
-        let limit = |from, speed| SpeedLimit { from, speed, source: Source::FEED };
+        let limit = |from, speed| SpeedLimit { from, speed, source: LimitId::FEED };
         let mut speeds = vec![limit(0.0, 1.0), limit(2.0, 3.0)];
         keep_up(&mut speeds, 1.0, 2.5, 2.0);
         let expected = [limit(0.0, 1.0), limit(1.0, 2.0), limit(2.0, 3.0), limit(2.5, 3.0)];

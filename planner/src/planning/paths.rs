@@ -22,8 +22,8 @@ use crate::law::windows::{even_speed, keeps_even};
 use crate::light::Policy;
 use crate::light::exposure::source_speeds;
 use crate::limits::along::{AlongPath, SpeedLimit};
+use crate::limits::limit_id::LimitId;
 use crate::limits::motion_limits::Scope;
-use crate::limits::source::Source;
 use crate::limits::tightening::Tightening;
 use crate::verify::checker::{LimitViolation, Quantity};
 
@@ -158,13 +158,13 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             let (speed, source) = if demand.power > 0.0 {
                 let most = self.task.speeds.most;
                 let asked = self.task.speeds.of(demand.speed) * self.faster(demand);
-                (asked, if asked < most { Source::FEED } else { Source::MARKING_SPEED })
+                (asked, if asked < most { LimitId::FEED } else { LimitId::MARKING_SPEED })
             } else {
                 match demand.speed {
                     Some(speed) if speed * self.rate < path.rapid => {
-                        (speed * self.rate, Source::FEED)
+                        (speed * self.rate, LimitId::FEED)
                     }
-                    _ => (path.rapid, Source::RAPID),
+                    _ => (path.rapid, LimitId::RAPID),
                 }
             };
             let speed = speed.min(least);
@@ -180,7 +180,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let mut limits = self.speed_limits(contour);
         if let Some(most) = most {
             // One speed all along.
-            let source = Source::TOOL_ACCELERATION;
+            let source = LimitId::TOOL_ACCELERATION;
             limits.iter_mut().for_each(|limit| {
                 (limit.speed, limit.source) = (limit.speed.min(most), source);
             });

@@ -8,7 +8,7 @@ use messages::axis::axis_array;
 use nalgebra::Vector3;
 
 use super::ahead::Ahead;
-use super::source::{Source, Steps};
+use super::operations::{OperationQueue, Steps};
 use super::{Planning, Task, Window};
 use crate::drawing::{Action, Note, Step};
 use crate::error::PlanError;
@@ -20,8 +20,8 @@ use crate::joint_space::directions::directions_near;
 use crate::law::optimum::Speeds;
 use crate::light::Policy;
 use crate::limits::motion_limits::Scope;
-use crate::plan::PlanFacts;
 use crate::verify::checker::{LimitViolation, Quantity};
+use messages::plan::PlanFacts;
 
 /// Who takes the windows of a job.
 pub(crate) trait Outlet {
@@ -81,7 +81,7 @@ pub(crate) fn plan_windows(
     };
     let mut notes = drawing.notes.clone();
     let open = if leaves_speeds_open(job) {
-        all(Source::new(held(job), operations()))?
+        all(OperationQueue::new(held(job), operations()))?
     } else {
         Vec::new()
     };
@@ -110,7 +110,7 @@ pub(crate) fn plan_windows(
         job.steps()
             .map_err(|error| PlanError::Unreadable { line: 0, message: error.to_string() })?,
     );
-    let source = Source::new(steps, operations());
+    let source = OperationQueue::new(steps, operations());
     let facts = Facts { name: &drawing.name, notes };
     let done = machine.mechanism.visit(Run { task: &task, source, stream, outlet, facts });
     done.map_err(|error| at_its_step(error, job))
@@ -168,7 +168,7 @@ fn held(job: &Job) -> Steps<'_> {
     }
 }
 
-fn all(mut source: Source<'_>) -> Result<Vec<Operation>, PlanError> {
+fn all(mut source: OperationQueue<'_>) -> Result<Vec<Operation>, PlanError> {
     let mut operations = Vec::new();
     while let Some(operation) = source.get(operations.len())? {
         operations.push(operation.clone());
@@ -225,7 +225,7 @@ impl Facts<'_> {
 /// Plans a job on a mechanism.
 struct Run<'a, 'o> {
     task: &'a Task<'a>,
-    source: Source<'a>,
+    source: OperationQueue<'a>,
     stream: u64,
     outlet: &'o mut dyn Outlet,
     facts: Facts<'a>,

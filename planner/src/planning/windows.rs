@@ -19,8 +19,8 @@ use crate::law::time_law::TimeLaw;
 use crate::law::windows::{between, keeps_even, straight};
 use crate::law::{End, Infeasible};
 use crate::limits::along::AlongPath;
+use crate::limits::limit_id::{JointLimit, LimitId};
 use crate::limits::motion_limits::Scope;
-use crate::limits::source::{JointLimit, Source};
 use crate::limits::tightening::Tightening;
 use crate::trajectory::Motion;
 
@@ -347,7 +347,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             let line = run.line_at(middle);
             let position: Vector3<f64> = run.path.at(middle).point;
             if run.contour.is_lit() {
-                draft.bound.add(Source(part.limit), part.duration, line, position.into());
+                draft.bound.add(LimitId(part.limit), part.duration, line, position.into());
             }
             let Some(asked) = run.lit_speed_at(middle) else { continue };
             let mean = (part.places.end - part.places.start) / part.duration;

@@ -3,6 +3,7 @@
 use super::{
     build::{Held, Launch, PARTS, Problem},
     cells::{self, LAUNCHES},
+    check::{Look, binding},
     ends::{Tie, Ties},
     estimate::{Estimate, MARGIN},
     program::Program,
@@ -11,7 +12,6 @@ use super::{
     solver::{Outcome, Solver},
     stretch::{End, Infeasible, Stretch, launches, reaches},
     time_law::TimeLaw,
-    verify::{Look, binding},
 };
 
 /// How much the speed bound of the next round is above the speed of this one, for rows that need it.

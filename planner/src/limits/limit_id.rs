@@ -31,9 +31,9 @@ impl JointLimit {
 
 /// A limit by number, as the time law carries it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Source(pub(crate) u16);
+pub(crate) struct LimitId(pub(crate) u16);
 
-impl Source {
+impl LimitId {
     /// The speed that the job asks for.
     pub(crate) const FEED: Self = Self(0);
     /// The machine's largest speed while marking.
@@ -115,9 +115,9 @@ impl Source {
 
 /// How long each limit ruled.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Shares {
+pub(crate) struct BindingTimes {
     /// By limit: the time [s], and the longest single stretch with its line and place.
-    found: std::collections::BTreeMap<Source, Share>,
+    found: std::collections::BTreeMap<LimitId, Share>,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -128,9 +128,9 @@ struct Share {
     position: [f64; 3],
 }
 
-impl Shares {
+impl BindingTimes {
     /// Notes that `source` ruled for `time` [s] near `position` [m] in `line`.
-    pub(crate) fn add(&mut self, source: Source, time: f64, line: u64, position: [f64; 3]) {
+    pub(crate) fn add(&mut self, source: LimitId, time: f64, line: u64, position: [f64; 3]) {
         let share = self.found.entry(source).or_default();
         share.time += time;
         if time > share.worst {

@@ -8,7 +8,7 @@ pub mod gcode;
 pub mod letters;
 pub mod path_table;
 pub mod points;
-mod reach;
+mod within_reach;
 pub mod workpiece_table;
 
 use std::path::{Path, PathBuf};
@@ -144,7 +144,7 @@ const GCODE: [&str; 4] = ["ngc", "nc", "gcode", "tap"];
 const JOB_FILE: &str = "toml";
 
 /// The job of the built-in machine.
-const BUILTIN: &str = include_str!("../../../jobs/letters.toml");
+const BUILTIN: &str = include_str!("../../jobs/letters.toml");
 
 impl Job {
     /// Lines of a G-code program whose steps are held in memory, at most.

@@ -14,7 +14,7 @@ use crate::job::JobError;
 pub(crate) type Steps<'a> = Box<dyn Iterator<Item = Result<Step, JobError>> + 'a>;
 
 /// What a job does, in order.
-pub(crate) struct Source<'a> {
+pub(crate) struct OperationQueue<'a> {
     steps: Steps<'a>,
     operations: Operations<'a>,
     made: VecDeque<Operation>,
@@ -23,7 +23,7 @@ pub(crate) struct Source<'a> {
     is_read: bool,
 }
 
-impl<'a> Source<'a> {
+impl<'a> OperationQueue<'a> {
     /// Of `steps`, which `operations` takes.
     pub(crate) fn new(steps: Steps<'a>, operations: Operations<'a>) -> Self {
         Self { steps, operations, made: VecDeque::new(), first: 0, is_read: false }

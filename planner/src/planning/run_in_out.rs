@@ -12,8 +12,8 @@ use crate::joint_space::configuration::{Configuration, Refused};
 use crate::joint_space::directions::{Parts, directions};
 use crate::joint_space::follow_flight::{Followed, follow_flight, tool};
 use crate::law::flight::{DirectionLimit, Flight, FlightLimits, State};
+use crate::limits::limit_id::JointLimit;
 use crate::limits::motion_limits::Scope;
-use crate::limits::source::JointLimit;
 use crate::limits::tightening::Tightening;
 use crate::trajectory::Motion;
 

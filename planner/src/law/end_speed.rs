@@ -4,7 +4,7 @@ use messages::math::cbrt;
 
 /// The state at an end of a stretch, seen into the stretch, and the third derivative from there.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Reach {
+pub(super) struct EndSpeed {
     /// u̇ at the end [m/s]; 0 at rest.
     pub(super) speed: f64,
     /// ü at the end, positive where the speed grows into the stretch [m/s²].
@@ -13,7 +13,7 @@ pub(super) struct Reach {
     pub(super) jerk: f64,
 }
 
-impl Reach {
+impl EndSpeed {
     /// An upper estimate of the speed at `distance` [m] from the end [m/s].
     pub(super) fn at(&self, distance: f64) -> f64 {
         let distance = distance.max(0.0);
@@ -38,13 +38,13 @@ impl Reach {
 
 #[cfg(test)]
 mod tests {
-    use super::Reach;
+    use super::EndSpeed;
 
     #[test]
     fn the_speed_from_rest_and_from_motion_is_that_of_constant_jerk() {
-        let rest = Reach { speed: 0.0, acceleration: 0.0, jerk: 6.0 };
+        let rest = EndSpeed { speed: 0.0, acceleration: 0.0, jerk: 6.0 };
         assert!((rest.at(1.0) - 3.0).abs() < 1e-9);
-        let moving = Reach { speed: 1.0, acceleration: 2.0, jerk: 6.0 };
+        let moving = EndSpeed { speed: 1.0, acceleration: 2.0, jerk: 6.0 };
         assert!((moving.at(3.0) - 6.0).abs() < 1e-4);
         assert_eq!(moving.at(0.0), 1.0);
     }
