@@ -69,6 +69,13 @@ fn a_five_bar_reaches_what_its_triangles_allow() {
     assert!(sample.ends_with("jobs/five_bar.toml") && !sample.contains(".."), "{sample}");
 }
 
+/// Its sample is built in as well: the path in its text leads nowhere from here.
+#[test]
+fn the_built_in_machine_names_no_file_as_its_sample() {
+    let report = Place::new().graver(&["check", "--json"]).json(0);
+    assert!(report["sample_job"].is_null(), "{}", report["sample_job"]);
+}
+
 #[test]
 fn a_polar_machine_is_nearest_to_its_center_there() {
     // Two lines, one of them 2 mm beside the centre of the table.

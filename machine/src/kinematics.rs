@@ -217,7 +217,7 @@ impl Branch for () {
 /// What a mechanism loses where a margin is used up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MarginKind {
-    /// A freedom of the tool, in a singularity of the first kind. The joints may pass there; a path
+    /// A direction of the tool, in a singularity of the first kind. The joints may pass there; a path
     /// has the rates that it needs, which the limits of the axes judge.
     Serial,
     /// Its hold on the tool, in a singularity of the second kind. Never to be passed.

@@ -28,6 +28,21 @@ fn refused(from: &str, to: &str, expected: &[&str]) {
     assert_eq!(messages, expected);
 }
 
+/// One missing bracket makes hundreds of errors further down, which only follow from it.
+#[test]
+fn of_malformed_toml_the_first_error_is_told() {
+    let text = COREXY.replacen("y = [\"0 mm\", \"200 mm\"]", "y = [\"0 mm\", \"200 mm\"", 1);
+    assert_ne!(text, COREXY);
+    let error = Machine::parse("corexy.toml", &text, &[]).unwrap_err();
+    let lines: Vec<usize> = error.problems().map(|problem| problem.line().unwrap()).collect();
+    let missing = COREXY.lines().position(|line| line.starts_with("y = [")).unwrap() + 1;
+    assert!(lines.len() == 1 && (missing..=missing + 3).contains(&lines[0]), "{lines:?}");
+    // Keys that stand there twice are errors of their own.
+    let twice = COREXY.replacen("[path]\n", "[path]\nspeed = \"1 m/s\"\nspeed = \"2 m/s\"\n", 1);
+    let error = Machine::parse("corexy.toml", &twice, &[]).unwrap_err();
+    assert_eq!(error.problems().count(), 2, "{error}");
+}
+
 #[test]
 fn errors_say_what_is_wrong_and_what_would_be_right() {
     refused(
@@ -101,7 +116,8 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
         "velocity = \"160 rad/s\"",
         "velocity = \"400 rad/s\"",
         &["67:12: the current loop (349 rad/s) must be faster than the velocity loop around it \
-           (400 rad/s); raise the one or lower the other"],
+           (400 rad/s); raise `loops.current` or lower \
+           `loops.velocity`"],
     );
     refused(
         "on_delay = \"0 us\"",

@@ -3,7 +3,7 @@
 use machine::kinematics::KinematicsError;
 use messages::MAX_EDGES;
 
-use crate::verify::checker::LimitViolation;
+use crate::verify::checker::{LimitViolation, Quantity};
 
 /// Why a job was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -72,14 +72,7 @@ pub enum PlanError {
         tried: usize,
     },
     /// A limit of path, area, axis or motor.
-    #[error(
-        "{place}{}: {} of {:.6} {unit} is beyond the limit of {:.6} {unit}",
-        violation.axis.as_ref().map(|axis| format!(", axis {axis}")).unwrap_or_default(),
-        violation.quantity,
-        violation.value,
-        violation.limit,
-        unit = violation.unit
-    )]
+    #[error("{}", beyond(place, violation, zero.as_deref()))]
     Limit {
         /// Line of the job file, 0 for none.
         line: u64,
@@ -87,6 +80,8 @@ pub enum PlanError {
         place: Place,
         /// Which limit, and by how much.
         violation: LimitViolation,
+        /// Where a G-code program has its X0 Y0 Z0, machine frame [m], if it is one place all along.
+        zero: Option<Box<[f64; 3]>>,
     },
 }
 
@@ -106,6 +101,39 @@ impl core::fmt::Display for Place {
             stroke => write!(formatter, "stroke {stroke}, at {:.3} s", self.time),
         }
     }
+}
+
+/// What a person reads of a limit that is broken.
+fn beyond(place: &Place, violation: &LimitViolation, zero: Option<&[f64; 3]>) -> String {
+    let LimitViolation { axis, quantity, value, limit, unit, .. } = violation;
+    let Quantity::ToolPosition(row) = *quantity else {
+        let axis = axis.as_ref().map(|axis| format!(", axis {axis}")).unwrap_or_default();
+        return format!(
+            "{place}{axis}: {quantity} of {value:.6} {unit} is beyond the limit of {limit:.6} {unit}"
+        );
+    };
+    let stroke = match place.stroke {
+        0 => String::new(),
+        stroke => format!("stroke {stroke}: "),
+    };
+    let name = ["x", "y", "z"][row.min(2)];
+    let mut text = format!(
+        "{stroke}{name} of the tool would be {:.3} mm in machine coordinates, outside the area, which \
+         {} at {:.3} mm",
+        value * 1e3,
+        if value > limit { "ends" } else { "begins" },
+        limit * 1e3
+    );
+    if let Some(zero) = zero {
+        let word = name.to_uppercase();
+        text.push_str(&format!(
+            "; {word}0 of the program is at {name} {:.3} mm there, so {word} can be {} {:.3} mm",
+            zero[row.min(2)] * 1e3,
+            if value > limit { "at most" } else { "no less than" },
+            (limit - zero[row.min(2)]) * 1e3
+        ));
+    }
+    text
 }
 
 impl PlanError {

@@ -43,7 +43,7 @@ use crate::sampling::sampler::{Sampler, Unreachable};
 use crate::trajectory::{BEFORE, Motion, Piece, Trajectory};
 use crate::verify::checker::{Checker, LimitViolation};
 use crate::verify::interpolation::InterpolationCheck;
-use account::{Account, Slowed};
+use account::{Account, Asked, Slowed};
 use operations::OperationQueue;
 use paths::PathRun;
 pub(crate) use trials::{Failure, Trials};
@@ -58,8 +58,8 @@ const PAUSE_REST: f64 = 0.1;
 /// Jobs that last longer are refused, most likely for a wrong number [s].
 const LONGEST: f64 = 7.0 * 86_400.0;
 
-/// How long after it the samples still tell of a motion [s]: differences over the cycles before, and the
-/// mean over one.
+/// For how long samples depend on the motion before them [s]: they are differences over earlier cycles and
+/// a mean over one.
 const REMEMBERED: f64 = 2.0 * CYCLE_TIME;
 
 /// Samples checked between two questions whether anybody still waits for the plan.
@@ -164,7 +164,7 @@ struct Draft<'s> {
     trajectory: Trajectory,
     strokes: Vec<ArtworkLine>,
     length: f64,
-    asked: f64,
+    asked: Asked,
     shares: &'s Tightening,
     slowed: Vec<Slowed>,
     notes: Vec<Note>,
@@ -276,7 +276,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         account.notes.extend(notes);
         account.shares.merge(&bound);
         account.speed = account.speed.max(speed);
-        account.asked = account.asked.max(asked);
+        account.asked.add(asked.speed, asked.line);
         account.length += length;
         account.strokes += strokes.iter().filter(|stroke| !stroke.goes_on).count() as u64;
         let (end, estimate) = (self.front.time, self.estimate());
@@ -291,6 +291,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     /// Setpoints so far.
     pub(crate) fn samples(&self) -> u64 {
         self.front.samples
+    }
+
+    /// Whether its last setpoint has been made.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.front.sampler.has_ended()
     }
 
     /// How much faster than the job asks for it is marked.
@@ -330,7 +335,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             trajectory: Trajectory { attitude: self.task.attitude, ..Trajectory::default() },
             strokes: Vec::new(),
             length: 0.0,
-            asked: 0.0,
+            asked: Asked::default(),
             shares,
             slowed: Vec::new(),
             notes: Vec::new(),
@@ -511,6 +516,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     pub(crate) fn notes(&self) -> Vec<Note> {
         let mut notes = self.operations.notes().to_vec();
         notes.extend_from_slice(&self.account.notes);
+        notes.extend(self.account.asked.note(self.task.speeds.most));
         notes.extend(self.account.slowed_note());
         notes
     }

@@ -110,3 +110,31 @@ fn curves_beat_the_table() {
         }
     }
 }
+
+/// A speed that is named is compared with what is marked, and not the one that curves leave of it.
+#[test]
+fn a_letter_that_its_curves_slow_is_noted() {
+    let machine = Machine::builtin();
+    let notes = |style: &str, speed: &str| {
+        let facts = plan(&machine, &job("S", 0.005, style, speed, &machine)).unwrap().facts;
+        (facts.notes, facts.speed, facts.speed_asked)
+    };
+    let (found, speed, asked) = notes("curves", "0.25 m/s");
+    assert!(speed < 0.1 && asked == 0.25, "{speed} of {asked} m/s");
+    assert_eq!(found.len(), 1, "{found:?}");
+    let expected = format!("slowed to {speed:.4} m/s instead of 0.2500 m/s near x ");
+    assert!(found[0].text.starts_with(&expected), "{:?}", found[0]);
+    // What the curves allow, and what is left to the planner, is no surprise.
+    assert_eq!(notes("curves", "0.04 m/s").0, []);
+    assert_eq!(notes("curves", "optimum").0, []);
+}
+
+#[test]
+fn a_speed_beyond_the_largest_marking_speed_is_noted() {
+    let machine = Machine::builtin();
+    let facts = plan(&machine, &job("N", 0.02, "h1", "1 m/s", &machine)).unwrap().facts;
+    let most = machine.path.speed;
+    assert_eq!((facts.speed_asked, facts.speed_limit), (1.0, most));
+    let expected = format!("asks for 1.0000 m/s, marked at {most:.4} m/s at most: ");
+    assert!(facts.notes.iter().any(|note| note.text.starts_with(&expected)), "{:?}", facts.notes);
+}

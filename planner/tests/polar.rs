@@ -243,9 +243,9 @@ fn a_line_beside_the_centre_is_as_fast_as_the_table_can_turn() {
 }
 
 #[test]
-fn a_stroke_is_timed_in_the_posture_in_which_it_can_be_entered() {
+fn a_stroke_is_timed_in_the_configuration_in_which_it_can_be_entered() {
     let mut machine = machine();
-    // The nearest posture is the one with the arm on the same side: its own speed is a third of what
+    // The nearest configuration is the one with the arm on the same side: its own speed is a third of what
     // it was, so that to change the side takes longer. On the way there the tool would leave the area.
     machine.axes[0].limits.velocity = 2.0;
     machine.area.upper[0] = 0.062;

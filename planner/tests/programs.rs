@@ -6,9 +6,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use machine::Machine;
-use planner::Job;
 use planner::drawing::{Action, Step};
 use planner::job::{JobError, gcode};
+use planner::request::JobRequest;
+use planner::{Job, Plan};
 
 /// A program of so many moves to and fro, in a file of its own folder.
 fn program(moves: u64) -> (tempfile::TempDir, PathBuf) {
@@ -129,5 +130,58 @@ fn a_mark_back_after_a_free_move_straight_on_is_marked_whole() {
         assert_eq!(ends, [[10.0, 20.0], [30.0, 5.0], [0.0, 15.0]], "{policy}");
         let length = 0.01 + 0.025 + messages::math::hypot(0.015, 0.005);
         assert!((plan.facts.length - length).abs() < 1e-9, "{policy}: {} m", plan.facts.length);
+    }
+}
+
+/// The plan of a program, or the message with which it is refused.
+fn planned(text: &str) -> Result<Plan, (Option<u64>, String)> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("program.nc");
+    std::fs::write(&path, text).unwrap();
+    let request = JobRequest { job: Some(path), set: Vec::new() };
+    let plan = request.plan(&Machine::builtin());
+    plan.map_err(|refusal| (refusal.line, refusal.message))
+}
+
+/// Machine coordinates alone say nothing to somebody who wrote others.
+#[test]
+fn a_place_outside_the_area_is_told_in_both_coordinates() {
+    let x = |value: f64, word: &str| {
+        format!(
+            "x of the tool would be {value:.3} mm in machine coordinates, outside the area, which ends \
+             at 200.000 mm; X0 of the program is at x 100.000 mm there, so X can be at most {word} mm"
+        )
+    };
+    let lit = planned("G21 G90 F600\nM3 S500\nG1 X50\nG1 X150\n").unwrap_err();
+    assert_eq!(lit, (Some(4), format!("stroke 1: {}", x(250.0, "100.000"))));
+    // A free move: its end, and not where it passes the edge.
+    let (line, message) = planned("G21 G90\nG0 X50\nG0 X150\n").unwrap_err();
+    assert_eq!((line, message.contains(&x(250.0, "100.000"))), (Some(3), true), "{message}");
+    let below = planned("G21 G90 F600\nG92 X20 Y0\nM3 S500\nG1 Y-101\n").unwrap_err().1;
+    assert!(below.contains("y of the tool would be -1.000 mm"), "{below}");
+    assert!(below.ends_with("so Y can be no less than -100.000 mm"), "{below}");
+    // Two origins: neither is meant more than the other.
+    let several = planned("G21 G90 F600\nM3 S500\nG1 X1\nG92 X0\nG1 X150\n").unwrap_err().1;
+    assert!(several.ends_with("which ends at 200.000 mm"), "{several}");
+}
+
+#[test]
+fn a_program_that_marks_nothing_says_so() {
+    let notes = |text: &str| planned(text).unwrap().facts.notes;
+    for text in ["", "G21 G90 F600\nG1 X5\nG0 X0\n", "G21 G90 F600\nM3 S0\nG1 X5\n"] {
+        let found = notes(text);
+        let told = |note: &planner::drawing::Note| note.text.starts_with("nothing is marked: ");
+        assert_eq!(found.iter().filter(|note| told(note)).count(), 1, "{text:?}: {found:?}");
+    }
+    assert_eq!(notes("G21 G90 F600\nM3 S500\nG1 X5\n"), []);
+}
+
+#[test]
+fn a_feed_beyond_the_largest_marking_speed_is_noted() {
+    for laser in ["M3", "M4"] {
+        let plan = planned(&format!("G21 G90\n{laser} S500\nG1 X5 F60000000\n")).unwrap();
+        let notes = &plan.facts.notes;
+        assert_eq!((notes.len(), notes[0].line), (1, 3), "{laser}: {notes:?}");
+        assert!(notes[0].text.starts_with("asks for 1000.0000 m/s, marked at 0.2500"), "{notes:?}");
     }
 }

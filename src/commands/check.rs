@@ -33,22 +33,23 @@ pub struct CheckReport {
     pub axes: Vec<AxisReport>,
     /// Which part of its area it reaches.
     pub reach: ReachReport,
-    /// Doubts about the machine file, with the numbers.
+    /// Warnings about the machine file, with the numbers.
     pub warnings: Vec<CheckWarning>,
-    /// The job that the machine file names as its sample; null where it names none.
+    /// The job that the machine file names as its sample; null where it names none, and for the built-in
+    /// machine.
     pub sample_job: Option<String>,
     /// What the job comes to on it; null without a job.
     pub job: Option<JobReport>,
 }
 
-/// A doubt and its place.
+/// A warning and its place.
 #[derive(Debug, Serialize, schemars::JsonSchema)]
 pub struct CheckWarning {
     /// Line of the machine file, 0 for an override or the machine as a whole.
     pub line: u64,
     /// Column from 1, 0 likewise.
     pub column: u64,
-    /// What is doubtful.
+    /// What is wrong or unusual, with the numbers.
     pub message: String,
 }
 
@@ -110,7 +111,8 @@ fn plan(input: &MachineInput, path: &Path) -> Result<Planned, Failure> {
 /// The sample job, by a path that holds from here.
 fn sample_job(input: &MachineInput) -> Option<String> {
     let sample = input.machine.sample_job.as_ref()?;
-    let path = input.folder.as_ref().map_or(sample.clone(), |folder| folder.join(sample));
+    // The built-in machine's sample is built in too, and no path leads to it.
+    let path = input.folder.as_ref()?.join(sample);
     let tidied = tidy(&path);
     // A symbolic link on the way may lead elsewhere.
     let same =
@@ -132,7 +134,7 @@ fn tidy(path: &Path) -> PathBuf {
     tidy
 }
 
-/// The doubts about the machine file, and why it cannot be simulated, if it cannot.
+/// The warnings about the machine file, and why it cannot be simulated, if it cannot.
 fn warnings(input: &MachineInput) -> Vec<CheckWarning> {
     let warnings = input.machine.warnings.iter().map(|warning| CheckWarning {
         line: warning.line as u64,

@@ -107,9 +107,16 @@ fn print_text(report: &PlanReport) {
     let facts = &report.facts;
     say!("job       {}", facts.name);
     say!("machine   {}", report.machine);
-    say!("strokes   {}, {:.3} mm", facts.strokes, facts.length * 1e3);
+    let draws = facts.length > 0.0;
+    if draws || facts.strokes == 0 {
+        say!("strokes   {}, {:.3} mm", facts.strokes, facts.length * 1e3);
+    } else {
+        say!("dots      {}", facts.strokes);
+    }
     say!("time      {:.4} s", report.time);
-    say!("speed     {:.4} m/s at most while the laser is on", facts.speed);
+    if draws {
+        say!("speed     {:.4} m/s at most while the laser is on", facts.speed);
+    }
     say!(
         "limits    path acceleration {:.1} %, path jerk {:.1} %",
         facts.uses.path_acceleration * 100.0,

@@ -18,7 +18,9 @@ pub fn run(path: &Path) -> Result<Exit, Failure> {
         let marks = summary.marks.as_ref().ok_or_else(|| named(&"completed without marks"))?;
         let sound = marks.error_max.is_finite() && marks.length > 0.0 && summary.time > 0.0;
         if !sound {
-            return Err(named(&"completed with marks that cannot be"));
+            return Err(named(
+                &"completed, but time, marked length or contour error is zero or not a number",
+            ));
         }
     }
     say!("{}: {}", path.display(), summary.outcome.name());

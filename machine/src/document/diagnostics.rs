@@ -20,13 +20,13 @@ pub struct Diagnostics {
 pub struct Warning {
     /// Where the value stands.
     pub span: Span,
-    /// What is doubtful, with the numbers.
+    /// What is wrong or unusual, with the numbers.
     pub text: String,
     /// What it bears on.
     pub concern: Concern,
 }
 
-/// What a doubt bears on.
+/// What a warning bears on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Concern {
     /// A value that is used, whenever the document is.

@@ -113,19 +113,27 @@ impl Node {
 
 /// Parses a whole document; `None` when something was found wrong.
 pub(super) fn parse(text: &str, source: usize, diagnostics: &mut Diagnostics) -> Option<Node> {
-    let (table, errors) = DeTable::parse_recoverable(text);
+    let (table, mut errors) = DeTable::parse_recoverable(text);
     if errors.is_empty() {
         let span = Span { source, start: 0, end: 0 };
         return Some(Node { span, value: from_table(table.get_ref(), source) });
     }
+    errors.sort_by_key(|error| error.span().map_or(text.len(), |bytes| bytes.start));
     for error in errors {
+        let is_duplicate = error.message() == "duplicate key";
         let bytes = error.span().unwrap_or(text.len()..text.len());
         let span = Span { source, start: bytes.start, end: bytes.end };
         let message = match text.get(bytes) {
-            Some(key) if error.message() == "duplicate key" => format!("duplicate key `{key}`"),
+            Some(key) if is_duplicate => format!("duplicate key `{key}`"),
             _ => error.message().to_owned(),
         };
-        diagnostics.refuse(ProblemKind::Syntax, span, message, None);
+        let help = message.starts_with("missing comma between array elements");
+        let help = help.then(|| "is a `]` missing before it?".to_owned());
+        diagnostics.refuse(ProblemKind::Syntax, span, message, help);
+        // Behind a place where TOML is malformed errors only follow from it: of one missing bracket hundreds.
+        if !is_duplicate {
+            break;
+        }
     }
     None
 }

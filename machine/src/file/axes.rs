@@ -137,7 +137,7 @@ fn gains(table: &AxisTable, inertia: f64, diagnostics: &mut Diagnostics) -> Opti
                     "the {} loop ({} rad/s) must be faster than the {} loop around it ({} rad/s)",
                     words[0], inner.value, words[1], outer.value
                 ),
-                "raise the one or lower the other",
+                &format!("raise `loops.{}` or lower `loops.{}`", words[0], words[1]),
             );
         }
     }

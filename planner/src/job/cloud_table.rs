@@ -130,14 +130,17 @@ fn points(table: &CloudTable, folder: &Path, diagnostics: &mut Diagnostics) -> V
     match (&table.file, &table.sphere) {
         (Some(file), None) => {
             let path = folder.join(&file.value);
-            let read = std::fs::read_to_string(&path).map_err(|error| error.to_string());
+            let read = std::fs::read_to_string(&path).map_err(|error| {
+                (error.to_string(), "a path is relative to the job file's folder")
+            });
             let points = read.and_then(|text| {
-                cloud::parse(&text).map_err(|line| format!("line {line} is no point x, y, z"))
+                let help = "give lines of x, y, z, and the unit in the first line";
+                cloud::parse(&text)
+                    .map_err(|line| (format!("line {line} is no point x, y, z"), help))
             });
             match points {
                 Ok(points) => points.into_iter().map(|point| point + at).collect(),
-                Err(cause) => {
-                    let help = "give lines of x, y, z, and the unit in the first line";
+                Err((cause, help)) => {
                     let text = format!("{}: {cause}", path.display());
                     diagnostics.contradict(file.span, text, help);
                     Vec::new()

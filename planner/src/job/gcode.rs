@@ -5,9 +5,9 @@
 //! program does not say itself (full scale of S, work origins, what Z means) stands in the machine
 //! file.
 //!
-//! Nothing is skipped in silence: a code, word or form that is not known here is a [`GcodeError`]
-//! with its place, and what is accepted without effect leaves a note in the drawing. Only the codes
-//! that cancel what this reader does not have anyway (G40, G49, G80, G97, G98, G99) pass unremarked.
+//! A code, word or form that is not known here is a [`GcodeError`] with its place, and what is accepted
+//! without effect leaves a note in the drawing. Only N, Q of G64, and the codes that cancel what this
+//! reader does not have anyway (G40, G49, G80, G97, G98, G99) pass without one.
 
 mod arc;
 mod block;

@@ -30,9 +30,9 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 pub(crate) struct Speeds {
     /// The largest while the laser is on [m/s].
     pub(crate) most: f64,
-    /// What the job sets for all lines [m/s].
-    fixed: Option<f64>,
-    /// Where neither the job nor a line says anything [m/s].
+    /// What the job sets for all lines.
+    fixed: Option<MarkingSpeed>,
+    /// Where neither the job nor a line says anything, and of a job that asks for the optimum [m/s].
     open: f64,
 }
 
@@ -59,11 +59,8 @@ impl Speeds {
             Some(most) => most,
             None => limits.speed,
         };
-        let fixed = match marking.speed {
-            Some(MarkingSpeed::Constant(speed)) => Some(speed),
-            Some(MarkingSpeed::Optimum) | None => None,
-        };
-        let asks = marking.speed.is_none();
+        let fixed = marking.speed;
+        let asks = fixed.is_none();
         let mut speeds = Self { most, fixed, open: most };
         let is_open = |contour: &Contour| {
             !asks
@@ -74,7 +71,7 @@ impl Speeds {
         };
         let open: Vec<(&Contour, f64)> = paths(operations)
             .filter(|contour| contour.policy == Policy::Constant && contour.is_lit())
-            .filter(|contour| fixed.is_none() && is_open(contour))
+            .filter(|contour| !matches!(fixed, Some(MarkingSpeed::Constant(_))) && is_open(contour))
             .map(|contour| (contour, contour.top_speed(limits).min(most)))
             .collect();
         let top = open.iter().map(|(_, top)| *top).fold(0.0, f64::max);
@@ -82,21 +79,28 @@ impl Speeds {
             let travel = Travel::new(start, operations, limits, near);
             speeds.open = fastest(|speed| travel.time(speed, most), top);
         }
-        if marking.speed == Some(MarkingSpeed::Optimum) {
-            speeds.fixed = Some(speeds.open);
-        }
         speeds
     }
 
     /// The speed that the job has for a lit stretch that asks for `asked` [m/s], however fast the machine
     /// is: the measure of power that follows the speed.
     pub(crate) fn asked(&self, asked: Option<f64>) -> f64 {
-        self.fixed.or(asked).unwrap_or(self.open)
+        self.named(asked).unwrap_or(self.open)
+    }
+
+    /// The speed that is named for a lit stretch whose line asks for `asked` [m/s]; `None` where it is left
+    /// to the planner.
+    pub(crate) fn named(&self, asked: Option<f64>) -> Option<f64> {
+        match self.fixed {
+            Some(MarkingSpeed::Constant(speed)) => Some(speed),
+            Some(MarkingSpeed::Optimum) => None,
+            None => asked,
+        }
     }
 
     /// The speed of a lit stretch that asks for `asked` [m/s].
     pub(crate) fn of(&self, asked: Option<f64>) -> f64 {
-        self.fixed.or(asked).unwrap_or(self.open).min(self.most)
+        self.asked(asked).min(self.most)
     }
 }
 

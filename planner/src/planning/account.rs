@@ -14,6 +14,31 @@ pub(crate) struct Slowed {
     pub(crate) place: Vector3<f64>,
 }
 
+/// The largest speed that the job asks for while the laser is on [m/s], and the line that does.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Asked {
+    pub(crate) speed: f64,
+    pub(super) line: u64,
+}
+
+impl Asked {
+    pub(super) fn add(&mut self, speed: f64, line: u64) {
+        if speed > self.speed {
+            *self = Self { speed, line };
+        }
+    }
+
+    /// The note of a job that asks for more than `most` [m/s].
+    pub(super) fn note(&self, most: f64) -> Option<Note> {
+        let Self { speed, line } = *self;
+        let text = format!(
+            "asks for {speed:.4} m/s, marked at {most:.4} m/s at most: the largest marking speed \
+             (path.speed of the machine, or marking.max_speed)"
+        );
+        (speed > most * (1.0 + 1e-9)).then_some(Note { line, text })
+    }
+}
+
 /// What is told of the windows so far.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Account {
@@ -24,8 +49,7 @@ pub(crate) struct Account {
     pub(crate) notes: Vec<Note>,
     /// The largest speed while the laser is on [m/s].
     pub(crate) speed: f64,
-    /// The largest that the job asks for while the laser is on [m/s].
-    pub(crate) asked: f64,
+    pub(crate) asked: Asked,
     /// Length that is marked [m], and the number of lines and dots.
     pub(crate) length: f64,
     pub(crate) strokes: u64,

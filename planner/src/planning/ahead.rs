@@ -1,5 +1,5 @@
-//! The windows that have been planned and not been taken, from each of which planning can be taken up
-//! again.
+//! The queue of windows that are planned but not taken yet. Each keeps a checkpoint, from which planning can
+//! start again.
 
 use std::collections::VecDeque;
 

@@ -81,13 +81,14 @@ impl<const N: usize> PathRun<N> {
         10.0 * self.least_reach
     }
 
-    /// The speed that is asked for at a place that is marked [m/s]; `None` in the dark.
-    pub(super) fn lit_speed_at(&self, place: f64) -> Option<f64> {
+    /// What the job asks for at a place that is marked, and the speed limit there [m/s]; `None` in the
+    /// dark.
+    pub(super) fn lit_at(&self, place: f64) -> Option<(&Demand, f64)> {
         let demands = self.contour.demands();
         let after = demands.partition_point(|demand| demand.from <= place);
-        demands.get(after.max(1) - 1).filter(|demand| demand.power > 0.0)?;
+        let demand = demands.get(after.max(1) - 1).filter(|demand| demand.power > 0.0)?;
         let after = self.speeds.partition_point(|speed| speed.from <= place);
-        Some(self.speeds[after.max(1) - 1].speed)
+        Some((demand, self.speeds[after.max(1) - 1].speed))
     }
 }
 
@@ -134,7 +135,12 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
                     let value = point[row];
                     let violation =
                         LimitViolation { time, axis: None, quantity, value, limit, unit: "m" };
-                    return Err(PlanError::Limit { line: contour.line, place, violation });
+                    return Err(PlanError::Limit {
+                        line: contour.line,
+                        place,
+                        violation,
+                        zero: None,
+                    });
                 }
             }
         }

@@ -1,5 +1,5 @@
-//! Stretches of a path that can be gone at the speed asked for: there is nothing to find out but how
-//! far they go, and that the tool can come to rest at their end.
+//! Stretches that can be passed at the speed asked for. They need no optimisation: only their length is
+//! sought, and a way to rest from their end.
 
 use machine::Mechanism;
 
@@ -12,7 +12,8 @@ use crate::law::time_law::TimeLaw;
 use crate::law::windows::{between, keeps_even};
 use crate::limits::along::AlongPath;
 
-/// The share of the speed asked for that is kept, so that a law can come to it.
+/// The fraction of the speed asked for at which a plateau runs: a little less, so that the profile before it
+/// can reach it.
 const SHARE: f64 = 0.999;
 
 /// The time of one step along a plateau, and of the longest that is handed on [s].

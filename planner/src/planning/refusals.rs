@@ -18,7 +18,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
 
     pub(super) fn limit(&self, violation: LimitViolation) -> PlanError {
         let (line, place) = self.place(violation.time);
-        PlanError::Limit { line, place, violation }
+        PlanError::Limit { line, place, violation, zero: None }
     }
 
     pub(super) fn unreachable(&self, found: Unreachable) -> PlanError {
@@ -45,7 +45,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
                 let quantity = Quantity::JointPosition;
                 let violation =
                     LimitViolation { time: place.time, axis, quantity, value, limit, unit };
-                PlanError::Limit { line, place, violation }
+                PlanError::Limit { line, place, violation, zero: None }
             }
         }
     }

@@ -1,5 +1,5 @@
-//! A job from its first window to its last: as far ahead of whoever takes the windows as they let it
-//! be, and planned anew from where they are when the job shall be faster.
+//! Plans a job window by window, as far ahead of the consumer as it allows, and plans the windows that it has
+//! not taken again when the override rises.
 
 use machine::kinematics::Joints;
 use machine::{Machine, Mechanism, MechanismVisitor, PathLimits, Pose};
@@ -23,9 +23,9 @@ use crate::limits::motion_limits::Scope;
 use crate::verify::checker::{LimitViolation, Quantity};
 use messages::plan::PlanFacts;
 
-/// Who takes the windows of a job.
+/// The consumer of a job's windows.
 pub(crate) trait Outlet {
-    /// Whether nobody wants them any more.
+    /// Whether planning shall stop.
     fn is_abandoned(&self) -> bool;
 
     /// Notes that a window has been planned, which will be taken after those before it.
@@ -111,16 +111,21 @@ pub(crate) fn plan_windows(
             .map_err(|error| PlanError::Unreadable { line: 0, message: error.to_string() })?,
     );
     let source = OperationQueue::new(steps, operations());
-    let facts = Facts { name: &drawing.name, notes };
+    let nothing = match job.program {
+        Some(_) => "nothing is marked: no G1, G2 or G3 is made with M3 or M4 on and S above 0",
+        None => "nothing is marked",
+    };
+    let facts = Facts { name: &drawing.name, notes, nothing };
     let done = machine.mechanism.visit(Run { task: &task, source, stream, outlet, facts });
     done.map_err(|error| at_its_step(error, job))
 }
 
-/// `error` with the line of the very step that leaves the area, of all that are gone in one go.
+/// `error` with the line of the very step that leaves the area, of all that are followed in one go, how far
+/// that leads, and where the program has its zero.
 fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
     /// How far a chord may lie from the curve [m].
     const CHORD: f64 = 1e-5;
-    let PlanError::Limit { line, violation, .. } = &mut error else { return error };
+    let PlanError::Limit { line, violation, zero, .. } = &mut error else { return error };
     let LimitViolation { quantity: Quantity::ToolPosition(row), value, limit, .. } = *violation
     else {
         return error;
@@ -128,20 +133,27 @@ fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
     if job.surface.is_some() {
         return error;
     }
-    let leaves = |step: &Step| {
-        let (Action::Mark { curve, .. } | Action::Feed { curve, .. }) = &step.action else {
-            return false;
+    *zero = job.survey.as_ref().and_then(|survey| survey.zero).map(Box::new);
+    let beyond = |point: &[f64; 3]| (point[row] - limit) * (value - limit).signum();
+    // How far a step goes beyond: by less than a fitted curve strays it does not.
+    let leaves = |step: Step| {
+        let points = match &step.action {
+            Action::Mark { curve, .. } | Action::Feed { curve, .. } => {
+                let mut points = vec![curve.from().into()];
+                Track::new(curve).sample(CHORD, &mut points);
+                points
+            }
+            Action::Rapid { to } => vec![(*to).into()],
+            _ => return None,
         };
-        let mut points = vec![curve.from().into()];
-        Track::new(curve).sample(CHORD, &mut points);
-        // By less than a fitted curve strays it does not.
-        let beyond = |point: &[f64; 3]| (point[row] - limit) * (value - limit).signum();
-        points.iter().any(|point| beyond(point) > (value - limit).abs() / 2.0)
+        let farthest = points.iter().map(beyond).fold(0.0, f64::max);
+        (farthest > (value - limit).abs() / 2.0).then_some((step.line, farthest))
     };
     let steps = job.steps().into_iter().flatten().map_while(Result::ok);
     let mut near = steps.skip_while(|step| step.line < *line).take(Job::HELD as usize);
-    if let Some(step) = near.find(leaves) {
-        *line = step.line;
+    if let Some((step, farthest)) = near.find_map(leaves) {
+        *line = step;
+        violation.value = limit + farthest * (value - limit).signum();
     }
     error
 }
@@ -201,11 +213,17 @@ impl MechanismVisitor for Start<'_> {
 struct Facts<'a> {
     name: &'a str,
     notes: Vec<Note>,
+    /// The note of a job that marks nothing.
+    nothing: &'static str,
 }
 
 impl Facts<'_> {
     fn of<const N: usize, M: Mechanism<N>>(&self, planning: &Planning<'_, N, M>) -> PlanFacts {
         let account = &planning.account;
+        let mut notes = [self.notes.clone(), planning.notes()].concat();
+        if account.strokes == 0 && planning.is_complete() {
+            notes.push(Note { line: 0, text: self.nothing.to_owned() });
+        }
         PlanFacts {
             name: self.name.to_owned(),
             strokes: account.strokes as usize,
@@ -213,9 +231,9 @@ impl Facts<'_> {
             duration: planning.duration(),
             samples: planning.samples(),
             speed: account.speed,
-            speed_asked: account.asked,
+            speed_asked: account.asked.speed,
             speed_limit: planning.task.speeds.most,
-            notes: [self.notes.clone(), planning.notes()].concat(),
+            notes,
             uses: planning.utilization().clone(),
             binding: account.shares.report(&planning.task.machine.axes),
         }

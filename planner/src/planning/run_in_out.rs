@@ -17,10 +17,11 @@ use crate::limits::motion_limits::Scope;
 use crate::limits::tightening::Tightening;
 use crate::trajectory::Motion;
 
-/// How often a flight is sought with less of the limits that the one before took too much of, how
-/// much of each it is to take then, and the least that is left of one at once.
+/// Trials of a flight, each with smaller limits where the one before broke a joint's.
 pub(super) const FOLLOW_TRIALS: usize = 8;
+/// The fraction of a joint's limit that the next trial aims at.
 const FITS: f64 = 0.9995;
+/// The smallest factor by which one trial reduces a limit.
 const LEAST_FIT: f64 = 0.5;
 
 /// A flight that takes so much of a limit is not followed further.

@@ -34,20 +34,21 @@ const STEP: f64 = 0.05;
 /// planned anew with what follows.
 const HANDED_ON: [f64; 2] = [0.6, 0.85];
 
-/// A line that is marked at less than this share of the speed asked for is told.
+/// A note names a line that is marked at less than this fraction of the speed asked for.
 const SLOW: f64 = 0.99;
 
 /// How far a chord may lie from the curve in the artwork [m]: a little less than promised, for
 /// rounding.
 const CHORD: f64 = Artwork::CHORD_ERROR * 0.8;
 
-/// The end of a stretch is sampled with the next, when nothing of it can be changed any more. So much
-/// of it [s] is held to the limits at once, looked at so often; what it may use of a limit of the joints
-/// and of one of the tool, what it is planned with if it takes more, and how often.
+/// The last [`TAIL`] seconds of a stretch are sampled with the next stretch, when they can no longer be
+/// changed. They are therefore checked when the stretch is planned, at [`TAIL_SAMPLES`] instants.
 const TAIL: f64 = 4.0 * CYCLE_TIME;
-const TAIL_LOOKS: u32 = 32;
-const TAIL_SHARE: f64 = 0.9997;
+const TAIL_SAMPLES: u32 = 32;
+/// The fraction that the tail may use of a joint's limit, and of a limit of the tool.
+const TAIL_JOINTS: f64 = 0.9997;
 const TAIL_TOOL: f64 = 1.0005;
+/// The fraction that a stretch is planned for again if its tail uses more, and how often that is tried.
 const TAIL_GOAL: f64 = 0.998;
 const TAIL_TRIALS: usize = 4;
 
@@ -96,8 +97,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let begin = law.duration() - TAIL;
         let mut tool_uses = [0.0_f64; 3];
         let mut joint_uses = [[0.0_f64; JointLimit::COUNT]; N];
-        for look in 0..=TAIL_LOOKS {
-            let time = begin + TAIL * f64::from(look) / f64::from(TAIL_LOOKS);
+        for look in 0..=TAIL_SAMPLES {
+            let time = begin + TAIL * f64::from(look) / f64::from(TAIL_SAMPLES);
             let now = law.at(time.max(0.0));
             let tool = run.path.at(now.position).motion(now.velocity, now.acceleration, now.jerk);
             let after = run.speeds.partition_point(|speed| speed.from <= now.position);
@@ -129,11 +130,11 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         hold(tool_uses[2], TAIL_TOOL, &mut shares.jerk);
         for (used, axis) in joint_uses.into_iter().zip(&mut shares.axes) {
             let [velocity, acceleration, jerk, torque, voltage] = used;
-            hold(velocity, TAIL_SHARE, &mut axis.velocity);
-            hold(acceleration, TAIL_SHARE, &mut axis.acceleration);
-            hold(jerk, TAIL_SHARE, &mut axis.jerk);
-            hold(torque, TAIL_SHARE, &mut axis.torque);
-            hold(voltage, TAIL_SHARE, &mut axis.voltage);
+            hold(velocity, TAIL_JOINTS, &mut axis.velocity);
+            hold(acceleration, TAIL_JOINTS, &mut axis.acceleration);
+            hold(jerk, TAIL_JOINTS, &mut axis.jerk);
+            hold(torque, TAIL_JOINTS, &mut axis.torque);
+            hold(voltage, TAIL_JOINTS, &mut axis.voltage);
         }
         is_beyond
     }
@@ -310,9 +311,9 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     pub(super) fn note_drawn(&self, contour: &Contour, was_lit: bool, draft: &mut Draft<'_>) {
         draft.strokes.extend(strokes(contour, was_lit));
         draft.length += contour.lit_length();
-        let lit = contour.demands().iter().filter(|demand| demand.power > 0.0);
-        let asked = lit.map(|demand| self.task.speeds.of(demand.speed));
-        draft.asked = asked.fold(draft.asked, f64::max);
+        for demand in contour.demands().iter().filter(|demand| demand.power > 0.0) {
+            draft.asked.add(self.task.speeds.asked(demand.speed), demand.line);
+        }
     }
 
     /// Ends a path: the joints are where it ends, at rest or moving.
@@ -349,9 +350,13 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             if run.contour.is_lit() {
                 draft.bound.add(LimitId(part.limit), part.duration, line, position.into());
             }
-            let Some(asked) = run.lit_speed_at(middle) else { continue };
+            let Some((demand, limit)) = run.lit_at(middle) else { continue };
+            // What the machine's largest marking speed takes of it has a note of its own.
+            let is_named = self.task.speeds.named(demand.speed).is_some();
+            let asked = self.task.speeds.of(demand.speed) * self.faster(demand);
+            let asked = if is_named { asked } else { limit };
             let mean = (part.places.end - part.places.start) / part.duration;
-            let speed = run.even.map_or(mean.min(asked), |even| even * draft.shares.speed);
+            let speed = run.even.map_or(mean.min(limit), |even| even * draft.shares.speed);
             draft.speed = draft.speed.max(speed);
             let slowed = Slowed { line, asked, speed, place: position };
             let worse = slowest.is_none_or(|worst| speed / asked < worst.speed / worst.asked);

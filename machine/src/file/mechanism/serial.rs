@@ -161,7 +161,7 @@ crate::keyword! {
 }
 
 crate::keyword! {
-    TaskSpace, "a freedom of the tool",
+    TaskSpace, "a task space",
     "plane" => Self::Plane,
     "space" => Self::Space,
     "axis" => Self::Axis,

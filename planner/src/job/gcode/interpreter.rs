@@ -59,6 +59,32 @@ pub(super) enum Remark {
     NoPower,
 }
 
+/// Where the program zero was at its moves, machine frame [m].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Zeros {
+    None,
+    One(Vector3<f64>),
+    Several,
+}
+
+impl Zeros {
+    fn add(&mut self, zero: Vector3<f64>) {
+        *self = match *self {
+            Self::None => Self::One(zero),
+            Self::One(first) if first == zero => return,
+            Self::One(_) | Self::Several => Self::Several,
+        };
+    }
+
+    /// The one place, if it is one.
+    pub(super) fn only(self) -> Option<[f64; 3]> {
+        match self {
+            Self::One(zero) => Some(zero.into()),
+            Self::None | Self::Several => None,
+        }
+    }
+}
+
 /// Runs a program line by line.
 #[derive(Debug)]
 pub(super) struct Interpreter {
@@ -66,6 +92,7 @@ pub(super) struct Interpreter {
     home: Vector3<f64>,
     modal: Modal,
     said: u32,
+    pub(super) zeros: Zeros,
     pub(super) notes: Vec<Note>,
     pub(super) tracer: Tracer,
 }
@@ -92,6 +119,7 @@ impl Interpreter {
                 corners: Corners::AsMachine,
             },
             said: 0,
+            zeros: Zeros::None,
             notes: Vec::new(),
             tracer: Tracer::new(settings),
         }
@@ -316,6 +344,9 @@ impl Interpreter {
         let moves = block.has_axes() || arc && (block.has_offsets() || block.has(b'R'));
         if taken || !moves {
             return Ok(());
+        }
+        if frame.is_none() && now.is_some() {
+            self.zeros.add(self.modal.origin + self.modal.shift);
         }
         match now {
             None => Ok(()),

@@ -86,9 +86,10 @@ impl<R: Read> Steps<R> {
                 tracer.steps.shrink_to(BATCH);
             }
         }
-        let Interpreter { tracer, notes, .. } = self.interpreter;
+        let Interpreter { tracer, notes, zeros, .. } = self.interpreter;
         let survey = Survey {
             facts: tracer.facts,
+            zero: zeros.only(),
             notes,
             lines: tracer.line,
             steps: (dropped + tracer.steps.len()) as u64,

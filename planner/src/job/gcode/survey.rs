@@ -37,6 +37,9 @@ pub struct ProgramFacts {
 pub struct Survey {
     /// Its extent.
     pub facts: ProgramFacts,
+    /// Where X0 Y0 Z0 of its moves is, machine frame [m]; `None` where that changes on the way, or nothing
+    /// moves in a work coordinate system.
+    pub zero: Option<[f64; 3]>,
     /// Things a person should know, each said once.
     pub notes: Vec<Note>,
     /// Lines that were read, up to the end of the program.

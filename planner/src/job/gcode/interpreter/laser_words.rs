@@ -48,7 +48,7 @@ impl Interpreter {
             block.span(letter),
             format!("{name}{number} is outside 0 to {full_scale}"),
             "laser power",
-            format!("full power is {name}{full_scale} (full scale in the machine file)"),
+            format!("full power is {name}{full_scale} (gcode.full_scale of the machine file)"),
         ))
     }
 
