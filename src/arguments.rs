@@ -40,12 +40,12 @@ Examples, one object a line in and out, SI units and radians:
   dynamics   {\"q\": [0.2, 0], \"qd\": [0, 0], \"qdd\": [10, 10]}
   ellipse    {\"q\": [0.2, 0]}
 
-A line that asks for what cannot be gets {\"error\": {\"code\", \"detail\", ..}}, and the next one
-its answer; a line that is not such an object ends the command with exit code 2.";
+A line that asks for an impossible pose or motion gets {\"error\": {\"code\", \"detail\", ..}}, and the next line is
+answered; a line that is not such an object ends the command with exit code 2.";
 
 const EXPORT_EXAMPLES: &str = "\
 Examples:
-  graver export runs/20260101-120000-letters > samples.csv
+  graver export runs/20261127-134500-NASO > samples.csv
   graver export runs/a/samples.bin --out samples.csv
 
 SI units and radians, one line a millisecond; a field that was not known is empty.";

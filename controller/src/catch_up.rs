@@ -1,4 +1,4 @@
-//! From where a stall left the axes back to the plan, without a step.
+//! Brings the axes back to the plan after a stall, without a step in the setpoints.
 //!
 //! An axis that hears nothing goes on at about the speed that it had, a stepper by its pulses, a motor
 //! by its voltage and back-EMF; the plan goes on as planned. What lies between the two, in position and
@@ -18,11 +18,10 @@ const CYCLES: u32 = 48;
 /// Share of the largest following error within which an axis counts as on the plan: 5 µm of 1 mm.
 const ON_PLAN: f64 = 0.005;
 
-/// How many times [`ON_PLAN`] an axis may be off before the velocity loop's integral is wound up by it,
-/// which takes longer to unwind: its tail is waited for with [`WOUND_UP`].
+/// Beyond this many times [`ON_PLAN`] an error winds up the velocity loop's integral, which takes longer to
+/// settle: the wait is then as long as the position loop alone needs to come [`WOUND_UP`] times closer.
 const LARGE: f64 = 8.0;
-
-/// How many times closer than [`ON_PLAN`] the position loop alone would be by then.
+/// See [`LARGE`].
 const WOUND_UP: f64 = 5.0;
 
 /// Time for which a wrong speed lasts until the loops have it back [s]: about two cycles.

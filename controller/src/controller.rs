@@ -4,8 +4,8 @@
 //!
 //! - Play the stream: references, voltages and gate edges for the cycle in which they act.
 //! - Close the loops on each motor: position, velocity, current.
-//! - Watch: setpoints, feedback, following error, limits, peers. Any doubt leads to the safe
-//!   state: laser off with this very command, then the axes to rest.
+//! - Supervise: setpoints, feedback, following error, limits, peers. Any error leads to the safe
+//!   state: laser off with this command, then the axes to rest.
 //! - Answer people: enable, disable, start, hold, resume, stop, reset, override.
 //!
 //! # Modes
@@ -232,7 +232,8 @@ impl Controller {
             told,
             inhibited.then(|| Finding::sound(Fault::new(FaultCode::DriveFault))),
         ];
-        // A lost peer stays lost in every cycle after: it must not hide the loss of an axis, which is worse.
+        // A lost peer is found again in every cycle. It must not hide a later loss of tracking, which needs the
+        // quick stop.
         let worse = |finding: &Finding| finding.tracking == Tracking::Lost;
         let found = || findings.iter().flatten();
         (elapsed, found().find(|finding| worse(finding)).or_else(|| found().next()).copied())
@@ -248,7 +249,7 @@ impl Controller {
         }
     }
 
-    /// Light is left out from here on: holds, to go back for it.
+    /// Holds, because marks from `from` on were not lit; the resume goes back to mark them.
     fn go_back_for_light(&mut self, from: StreamTime, now: Nanoseconds) {
         let same_place = self.losses > 0 && from < self.lost_at + ONE_PLACE;
         self.losses = if same_place { self.losses + 1 } else { 1 };

@@ -28,12 +28,11 @@ const OVERRIDES: core::ops::RangeInclusive<f64> = 0.1..=2.0;
 /// whose motion the next ones tell.
 const RESERVE: StreamTime = StreamTime(4 * ONE);
 
-/// How many times as far as an unhindered stop one within the limits may go, before it is hindered
-/// no longer.
+/// A stop that keeps the limits may take this many times the distance of one at the full ramp; then it ignores
+/// them.
 const HINDRANCE: i64 = 2;
 
-/// Cycles after which a stop is hindered no longer. Planned motion, however it uses the limits, lets it
-/// rest within half of them.
+/// Cycles after which a stop ignores the limits. Within the limits, planned motion stops in half of them.
 const PATIENCE: u32 = 400;
 
 /// Setpoints in hand with which nothing can run dry: [`HINDRANCE`] times a stop from rate 1, and more.
@@ -192,8 +191,8 @@ impl Player {
         }
     }
 
-    /// Of the `elapsed` cycles that the coming advances make up for, drives kept the last dark:
-    /// brakes if light was lost in them, and gives the place where the first began.
+    /// Drives kept the last of the `elapsed` cycles dark. If they should have been lit: brakes, and gives the
+    /// stream time at which the first of them began.
     pub fn miss(&mut self, elapsed: Elapsed, lookahead: &Lookahead) -> Option<StreamTime> {
         // The command given last acts from `next` to `after`; for later cycles there was none.
         let sent = elapsed.missed >= elapsed.cycles && self.marking;

@@ -1,4 +1,4 @@
-//! Any doubt: dark with the very next command, then to rest, then latched until a reset.
+//! Any error: dark with the very next command, then to rest, then latched until a reset.
 
 #![allow(clippy::unwrap_used)]
 
@@ -269,7 +269,7 @@ fn a_planner_that_is_lost_hides_nothing_that_drives_says() {
     bench.run(Some(&job), 1);
     let gone = bench.last().command.stream_time - before;
     assert!(gone > 2.9e-3, "{gone}");
-    // And what is worse brakes the axes at once, under the fault that came first.
+    // A drive fault after that still brakes the axes at once, under the fault that came first.
     bench.cycle(Some(&job), None, |feedback| feedback.fault = Fault::new(FaultCode::DriveFault));
     let command = bench.last().command;
     assert_eq!(command.mode(), CommandMode::QuickStop);

@@ -13,7 +13,7 @@
 //!   ticket travels in the command) and the controller starts again from disabled.
 //!
 //! ```text
-//! Waiting ──command: disabled──► Following ──doubt──► Stopped
+//! Waiting ──command: disabled──► Following ──fault──► Stopped
 //!    ▲ ▲                            │                    │
 //!    │ └──too many misses, unpowered┘                    │
 //!    └──────────command: disabled, with a new reset──────┘   (goes on to Following)

@@ -1,6 +1,6 @@
 //! The machine file: what its tables are (`tables`), and how they become a [`Machine`]
-//! (`validate`, `axes`), or are doubted: one value by itself (`bounds`), one against others (`doubts`,
-//! `relations`).
+//! (`validate`, `axes`), with errors and warnings about single values (`bounds`), values that do not fit
+//! each other (`relations`), and motors, speeds and springs that the machine cannot make use of (`warnings`).
 
 mod axes;
 pub mod bounds;

@@ -46,10 +46,10 @@ pub struct Machine {
     pub warnings: Vec<Warning>,
 }
 
-/// A doubt about a machine file that does not keep it from running.
+/// A warning about a machine file that does not keep it from running.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
-    /// What is doubtful, with the numbers.
+    /// What is wrong or unusual, with the numbers.
     pub text: String,
     /// Line in the file from 1; 0 when an override is meant.
     pub line: usize,

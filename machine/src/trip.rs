@@ -8,8 +8,8 @@
 use crate::actuator::Axis;
 use crate::motor::{DcMotor, Motor, StepperMotor};
 
-/// What supervision forgives a planned value beyond its limit: a thousandth. Both ends compute the same
-/// numbers, so that no more than rounding lies between them.
+/// Supervision tolerates planned values up to 0.1 % beyond a limit. Planner and controller compute the same
+/// numbers, so only rounding lies between them.
 const PLANNED_EXCESS: f64 = 1.001;
 
 /// What of its continuous current a plan may warm a winding with. The measured current also has what
@@ -108,8 +108,8 @@ impl Axis {
 
 /// What supervision compares with the largest following error of an axis, as shares of it.
 pub mod following {
-    /// How far a setpoint may be from where the speeds of both lead from the one before. The planned
-    /// motion leaves a twelfth of jerk times cycle³, 40 nm at 500 m/s³.
+    /// The largest difference between a setpoint and the one before it plus the mean of both speeds times the
+    /// cycle. Planned motion has jerk·T³/12, 40 nm at 500 m/s³.
     pub const DISCONTINUITY: f64 = 0.01;
 
     /// How much the lead may change between two setpoints.

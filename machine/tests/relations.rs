@@ -101,7 +101,7 @@ fn a_lead_longer_than_the_travel_is_warned_of() {
 }
 
 #[test]
-fn time_constants_of_motors_are_doubted_where_no_motor_has_them() {
+fn time_constants_of_motors_give_a_warning_where_no_motor_has_them() {
     let winding = "windings have 2e-5 to 0.2 s";
     warned("corexy", &["axis.a.motor.dc.inductance=2.3 uH"], &["1.000e-6 s", winding, "line 47"]);
     warned("corexy", &["axis.a.motor.dc.inductance=0.9 H"], &[winding, "line 47"]);

@@ -149,7 +149,7 @@ fn a_puma_stands_where_its_closed_form_says_and_is_found_from_afar() {
         let wrist =
             Vector3::new(c1 * out - d3 * s1, s1 * out + d3 * c1, -a3 * s23 - a2 * s2 - d4 * c23);
         assert!((pose.position - wrist).amax() < 1e-15, "{case}");
-        // From far away any posture will do; but it must reach the pose, within the limits.
+        // From far away any configuration will do; but it must reach the pose, within the limits.
         let Ok(other) = arm.inverse(&pose, (), &Joints::from_element(0.3)) else { continue };
         found += 1;
         let back = arm.forward(&other, ()).unwrap();

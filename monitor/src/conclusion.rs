@@ -38,7 +38,7 @@ pub const LIGHT_LAG: u64 = 2;
 /// Cycles that the controller counts beyond a stream's setpoints: the one that finds it at rest.
 const END_CYCLES: u64 = 1;
 
-/// How a run ended, as whoever watched it knows.
+/// How a run ended, as its supervisor (or the monitor after the supervisor's death) knows.
 #[derive(Debug, Clone, Default)]
 pub struct RunOutcome {
     /// How whoever watched ended it; `None` where it ended by itself. What the reports say of the

@@ -169,7 +169,7 @@ impl<W: Write> IntervalLog<W> {
         Ok(Self { writer, serializer })
     }
 
-    /// Appends one hop over the interval that began at `start` after the log's begin.
+    /// Appends one hop over the interval that began at `start` after the start of the log.
     ///
     /// # Errors
     /// Whatever the writer reports.

@@ -218,7 +218,7 @@ const REACH: f64 = 1e-4;
 const LOST_TRACK: f64 = 2e-4;
 
 impl<'a> MarkEvaluator<'a> {
-    /// A judge of the marks of `artwork`, before the first record.
+    /// An evaluator for `artwork`, before the first record.
     pub fn new(artwork: &'a Artwork) -> Self {
         Self {
             artwork,

@@ -24,8 +24,8 @@ use runtime::{Domain, Publisher, Role, Samples, ServiceError, Subscriber, clock,
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How often the service looks at its channels.
-const LOOK: Duration = Duration::from_millis(2);
+/// How often the service polls its channels.
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 /// How often it reports when nothing changes.
 const REPORT_INTERVAL: Duration = Duration::from_millis(100);
@@ -38,7 +38,7 @@ pub fn run(domain: &Domain, machine: &Machine) -> Result<(), ServiceError> {
     let mut service = Service::open(domain, machine)?;
     while signal::termination().is_none() && service.peers.state(Role::Domain) != PeerState::Dead {
         service.turn()?;
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
     Ok(())
 }
@@ -226,8 +226,8 @@ impl Service {
             return Ok(());
         }
         let under_way = self.report.sent.saturating_sub(progress.accepted);
-        let mut licence = progress.room.saturating_sub(under_way);
-        while licence > 0 {
+        let mut credit = progress.room.saturating_sub(under_way);
+        while credit > 0 {
             let next = waiting.take().map(|setpoint| *setpoint).or_else(|| window.next());
             let Some(mut setpoint) = next else { break };
             setpoint.published = clock::now();
@@ -236,7 +236,7 @@ impl Service {
                 return Ok(());
             }
             self.report.sent += 1;
-            licence -= 1;
+            credit -= 1;
         }
         if *is_complete && waiting.is_none() && window.len() == 0 {
             self.work = Work::Idle;

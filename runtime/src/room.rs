@@ -209,8 +209,8 @@ pub(crate) fn wipe(prefix: &str) -> Result<(), RoomError> {
 }
 
 /// Closes to others what iceoryx2 0.10 opens to everybody, the segment that counts nodes: for the
-/// holder, before anybody else is in the domain. A copy takes its place, because whoever saw the
-/// name may have the segment open already.
+/// holder, before anybody else is in the domain. It is replaced by a copy, because another
+/// process may have opened the old one already.
 pub(crate) fn close_to_others(prefix: &str) -> Result<(), RoomError> {
     let directory = Path::new(SHARED_MEMORY);
     for segment in own_files(prefix).map_err(|error| io_error(directory, &error))? {

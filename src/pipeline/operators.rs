@@ -102,8 +102,7 @@ pub struct VerbReply {
     pub state: String,
     /// The rate now wanted, 1 as planned.
     pub value: f64,
-    /// What keeps the job under way from being marked as much faster as an override asks for; null where
-    /// nothing does.
+    /// What limits the override: why the job cannot run as fast as asked; null where nothing does.
     pub capped_by: Option<String>,
 }
 

@@ -239,7 +239,7 @@ pub const BOUNDS: &[Bounds] = &[
           "PrrrpTable.type_2_margin", "TriPlanarTable.type_1_margin",
           "TriPlanarTable.type_2_margin", "TwinActuatorTable.baseline_margin"],
         ["1e-6", "10"], ["0.01", "0.9"],
-        "a sine: below 0.01 forces grow a hundredfold, 1 is the best posture there is"),
+        "a sine: below 0.01 forces grow a hundredfold, 1 is the best configuration"),
     row(&["FiveBarTable.working_mode", "FiveBarTable.assembly_mode", "PrrrpTable.side",
           "TriPlanarTable.legs", "TwinActuatorTable.elbow"],
         ["-1e15", "1e15"], ["-1e15", "1e15"],

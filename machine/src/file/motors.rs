@@ -157,7 +157,7 @@ pub(super) fn counts(
         diagnostics.refuse(
             ProblemKind::OutOfRange,
             resolution.span,
-            format!("{} counts in a revolution cannot be", resolution.value * TAU),
+            format!("{} counts per revolution are no whole number", resolution.value * TAU),
             Some("an encoder has a whole number of counts, such as \"4096 counts/rev\"".to_owned()),
         );
     }

@@ -1,7 +1,7 @@
 //! What two values of a machine file say of each other: each may be usual by itself, and both together
 //! make a machine that trips, misses its path, or cannot be controlled.
 //!
-//! The arithmetic is that of the machine at home. It is a doubt and no proof: the planner holds every
+//! The arithmetic is that of the machine at home. It warns and proves nothing: the planner holds every
 //! job to the machine's limits, and the controller every motion.
 
 use messages::time::CYCLE_TIME;
@@ -143,8 +143,8 @@ struct Subject<'a> {
     gravity: f64,
 }
 
-/// Looks for doubts about what the values of a machine say of each other, and refuses what cannot be
-/// together. `tables`, `joints` and `axes` belong to each other.
+/// Warns of values of a machine that do not fit each other, and refuses contradictions.
+/// `tables`, `joints` and `axes` belong to each other.
 pub(super) fn check(
     table: &MachineTable,
     mechanism: &MechanismKind,
@@ -209,7 +209,7 @@ fn loops(tables: &[&AxisTable], axes: &[Axis], standing: &Standing, diagnostics:
         );
     }
     let fastest = bandwidth / standing.smallest_share;
-    // Put this way a share that is no number is doubted.
+    // Put this way a share that is no number gives a warning.
     let slow_enough = fastest <= FASTEST_LOOP;
     if !slow_enough {
         diagnostics.warn(
@@ -326,7 +326,7 @@ impl Subject<'_> {
         let speed = if path.speed.value > path.rapid.value { path.speed } else { path.rapid };
         let asked = speed.value * worst_speed;
         let limit = axis.limits.velocity;
-        // Where the tool's straight lines are the joints', `doubts` says it for each speed; a limit
+        // Where the tool's straight lines are the joints', `warnings` says it for each speed; a limit
         // that the file sets is meant.
         let is_declared = table.limits.velocity.is_some();
         if self.joint.worst_speed == 0.0 && !is_declared && asked > limit {

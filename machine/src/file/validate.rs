@@ -73,8 +73,8 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     diagnostics.finish(machine)
 }
 
-/// The axes that `tables` describe, in the order of `joints`; what is doubtful about them and their
-/// transmissions is noted. Those without a sound motor are left out, and noted.
+/// The axes that `tables` describe, in the order of `joints`; warnings about them and their
+/// transmissions are noted. Those without a sound motor are left out, and noted.
 fn axes(
     table: &MachineTable,
     tables: &[&AxisTable],

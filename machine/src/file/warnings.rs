@@ -1,4 +1,4 @@
-//! What is sound enough to run but should be looked at: doubts for a person, not errors.
+//! What is sound enough to run but should be looked at: warnings for a person, not errors.
 //!
 //! Foremost motor data that contradict themselves. Source 003's own table 3-3 promises a torque
 //! that its supply cannot drive, so the voltage limit line `R·i + k·ω ≤ V` is what counts, and
@@ -13,11 +13,11 @@ use crate::document::{self, Diagnostics, Number, Positive, Quantity};
 use crate::machine::Warning;
 use crate::quantity::Speed;
 
-/// How far a data sheet's nominal point may lie beyond the limit line before it is doubted: the
+/// How far a data sheet's nominal point may lie beyond the limit line before there is a warning: the
 /// rounding of two-digit data.
 const ROUNDING: f64 = 0.02;
 
-/// Notes doubts about the motor of `axis`.
+/// Warns about the motor of `axis`.
 pub(super) fn of_motor(axis: &str, motor: &DcMotorTable, diagnostics: &mut Diagnostics) {
     let voltage = motor.voltage.value;
     let resistance = motor.resistance.value;
@@ -55,7 +55,7 @@ pub(super) fn of_motor(axis: &str, motor: &DcMotorTable, diagnostics: &mut Diagn
     }
 }
 
-/// Notes doubts about path speeds that `axis` cannot follow in every direction.
+/// Warns about path speeds that `axis` cannot follow in every direction.
 pub(super) fn of_speeds(
     speeds: [&Quantity<Speed, Positive>; 2],
     joint: &Joint,
@@ -76,7 +76,7 @@ pub(super) fn of_speeds(
     }
 }
 
-/// Notes doubts about the damping of a spring: a spring that rings cannot be led by inverting it
+/// Warns about the damping of a spring: a spring that rings cannot be led by inverting it
 /// once a millisecond, as a pilot of both machines found.
 pub(super) fn of_damping(ratio: &Number<Positive>, diagnostics: &mut Diagnostics) {
     /// Share of critical damping below which the inversion fails.
@@ -91,7 +91,7 @@ pub(super) fn of_damping(ratio: &Number<Positive>, diagnostics: &mut Diagnostics
     }
 }
 
-/// Everything that was doubted, in the order in which it was noted.
+/// All warnings, in the order in which it was noted.
 pub(super) fn warnings(diagnostics: &mut Diagnostics) -> Vec<Warning> {
     let warnings = diagnostics.take_warnings();
     warnings

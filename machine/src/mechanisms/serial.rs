@@ -2,7 +2,7 @@
 //! (source 000 sec. 3, after Craig).
 //!
 //! Joint `i` turns about or slides along the z axis of frame `i`. The inverse is found by iteration
-//! from the previous joints, so a chain stays in the posture that it is in.
+//! from the previous joints, so a chain stays in its configuration.
 
 mod dynamics;
 mod frame;

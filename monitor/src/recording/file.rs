@@ -85,7 +85,7 @@ pub enum RecordingError {
         expected_layout: u64,
     },
     /// The file ends inside a record: whoever wrote it was stopped.
-    #[error("the recording ends inside record {record}: whoever wrote it was stopped")]
+    #[error("the recording ends inside record {record}: its writer was killed")]
     Truncated {
         /// The incomplete record, from 0.
         record: u64,

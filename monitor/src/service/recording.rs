@@ -223,8 +223,7 @@ impl Recording {
 /// nobody waits for it.
 ///
 /// # Errors
-/// When whoever waits cannot be told by a file: the note that is there still says that the
-/// recording goes on.
+/// When `monitor.json` cannot be written: the old one then still says that the recording goes on.
 pub(super) fn give_up(
     folder: &RunFolder,
     stream: u64,

@@ -12,14 +12,13 @@ use crate::geometry::path::Path;
 use crate::geometry::track::{Bend, Track};
 use crate::light::Policy;
 
-/// A smoothed joint of a line that is marked at one speed stays within this share of the tolerance
-/// where it is made gentler than it must be.
+/// A corner that is rounded more than its speed requires stays within this fraction of the tolerance.
 const GENTLE: f64 = 0.2;
 
 /// Curves that meet within this distance are taken to meet [m].
 pub(crate) const GAP: f64 = 1e-8;
 
-/// Cosine of the angle from which on two directions are a corner wherever corners are exact: 1°.
+/// Two directions that differ by 1° or more form a corner; its cosine.
 pub(crate) const CORNER: f64 = 0.999_847_695_156_391_3;
 
 /// Cosine of the sharpest turn that is passed on the way: 150°. Beyond, the rounded path would turn

@@ -408,7 +408,7 @@ impl<'a> Operations<'a> {
     fn limit_changes(&mut self, contour: &mut Contour) {
         if let Some(line) = contour.limit_change_rate(EDGES, CYCLE_TIME, self.limits.speed) {
             let text =
-                "slowed: the light changes more often here than can be said in a cycle".to_owned();
+                "slowed here: the power changes more often than a 1 ms cycle can carry".to_owned();
             if !self.notes.iter().any(|note| note.text == text) {
                 self.notes.push(Note { line, text });
             }
@@ -430,8 +430,8 @@ impl<'a> Operations<'a> {
             return;
         }
         let text =
-            "the steps between the rows of this raster are gone in the dark: at one speed they \
-                    could not be marked"
+            "the steps between the rows of this raster are moved with the laser off: at constant \
+                    speed they cannot be marked"
                 .to_owned();
         if !self.notes.iter().any(|note| note.text == text) {
             self.notes.push(Note { line, text });

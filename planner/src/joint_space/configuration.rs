@@ -9,11 +9,11 @@ use machine::{Axis, Mechanism};
 use crate::geometry::path::Path;
 use crate::limits::motion_limits::{MotionLimits, Scope};
 
-/// A larger step of a joint between two looks makes the other branches compete [m or rad].
+/// If a joint moves by more than this between two samples, the other branches are tried too [m or rad].
 const JUMP: f64 = 0.3;
 
-/// The shortest step of a walk, as a share of the part that it goes along: below, a change of the
-/// joints is a jump.
+/// The shortest step along a part, as a fraction of it. If the joints still change too much over that, they
+/// jump.
 const SHORTEST: f64 = 1e-7;
 
 /// Steps of a walk along one part, before they are refined.
@@ -137,7 +137,7 @@ pub(crate) fn follow<const N: usize, M: Mechanism<N>>(
     best
 }
 
-/// What ends where it begins to matter: the tool's motion as a function of a share from 0 to 1.
+/// A part of a path: the tool's motion as a function of the fraction of it that is done, 0 to 1.
 pub(crate) type PathFunction<'a> = dyn Fn(f64) -> ToolMotion + 'a;
 
 /// Why a configuration does not do.

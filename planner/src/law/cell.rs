@@ -24,9 +24,9 @@ pub(super) struct Cell {
     pub(super) place: f64,
     /// How far it goes [m], 0 or more.
     pub(super) length: f64,
-    /// u̇ at its begin [m/s].
+    /// u̇ at its start [m/s].
     pub(super) speed: f64,
-    /// ü at its begin [m/s²].
+    /// ü at its start [m/s²].
     pub(super) acceleration: f64,
     pub(super) motion: Motion,
     /// Which limit is nearest in it.
@@ -37,7 +37,7 @@ pub(super) struct Cell {
 const MOST_TERMS: usize = 60;
 
 impl Cell {
-    /// The motion at `time` after the begin of the cell [s], the position from its begin.
+    /// The motion at `time` after the start of the cell [s], the position from its start.
     #[inline]
     pub(super) fn at(&self, time: f64) -> Along {
         match self.motion {
@@ -52,7 +52,7 @@ impl Cell {
         }
     }
 
-    /// When, after the begin of the cell, the place `distance` [m] from it is reached [s]; the cell
+    /// When, after the start of the cell, the place `distance` [m] from it is reached [s]; the cell
     /// takes at most `longest` [s].
     pub(super) fn time_at(&self, distance: f64, longest: f64) -> f64 {
         if distance <= 0.0 {

@@ -1,4 +1,4 @@
-//! The planning of one stretch: estimate, cells, rounds of programmes, a last look.
+//! Plans one stretch: speed estimate, cells, a few linear programmes, and a check between the grid points.
 
 use super::{
     build::{Held, Launch, PARTS, Problem},
@@ -14,17 +14,17 @@ use super::{
     time_law::TimeLaw,
 };
 
-/// How much the speed bound of the next round is above the speed of this one, for rows that need it.
+/// Speed bound of the next round, as a multiple of this round's speed, for rows that mix orders.
 const GROWTH: [f64; 3] = [1.3, 1.15, 1.07];
 /// A round that changes the time by less than this part of it is the last.
 const LEAST_GAIN: f64 = 2e-3;
 /// A limit used by more than this between the places at which it is held is tightened.
 const MOST_USED: f64 = 1.003;
-/// A law that uses a limit by more than this is run through slower.
+/// If a profile uses more than this fraction of a limit, the whole of it is slowed.
 const TOLERATED: f64 = 1.008;
 /// How often limits are tightened.
 const TIGHTENINGS: usize = 3;
-/// How much of the square of a moving end's speed the limits of the second order must allow.
+/// The fraction of v² at a moving end that the limits on acceleration must allow.
 const MET: f64 = 0.98;
 /// How much the limits of the third order are loosened to find a way to a moving end.
 const LOOSENED: f64 = 1.3;

@@ -148,7 +148,7 @@ impl TimeLaw {
         self.cells.extend(next.cells.iter().map(|cell| Cell { time: time + cell.time, ..*cell }));
     }
 
-    /// The begin of the law up to the last border of its cells that is not behind `place` [m].
+    /// The part of the law up to the last border of its cells that is not behind `place` [m].
     pub fn up_to(&self, place: f64) -> Self {
         let end = |cell: &Cell| cell.place + cell.length;
         let count = self.cells.partition_point(|cell| end(cell) <= place);

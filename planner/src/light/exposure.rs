@@ -35,8 +35,8 @@ impl Light {
         Self { source, stroke: 0, is_lit: false, changes: Vec::new(), last }
     }
 
-    /// Hands on the changes that nothing after `time` [s] can come before or undo: the source is told
-    /// of light ahead of time, and a pause too short for it is none.
+    /// Takes the laser changes that motion after `time` [s] can no longer affect. Later motion can move a change
+    /// forward, by the source's delay, or delete one, where a pause is too short for the source.
     pub(crate) fn take(&mut self, time: f64) -> Vec<LaserChange> {
         let first = Nanoseconds::from_seconds(time - told_ahead(&self.source));
         let count = self.changes.iter().take_while(|change| change.time < first).count();

@@ -89,8 +89,8 @@ fn tangent(motor: &StepperMotor, turns: f64, speed: f64) -> [f64; 2] {
     [rest, (here - rest) / speed.max(f64::MIN_POSITIVE)]
 }
 
-/// τ within ±`share`·(`most[0]` + `most[1]`·u̇). A share that would leave less than the load takes
-/// leaves a part of what is there beside the load: slower motion needs no more than that.
+/// τ within ±`share`·(`most[0]` + `most[1]`·u̇). Where that is less than the load needs at rest, a tenth of the
+/// torque beyond the load is left: enough for slow motion.
 fn torque_rows(
     axis: &Axis,
     motion: &AxisMotion,

@@ -9,8 +9,8 @@ const BELOW: f64 = 0.997;
 /// The share that one round of tightening leaves at most, and at least.
 const ROUND: [f64; 2] = [0.5, 0.995];
 
-/// What a law that is held to its rows at places only is planned with of the tool's acceleration and
-/// jerk.
+/// Fractions of the tool's acceleration and jerk to plan with where a profile keeps its limits at grid points
+/// only, since it may exceed them a little between two.
 const BY_PLACES: [f64; 2] = [0.999, 0.997];
 
 /// Shares of the limits that a stretch is planned with [1].
@@ -84,8 +84,8 @@ impl Tightening {
         true
     }
 
-    /// The same with a little of the axes' limits left over: what the way out of a path is promised
-    /// with, so that it is still there when the check of its samples has taken some of them.
+    /// The same with 1 % of the axes' limits in reserve. The way out of a path is planned with these, so that it
+    /// still exists after the check of the samples has tightened a limit.
     pub(crate) fn with_reserve(&self) -> Self {
         /// What is left of each.
         const SHARE: f64 = 0.99;

@@ -106,7 +106,7 @@ impl PlanFiles {
     }
 }
 
-/// Whoever reads the plan would find null where a number is due.
+/// Refuses numbers that are not finite: JSON has none, and a reader would find null.
 fn finite(value: &impl serde::Serialize) -> Result<(), Refusal> {
     match first_not_finite(value) {
         Some(place) => Err(Refusal::internal(format!("the plan has no finite number at {place}"))),

@@ -152,7 +152,7 @@ fn at(x: f64, y: f64) -> AxisArray {
 const SMALL: [&str; 2] = ["letters.text=S", "letters.height=2 mm"];
 
 #[test]
-fn a_stream_waits_for_its_name_and_never_exceeds_its_licence() {
+fn a_stream_waits_for_its_name_and_never_exceeds_its_credit() {
     let mut bench = Bench::new();
     bench.offer(1, &SMALL);
     bench.turn_until(PlannerPhase::Streaming);

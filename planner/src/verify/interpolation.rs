@@ -39,7 +39,7 @@ impl InterpolationCheck {
     }
 
     /// Looks between the setpoint before and this one of `trajectory`, the last that `sampler` has
-    /// made, if a stroke is marked there. Gives the breach where the tool strays too far.
+    /// made, if a stroke is marked there. Gives the violation where the tool strays too far.
     ///
     /// # Errors
     /// Where a chain does not close.

@@ -46,7 +46,7 @@ pub(super) fn check<const N: usize, M: Mechanism<N>>(
                      `{}` is {:.6}, and must be {} or more",
                     margin.name, margin.value, margin.limit
                 ),
-                "change `home_axes` to a posture farther from it",
+                "change `home_axes` to a configuration farther from it",
             );
         }
     }

@@ -1,9 +1,8 @@
 //! The shortest duration of a flight.
 //!
-//! Whether a duration is long enough is asked of the [`programme`](super::programme). It need not
-//! be that a longer one is long enough too: what keeps its speed has no way to lose time. So the
-//! search goes up from a lower bound in steps by how far the limits are exceeded, and then between
-//! the last that was too short and the first that was not.
+//! [`programme`](super::programme) says whether a duration is feasible. Feasibility is not monotonic: a tool
+//! that must keep its speed cannot use more time. So the search steps up from a lower bound, by how far the
+//! limits are exceeded, and then interpolates between the last infeasible duration and the first feasible one.
 
 use messages::math;
 
@@ -14,28 +13,29 @@ use super::programme::{Answer, solve};
 use super::{DirectionLimit, Flight, FlightLimits, LONGEST, ROUNDING, State};
 use crate::law::profile::Ramp;
 
-/// Nearness of the found duration to the next that is too short.
+/// The search ends when the best duration is within this factor of one that is too short.
 const NEAR: f64 = 1.005;
 
-/// Where the search begins, as a multiple of the lower bound; at it nothing would be left over.
+/// The first duration tried, as a multiple of the lower bound, at which the limits leave no room.
 const BEGIN: f64 = 1.003;
 
-/// To what part the share is found where the duration is still far off.
+/// Relative precision of the use of the limits while the duration is far from the answer.
 const ROUGH: f64 = 0.1;
 
-/// To what part it is found in the end.
+/// The same near the answer.
 const FINE: f64 = 0.008;
 
-/// A duration that is so much longer, and needs so much of the share before it, is no way to go on;
-/// so often.
+/// The search gives up after [`STALLS`] steps in which the duration grew by more than the first factor, and the
+/// use of the limits was still more than the second times that of the step before: an end itself is beyond a
+/// limit.
 const STALLED: [f64; 2] = [1.2, 0.99];
 const STALLS: usize = 3;
 
-/// Lowerings of the limits by a quarter, and bisections after the first that fits.
+/// How often the limits are reduced by a quarter, and bisections after the first trial that fits.
 const LOWERINGS: usize = 30;
 const BISECTIONS: usize = 5;
 
-/// Attempts at curved ends as fast as may be.
+/// Trials for ends that are curved and at the largest speed.
 const RETRIES: usize = 12;
 
 /// A flight in the coordinates of its frame.
