@@ -301,6 +301,8 @@ pub enum KinematicsVerb {
     Jacobian,
     /// Efforts for a motion.
     Dynamics,
+    /// Mass matrix, velocity terms and gravity, apart.
+    Matrices,
     /// Velocity and force ellipses.
     Ellipse,
 }

@@ -1,6 +1,6 @@
 //! The one trait that every mechanism implements.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
 
 use crate::taylor::Taylor;
 
@@ -196,8 +196,8 @@ pub trait Branch: Copy + core::fmt::Debug + PartialEq + Send + Sync + 'static {
     /// The same with `name` set to `values`; `None` where there is no such name or value.
     fn choose(self, name: &str, values: &[i32]) -> Option<Self>;
 
-    /// The same with the turn of a joint that turns without end left to the previous joints; itself
-    /// where it names no turn.
+    /// The same with what depends on the place left open: the turn of a joint that turns without end,
+    /// and the number of an assembly. Itself where it names neither.
     #[must_use]
     fn in_any_turn(self) -> Self {
         self
@@ -307,6 +307,22 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
     /// Tool velocity per joint rate.
     fn jacobian(&self, chain: &Self::ChainState) -> Jacobian<N>;
 
+    /// Angular velocity of the body that bears the tool, against the frame of the tool's positions and
+    /// in it, per joint rate [rad/m or 1]: what a moment at the tool works on. These are the angular
+    /// rows of the Jacobian, except where the tool turns and its orientation is nobody's choice.
+    fn tool_turning(&self, chain: &Self::ChainState) -> SMatrix<f64, 3, N> {
+        self.jacobian(chain).fixed_rows::<3>(3).into_owned()
+    }
+
+    /// Efforts of the joints while the tool exerts `wrench`, a force [N] and a moment [N·m] about the
+    /// tool centre point in the frame of the tool's positions, on what it marks; in [N or N·m]. The
+    /// parts that the mechanism's guides bear are not in it.
+    fn wrench_efforts(&self, chain: &Self::ChainState, wrench: &Vector6<f64>) -> Joints<N> {
+        // Virtual work of the force and of the moment.
+        self.jacobian(chain).fixed_rows::<3>(0).tr_mul(&wrench.fixed_rows::<3>(0))
+            + self.tool_turning(chain).tr_mul(&wrench.fixed_rows::<3>(3))
+    }
+
     /// Distances to the mechanism's singularities and collisions, each with what it must keep.
     fn margins(&self, chain: &Self::ChainState) -> Vec<Margin>;
 
@@ -364,12 +380,6 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
         _previous: &Joints<N>,
     ) -> Option<Result<Joints<N>, KinematicsError>> {
         None
-    }
-
-    /// Friction of the joints at `velocity` [N or N·m], where the mechanism's own equations have it.
-    /// In motion friction is that of the motors' shafts ([`crate::Friction`]), the same put elsewhere.
-    fn friction(&self, _velocity: &Joints<N>) -> Joints<N> {
-        Joints::zeros()
     }
 
     /// Inertia of the load in joint coordinates, symmetric and positive definite, rotors excluded

@@ -9,6 +9,7 @@
 
 pub mod actuator;
 pub mod document;
+pub mod equation_of_motion;
 pub mod file;
 pub mod focus;
 pub mod gcode_settings;
@@ -27,6 +28,7 @@ pub mod trip;
 
 pub use actuator::{Axis, Encoder, Friction, JointUnit, LoopGains};
 pub use document::{DocumentError, Override};
+pub use equation_of_motion::EquationOfMotion;
 pub use gcode_settings::{GcodeSettings, ZMeaning};
 pub use kinematics::{Mechanism, Pose};
 pub use laser::LaserSource;

@@ -6,9 +6,9 @@ mod support;
 
 use machine::kinematics::{Attitude, Branch, Joints, ToolMotion};
 use machine::mechanisms::polar::{PolarBranch, PolarLoad};
-use machine::{Mechanism, Polar, Pose};
+use machine::{Friction, Mechanism, Polar, Pose};
 use messages::math;
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3, Vector6};
 use serde_json::Value;
 use support::{array, code_of, conforms, golden, near, number, vector};
 
@@ -34,8 +34,6 @@ fn polar(parameters: &Value) -> Polar {
             workpiece_inertia: of("Iw"),
             counterbalance: of("F_cb"),
             gravity: of("g"),
-            viscous: array(&parameters["visc"]),
-            coulomb: array(&parameters["coul"]),
         },
         elasticity: None,
     }
@@ -115,8 +113,12 @@ fn dynamics_statics_and_feed_agree_with_the_golden_vectors() {
         let mass = machine.mass_matrix(&q);
         let gravity = machine.gravity(&q);
         let velocity = Joints::from(array::<3>(&input["qd"]));
-        let effort = machine.inverse_dynamics(&q, &velocity, &Joints::from(array(&input["qdd"])))
-            + machine.friction(&velocity);
+        let friction = Joints::from_fn(|axis, _| {
+            let [coulomb, viscous] = ["coul", "visc"].map(|key| number(&parameters[key][axis]));
+            Friction { coulomb, viscous }.torque(velocity[axis])
+        });
+        let acceleration = Joints::from(array(&input["qdd"]));
+        let effort = machine.inverse_dynamics(&q, &velocity, &acceleration) + friction;
         let diagonal: [f64; 3] = array(&output["M_diag"]);
         let (held, tau): ([f64; 3], [f64; 3]) = (array(&output["G"]), array(&output["tau"]));
         for axis in 0..3 {
@@ -129,10 +131,18 @@ fn dynamics_statics_and_feed_agree_with_the_golden_vectors() {
         let margin = machine.margins(&q)[0];
         near(margin.value, number(&output["det_xy"]).abs(), tolerance, &context);
 
-        let statics = machine.statics(&vector(&input["wrench_f"]), &vector(&input["wrench_m"]));
+        // The golden wrench is in the arm's frame, the mechanism's in that of the work.
+        let to_work = Rotation3::from_axis_angle(&Vector3::z_axis(), q[0] - q[1]);
+        let [force, moment] = ["wrench_f", "wrench_m"].map(|key| to_work * vector(&input[key]));
+        let wrench = Vector6::from_fn(|row, _| if row < 3 { force[row] } else { moment[row - 3] });
+        let statics = machine.wrench_efforts(&q, &wrench);
         let expected: [f64; 2] = array(&output["static"]);
         near(statics[0], expected[0], tolerance, &context);
-        near(statics[1], expected[1], tolerance, &context);
+        near(statics[2], expected[1], tolerance, &context);
+        // What the table bears: the force's moment about its axis, and the moment, both backwards.
+        let tool = machine.pose(&q).position;
+        let borne = -(tool.cross(&force) + moment).z;
+        near(statics[1], borne, tolerance, &context);
 
         let speed = vector(&input["v_workpiece"]);
         let tool = line(vector(&input["p"]), speed, [1.0, 0.0, 0.0]);
@@ -144,7 +154,6 @@ fn dynamics_statics_and_feed_agree_with_the_golden_vectors() {
         let share = 1.0 / uses.max().max(1.0);
         near(share, number(&output["feed_scale"]), tolerance, &context);
     }
-    assert_eq!(machine.friction(&Joints::zeros()), Joints::<3>::zeros());
 }
 
 /// The code of a pose: what the inverse says, and else which of the limits its joints break.

@@ -51,8 +51,6 @@ fn machine() -> Machine {
         workpiece_inertia: 1e-3,
         counterbalance: 0.3 * 9.81,
         gravity: 9.81,
-        viscous: [0.0; 3],
-        coulomb: [0.0; 3],
     };
     machine.mechanism = MechanismKind::Polar(Polar {
         arm: ARM,

@@ -9,10 +9,12 @@ use crate::arguments::{KinematicsArguments, KinematicsVerb};
 use crate::exit::{Exit, Failure};
 use crate::inputs;
 use machine::kinematics::{Branch as _, Joints, KinematicsError, TaskSpace};
-use machine::{Machine, Mechanism, MechanismVisitor, Pose};
+use machine::{Axis, EquationOfMotion, Machine, Mechanism, MechanismVisitor, Pose};
 use messages::finite::first_not_finite;
 use messages::math;
-use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SMatrix, SVD, SymmetricEigen, Vector3};
+use nalgebra::{
+    DMatrix, DVector, Matrix3, Rotation3, SMatrix, SVD, SymmetricEigen, Vector3, Vector6,
+};
 use serde_json::Value;
 use std::io::{self, BufRead, BufWriter, ErrorKind, Write};
 
@@ -135,6 +137,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
             KinematicsVerb::Inverse => self.inverse(request),
             KinematicsVerb::Jacobian => self.jacobian(request),
             KinematicsVerb::Dynamics => self.dynamics(request),
+            KinematicsVerb::Matrices => self.matrices(request),
             KinematicsVerb::Ellipse => self.ellipse(request),
         }
     }
@@ -276,7 +279,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
             .collect();
         let shown = q.component_div(&self.ratios());
         let branch = shown_branch(self.mechanism.branch_of(&state));
-        Ok(Reply::Inverse { q: shown.as_slice().to_vec(), branch, margin })
+        Ok(Reply::Inverse { q: numbers(&shown), branch, margin })
     }
 
     /// Tool velocity per joint rate, in the joint values that the user speaks of.
@@ -332,8 +335,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
         let velocity = self.joints("qd", request.qd.as_ref())?;
         let acceleration = self.joints("qdd", request.qdd.as_ref())?;
         let state = self.state(request)?;
-        let mut effort = self.mechanism.inverse_dynamics(&state, &velocity, &acceleration)
-            + self.mechanism.friction(&velocity);
+        let mut effort = self.mechanism.inverse_dynamics(&state, &velocity, &acceleration);
         if let Some(wrench) = &request.wrench {
             if wrench.len() > 6 {
                 return Err(ErrorBody::bad_request(format!(
@@ -341,20 +343,59 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
                     wrench.len()
                 )));
             }
-            // The tool pushes on the work with this wrench: virtual work gives Jᵀ·w at the joints.
-            let wrench =
-                nalgebra::Vector6::from_fn(|row, _| wrench.get(row).copied().unwrap_or(0.0));
-            effort += self.mechanism.jacobian(&state).transpose() * wrench;
+            let wrench = Vector6::from_fn(|row, _| wrench.get(row).copied().unwrap_or(0.0));
+            effort += self.mechanism.wrench_efforts(&state, &wrench);
         }
         let ratios = self.ratios();
-        let mut shown = effort.component_mul(&ratios);
-        if self.arguments.motor {
-            for (axis, value) in shown.iter_mut().enumerate() {
-                let settings = &self.machine.axes[axis];
-                *value += settings.motor.rotor_inertia() * acceleration[axis] / settings.ratio;
-            }
-        }
-        Ok(Reply::Dynamics { effort: shown.as_slice().to_vec() })
+        let friction = match request.friction {
+            Some(false) => Joints::zeros(),
+            None | Some(true) => self.friction(&velocity),
+        };
+        let rotors = self.rotors().component_mul(&acceleration).component_div(&ratios);
+        let shown = effort.component_mul(&ratios) + rotors + friction;
+        Ok(Reply::Dynamics { effort: numbers(&shown), friction: numbers(&friction) })
+    }
+
+    /// What the axes' friction takes at `velocity` [m/s or rad/s], as efforts on what the user calls a
+    /// joint value.
+    fn friction(&self, velocity: &Joints<N>) -> Joints<N> {
+        let joints = Joints::<N>::from_fn(|axis, _| {
+            let Axis { friction, ratio, .. } = &self.machine.axes[axis];
+            friction.torque(velocity[axis] / ratio) / ratio
+        });
+        joints.component_mul(&self.ratios())
+    }
+
+    /// Inertia of each motor's rotor where motor angles are asked for [kg·m²]; joints have none.
+    fn rotors(&self) -> Joints<N> {
+        let motor = self.arguments.motor;
+        Joints::from_fn(
+            |axis, _| {
+                if motor { self.machine.axes[axis].motor.rotor_inertia() } else { 0.0 }
+            },
+        )
+    }
+
+    fn matrices(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
+        let velocity = match &request.qd {
+            None => Joints::zeros(),
+            given => self.joints("qd", given.as_ref())?,
+        };
+        let state = self.state(request)?;
+        let equation = EquationOfMotion::of(self.mechanism, &state, &velocity)
+            .through(&self.ratios(), &self.rotors());
+        let rows = |matrix: &SMatrix<f64, N, N>| {
+            matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+        };
+        let coriolis = |row| equation.coriolis.iter().map(|column| column[row]).collect();
+        Ok(Reply::Matrices {
+            m: rows(&equation.mass),
+            v: numbers(&equation.velocity),
+            g: numbers(&equation.gravity),
+            c: rows(&equation.centrifugal),
+            b: (0..N).map(coriolis).collect(),
+            friction: numbers(&self.friction(&velocity)),
+        })
     }
 
     fn ellipse(&mut self, request: &Request) -> Result<Reply, ErrorBody> {
@@ -424,6 +465,11 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
             detail: error.detail.into(),
         }
     }
+}
+
+/// A number for each joint, as it is printed.
+fn numbers<const N: usize>(joints: &Joints<N>) -> Vec<f64> {
+    joints.as_slice().to_vec()
 }
 
 /// The direction in which the beam shines.

@@ -49,7 +49,7 @@ pub struct Polar {
     pub endless: bool,
     /// The branch in which the machine works.
     pub branch: PolarBranch,
-    /// Masses, inertias and friction.
+    /// Masses and inertias.
     pub load: PolarLoad,
     /// Spring and damper of each joint; `None` when they are taken as rigid.
     pub elasticity: Option<[Elasticity; 3]>,
@@ -253,6 +253,15 @@ impl Mechanism<3> for Polar {
         jacobian
     }
 
+    // The arm turns the tool, and the table turns the work away below it: source 000 eq. 5.8 by
+    // virtual work, τ₁ = a₁·f_y + m_z with the force in the arm's frame, and the table bears −m_z.
+    fn tool_turning(&self, _q: &Joints<3>) -> Matrix3<f64> {
+        let mut turning = Matrix3::zeros();
+        turning[(2, 0)] = 1.0;
+        turning[(2, 1)] = -1.0;
+        turning
+    }
+
     /// `center` is |det J| over x and y, a₁·c·|sin θ₁| [m²], 0 where arm and table are in line; a
     /// path through the centre passes there. `reach` is what is left of the arm's reach [m].
     fn margins(&self, q: &Joints<3>) -> Vec<Margin> {
@@ -341,10 +350,6 @@ impl Mechanism<3> for Polar {
 
     fn has_constant_mass(&self) -> bool {
         true
-    }
-
-    fn friction(&self, velocity: &Joints<3>) -> Joints<3> {
-        Self::friction(self, velocity)
     }
 
     fn stiffness(&self) -> Option<Matrix3<f64>> {

@@ -13,7 +13,7 @@
 //! Each actuator is two bodies in line: the housing, which only turns about its base, and the rod,
 //! which also moves out. The tool, with its plate, is a mass at P.
 
-use nalgebra::{Matrix2, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
 use crate::kinematics::{
@@ -286,6 +286,13 @@ impl Mechanism<2> for TwinActuator {
 
     fn jacobian(&self, chain: &TwinAssembly) -> Jacobian<2> {
         plane::jacobian(&chain.jacobian)
+    }
+
+    // The plate with the tool is one body with actuator a.
+    fn tool_turning(&self, chain: &TwinAssembly) -> Matrix3x2<f64> {
+        let mut turning = Matrix3x2::zeros();
+        turning.set_row(2, &chain.turning[0].transpose());
+        turning
     }
 
     fn margins(&self, chain: &TwinAssembly) -> Vec<Margin> {

@@ -4,7 +4,7 @@ use machine::kinematics::Joints;
 use machine::mechanisms::polar::{PolarBranch, PolarLoad};
 use machine::{Mechanism, Polar};
 use messages::math;
-use nalgebra::{Rotation3, Vector2, Vector3};
+use nalgebra::{Rotation3, Vector2, Vector3, Vector6};
 
 use super::{only_corrected, slope};
 
@@ -18,13 +18,7 @@ fn machine() -> Polar {
         singular_radius: 2e-4,
         endless: true,
         branch: PolarBranch::default(),
-        load: PolarLoad {
-            head_center: 0.23,
-            counterbalance: 0.0,
-            viscous: [0.0; 3],
-            coulomb: [0.0; 3],
-            ..super::loads::POLAR
-        },
+        load: PolarLoad { head_center: 0.23, counterbalance: 0.0, ..super::loads::POLAR },
         elasticity: None,
     }
 }
@@ -62,7 +56,13 @@ fn a_moment_about_the_vertical_loads_the_arm() {
     let place = |by: f64, axis: usize| (turned(by) * Vector3::new(ARM, 0.0, 0.0))[axis];
     let velocity = Vector3::new(slope(|by| place(by, 0)), slope(|by| place(by, 1)), 0.0);
     let work = (turned(0.0) * force).dot(&velocity) + (turned(0.0) * moment).z;
-    let [torque, _] = machine().statics(&force, &moment);
+    // The arm's frame is turned by θ₁ − θ₂ against the work's, in which a wrench is told.
+    let q = Joints::from([angle, -0.5, 0.0]);
+    let to_work = Rotation3::from_axis_angle(&Vector3::z_axis(), q[0] - q[1]);
+    let (force_there, moment_there) = (to_work * force, to_work * moment);
+    let wrench =
+        Vector6::from_fn(|row, _| if row < 3 { force_there[row] } else { moment_there[row - 3] });
+    let torque = machine().wrench_efforts(&q, &wrench)[0];
     only_corrected("5.8", work, torque, ARM * force.y, 1e-9);
 }
 

@@ -18,7 +18,7 @@ pub const MCM: McmLoad = McmLoad {
     gravity: machine::kinematics::STANDARD_GRAVITY,
 };
 
-/// Of a polar machine, with friction at its joints.
+/// Of a polar machine.
 pub const POLAR: PolarLoad = PolarLoad {
     arm_mass: 1.2,
     arm_center: 0.105,
@@ -32,6 +32,4 @@ pub const POLAR: PolarLoad = PolarLoad {
     workpiece_inertia: 0.0026,
     counterbalance: 2.0,
     gravity: machine::kinematics::STANDARD_GRAVITY,
-    viscous: [0.035, 0.05, 6.0],
-    coulomb: [0.06, 0.09, 1.4],
 };

@@ -24,8 +24,11 @@ pub struct Request {
     pub pose: Option<RequestPose>,
     /// Joint position to stay near [m or rad].
     pub previous: Option<Vec<f64>>,
-    /// Force [N] and moment [N·m] of the tool on the work, up to six numbers.
+    /// Force [N] and moment [N·m] of the tool on the work, up to six numbers, in the frame of the
+    /// tool's positions.
     pub wrench: Option<Vec<f64>>,
+    /// Whether the efforts of `dynamics` have the axes' friction in them; they do by default.
+    pub friction: Option<bool>,
     /// The branch to take; mechanisms that have none accept an empty one.
     pub branch: Option<Map<String, Value>>,
 }
@@ -79,8 +82,26 @@ pub enum Reply {
     },
     /// Of `dynamics`.
     Dynamics {
-        /// Effort of each joint [N or N·m].
+        /// Effort of each joint [N or N·m], friction included.
         effort: Vec<f64>,
+        /// The part of it that the axes' friction takes [N or N·m]; 0 where it is left out.
+        friction: Vec<f64>,
+    },
+    /// Of `matrices`: `effort = m·q̈ + v + g + friction`, and `v = c·(q̇ⱼ²) + b·(q̇ⱼ·q̇ₖ)`.
+    Matrices {
+        /// Mass matrix [kg or kg·m²].
+        m: Vec<Vec<f64>>,
+        /// Centrifugal and Coriolis efforts at the joint velocity [N or N·m].
+        v: Vec<f64>,
+        /// Efforts of gravity [N or N·m].
+        g: Vec<f64>,
+        /// Centrifugal efforts, a column for the square of each joint rate.
+        c: Vec<Vec<f64>>,
+        /// Coriolis efforts, a column for the product of each pair of joint rates, in the order
+        /// (1, 2), (1, 3), …, (2, 3), ….
+        b: Vec<Vec<f64>>,
+        /// What the axes' friction takes at the joint velocity [N or N·m].
+        friction: Vec<f64>,
     },
     /// Of `ellipse`.
     Ellipse {

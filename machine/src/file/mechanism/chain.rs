@@ -5,7 +5,6 @@ use core::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use crate::actuator::Friction;
 use crate::document::{Diagnostics, Either, Number, Positive, ProblemKind, Span};
 use crate::file::axes::{Joint, JointUnit};
 use crate::file::tables::{AxisTable, MachineTable};
@@ -169,17 +168,6 @@ pub(super) fn range(context: &BuildContext<'_>, name: &str) -> Option<[f64; 2]> 
     match axis(context, name)?.limits.position.as_ref()? {
         Either::Word(_) => Some([f64::NEG_INFINITY, f64::INFINITY]),
         Either::Value([lower, upper]) => Some([lower.value, upper.value]),
-    }
-}
-
-/// The friction of the axis `name`, seen at its joint: coulomb [N or N·m], viscous per joint speed.
-pub(super) fn friction(context: &BuildContext<'_>, name: &str) -> Friction {
-    let Some(axis) = axis(context, name) else { return Friction { coulomb: 0.0, viscous: 0.0 } };
-    let travel = output(axis).first().map_or(1.0, |output| output.travel);
-    let ratio = travel / axis.gear.value;
-    Friction {
-        coulomb: axis.friction.coulomb.value / ratio,
-        viscous: axis.friction.viscous.value / (ratio * ratio),
     }
 }
 

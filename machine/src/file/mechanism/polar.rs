@@ -57,7 +57,6 @@ pub(super) fn build(
     diagnostics: &mut Diagnostics,
 ) -> Option<Built> {
     let names = [("th1", JointUnit::Angle), ("th2", JointUnit::Angle), ("d", JointUnit::Length)];
-    let friction = names.map(|(name, _)| chain::friction(context, name));
     let mut mechanism = Polar {
         arm: table.arm.value,
         center_distance: table.center_distance.value,
@@ -78,8 +77,6 @@ pub(super) fn build(
             workpiece_inertia: table.workpiece_inertia.value,
             counterbalance: table.counterbalance.value,
             gravity: STANDARD_GRAVITY,
-            viscous: friction.map(|friction| friction.viscous),
-            coulomb: friction.map(|friction| friction.coulomb),
         },
         elasticity: None,
     };

@@ -1,11 +1,6 @@
-//! What the polar machine's motors must move, and hold (source 000 sec. 5 and 7).
+//! What the polar machine's motors must move, and hold (source 000 sec. 7).
 
-use nalgebra::Vector3;
-
-use super::Polar;
-use crate::kinematics::Joints;
-
-/// Masses, inertias and friction, in the source's frames.
+/// Masses and inertias, in the source's frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PolarLoad {
     /// Mass of the arm, m₁ [kg].
@@ -33,10 +28,6 @@ pub struct PolarLoad {
     pub counterbalance: f64,
     /// Acceleration of gravity [m/s²].
     pub gravity: f64,
-    /// Viscous friction of each joint, b [N·m·s/rad or N·s/m].
-    pub viscous: [f64; 3],
-    /// Coulomb friction of each joint, T_c [N·m or N].
-    pub coulomb: [f64; 3],
 }
 
 impl PolarLoad {
@@ -57,23 +48,5 @@ impl PolarLoad {
     // Source 000 eq. 7.25.
     pub(super) fn weight(&self) -> f64 {
         self.head_mass * self.gravity - self.counterbalance
-    }
-}
-
-impl Polar {
-    /// Efforts that the joints' friction takes at `velocity` [N·m or N]; at rest none.
-    pub fn friction(&self, velocity: &Joints<3>) -> Joints<3> {
-        Joints::from_fn(|row, _| {
-            let speed = velocity[row];
-            let direction = if speed == 0.0 { 0.0 } else { speed.signum() };
-            self.load.viscous[row] * speed + self.load.coulomb[row] * direction
-        })
-    }
-
-    /// Torque of the arm's motor [N·m] and force of the vertical axis [N] while the tool exerts
-    /// `force` [N] and `moment` [N·m], both in the arm's frame: x along the arm, z up.
-    // Source 000 eq. 5.8 and 5.9; by virtual work eq. 5.4 loses m_z.
-    pub fn statics(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> [f64; 2] {
-        [self.arm * force.y + moment.z, force.z]
     }
 }
