@@ -212,7 +212,7 @@ fn spatial(criterion: &mut Criterion) {
         elasticity: None,
     };
     let level = Pose::at(Vector3::new(0.02, 0.01, 0.105));
-    let feet = platform.inverse(&level, Legs::default(), &Joints::zeros()).unwrap();
+    let feet = platform.inverse(&level, platform.branch(), &Joints::zeros()).unwrap();
     measure(criterion, "tri_planar", platform, feet.into());
 }
 

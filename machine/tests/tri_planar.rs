@@ -8,7 +8,7 @@ use machine::Mechanism;
 use machine::kinematics::{
     Attitude, Branch, JointMotion, Joints, KinematicsError, Pose, ToolMotion,
 };
-use machine::mechanisms::tri_planar::{Fold, Legs, TriPlanar};
+use machine::mechanisms::tri_planar::{Fold, Legs, TriPlanar, TriPlanarBranch};
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 use serde_json::Value;
 use support::{Random, golden, number};
@@ -39,8 +39,9 @@ fn mechanism(params: &Value) -> TriPlanar {
     }
 }
 
-fn legs(modes: &Value) -> Legs {
-    Legs(list::<3>(modes).map(|mode| if mode > 0.0 { Fold::Outward } else { Fold::Inward }))
+fn legs(modes: &Value) -> TriPlanarBranch {
+    let fold = |mode| if mode > 0.0 { Fold::Outward } else { Fold::Inward };
+    Legs(list::<3>(modes).map(fold)).into()
 }
 
 /// Roll, pitch and yaw about the fixed axes.
@@ -168,9 +169,9 @@ fn it_agrees_with_the_golden_vectors() {
     for point in golden["trajectory"].as_array().unwrap() {
         let context = &point.to_string();
         let pose = Pose { position: list(&point["t"]).into(), rotation: rotation(&point["rpy"]) };
-        let q = mechanism.inverse(&pose, Legs::default(), &at_rest()).unwrap();
+        let q = mechanism.inverse(&pose, TriPlanarBranch::default(), &at_rest()).unwrap();
         near((q - Joints::from(list::<6>(&point["motors"]))).amax(), 0.0, tolerance, context);
-        let found = mechanism.solve(&q, Legs::default(), chain.as_ref()).unwrap();
+        let found = mechanism.solve(&q, TriPlanarBranch::default(), chain.as_ref()).unwrap();
         same_pose(&mechanism.pose(&found), &pose, fk_tolerance, context);
         chain = Some(found);
     }
@@ -181,8 +182,8 @@ fn it_agrees_with_the_golden_vectors() {
         let z = number(&level["z_over_h"]) * height;
         let mut tool = ToolMotion::rest(&Pose::at(Vector3::new(0.0, 0.0, z)));
         tool.velocity.z = 1.0;
-        let motion = mechanism.joint_motion(&tool, Legs::default(), &at_rest()).unwrap();
-        let chain = mechanism.solve(&motion.position, Legs::default(), None).unwrap();
+        let motion = mechanism.joint_motion(&tool, TriPlanarBranch::default(), &at_rest()).unwrap();
+        let chain = mechanism.solve(&motion.position, TriPlanarBranch::default(), None).unwrap();
         for foot in 0..3 {
             let place = motion.position.fixed_rows::<2>(2 * foot).into_owned();
             let speed = motion.velocity.fixed_rows::<2>(2 * foot).into_owned();
@@ -216,7 +217,7 @@ fn it_refuses_what_the_golden_vectors_refuse() {
     assert_eq!(count, 4);
 }
 
-fn refusal(mechanism: &TriPlanar, pose: &Pose, branch: Legs) -> KinematicsError {
+fn refusal(mechanism: &TriPlanar, pose: &Pose, branch: TriPlanarBranch) -> KinematicsError {
     mechanism.inverse(pose, branch, &at_rest()).unwrap_err()
 }
 
@@ -224,7 +225,7 @@ fn refusal(mechanism: &TriPlanar, pose: &Pose, branch: Legs) -> KinematicsError 
 fn it_says_which_limit_and_by_how_much() {
     let mechanism = mechanism(&golden("tri_planar")["params"]);
     let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
-    let outward = Legs::default();
+    let outward = TriPlanarBranch::default();
     let level = |x, y, z| Pose::at(Vector3::new(x, y, z * height));
 
     let error = refusal(&mechanism, &level(0.0, 0.0, 1.05), outward);
@@ -286,8 +287,8 @@ fn feet_and_pose_lead_to_each_other_over_the_working_range() {
     let mut last: [Option<_>; 2] = [None; 2];
     for case in 0..4000 {
         let pose = any_pose(&mut random, height, 0.6);
-        let mixed = Legs([Fold::Inward, Fold::Outward, Fold::Outward]);
-        for (which, branch) in [Legs::default(), mixed].into_iter().enumerate() {
+        let mixed = TriPlanarBranch::from(Legs([Fold::Inward, Fold::Outward, Fold::Outward]));
+        for (which, branch) in [TriPlanarBranch::default(), mixed].into_iter().enumerate() {
             let Ok(q) = mechanism.inverse(&pose, branch, &at_rest()) else { continue };
             let context = &format!("case {case} {branch:?}: {pose:?}");
             let cold = mechanism.solve(&q, branch, None).expect(context);
@@ -362,7 +363,7 @@ impl Course {
 }
 
 /// Courses over the stator that every limit allows.
-fn courses(mechanism: &TriPlanar, branch: Legs, count: usize) -> Vec<Course> {
+fn courses(mechanism: &TriPlanar, branch: TriPlanarBranch, count: usize) -> Vec<Course> {
     let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
     let mut random = Random::new(0x5851_f42d_4c95_7f2d);
     let mut courses = Vec::new();
@@ -379,8 +380,8 @@ fn courses(mechanism: &TriPlanar, branch: Legs, count: usize) -> Vec<Course> {
 #[test]
 fn every_derivative_of_the_joints_is_that_of_the_one_below() {
     let mechanism = mechanism(&golden("tri_planar")["params"]);
-    let mixed = Legs([Fold::Outward, Fold::Inward, Fold::Outward]);
-    for branch in [Legs::default(), mixed] {
+    let mixed = TriPlanarBranch::from(Legs([Fold::Outward, Fold::Inward, Fold::Outward]));
+    for branch in [TriPlanarBranch::default(), mixed] {
         for course in courses(&mechanism, branch, 200) {
             let context = &format!("{branch:?} {:?}", course.tool);
             let free = unlimited(&mechanism);
@@ -412,7 +413,12 @@ fn every_derivative_of_the_joints_is_that_of_the_one_below() {
 /// Kinetic and potential energy from the bodies alone: speeds of their points by differences of
 /// their places. A thin uniform triangle has the inertia of a third of its mass in the middle of
 /// each side.
-fn energy(mechanism: &TriPlanar, branch: Legs, course: &Course, time: f64) -> (f64, f64) {
+fn energy(
+    mechanism: &TriPlanar,
+    branch: TriPlanarBranch,
+    course: &Course,
+    time: f64,
+) -> (f64, f64) {
     let h = 3e-6;
     let points = |time: f64| {
         let tool = course.later(time);
@@ -449,8 +455,8 @@ fn energy(mechanism: &TriPlanar, branch: Legs, course: &Course, time: f64) -> (f
 #[test]
 fn power_into_the_feet_is_the_change_of_energy() {
     let mechanism = mechanism(&golden("tri_planar")["params"]);
-    let mixed = Legs([Fold::Outward, Fold::Outward, Fold::Inward]);
-    for branch in [Legs::default(), mixed] {
+    let mixed = TriPlanarBranch::from(Legs([Fold::Outward, Fold::Outward, Fold::Inward]));
+    for branch in [TriPlanarBranch::default(), mixed] {
         for course in courses(&mechanism, branch, 200) {
             let context = &format!("{branch:?} {:?}", course.tool);
             let motion: JointMotion<6> =
@@ -483,7 +489,7 @@ fn power_into_the_feet_is_the_change_of_energy() {
 #[test]
 fn the_bias_is_that_of_lagrange() {
     let mechanism = mechanism(&golden("tri_planar")["params"]);
-    let branch = Legs::default();
+    let branch = TriPlanarBranch::default();
     for course in courses(&mechanism, branch, 100) {
         let context = &format!("{:?}", course.tool);
         let motion = mechanism.joint_motion(&course.tool, branch, &at_rest()).unwrap();
@@ -512,8 +518,8 @@ fn a_level_load_spreads_the_feet_by_a_third_of_it_over_tan_omega() {
     let height = massless.side * 3.0_f64.sqrt() / 2.0;
     for share in [0.3, 0.5, 0.7, 0.9] {
         let pose = Pose::at(Vector3::new(0.1, -0.05, share * height));
-        let q = massless.inverse(&pose, massless.legs, &at_rest()).unwrap();
-        let held = massless.gravity(&massless.solve(&q, massless.legs, None).unwrap());
+        let q = massless.inverse(&pose, massless.branch(), &at_rest()).unwrap();
+        let held = massless.gravity(&massless.solve(&q, massless.branch(), None).unwrap());
         let slope = share / (1.0_f64 - share * share).sqrt();
         let thrust = 0.8 * 9.806_65 / (3.0 * slope);
         for leg in 0..3 {
@@ -572,4 +578,127 @@ fn its_dynamics_are_those_of_an_independent_library() {
         }
     }
     assert_eq!(count, 14);
+}
+
+/// Poses over the stator with at least one leg folded below the platform, whose limits all are kept.
+fn inward_poses(mechanism: &TriPlanar, count: usize) -> Vec<(Pose, TriPlanarBranch, Joints<6>)> {
+    let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
+    let mut random = Random::new(0x1234_5678_9abc_def1);
+    let mut poses = Vec::new();
+    while poses.len() < count {
+        let folds =
+            core::array::from_fn(
+                |_| {
+                    if random.next() < 0.0 { Fold::Inward } else { Fold::Outward }
+                },
+            );
+        let branch = TriPlanarBranch::from(Legs(folds));
+        let pose = any_pose(&mut random, height, 1.0);
+        if branch != TriPlanarBranch::default()
+            && let Ok(q) = mechanism.inverse(&pose, branch, &at_rest())
+        {
+            poses.push((pose, branch, q));
+        }
+    }
+    poses
+}
+
+#[test]
+fn the_branch_of_the_inverse_leads_back_to_its_pose_with_legs_folded_inwards() {
+    let mechanism = mechanism(&golden("tri_planar")["params"]);
+    let mut ambiguous = 0;
+    for (pose, branch, q) in inward_poses(&mechanism, 12_000) {
+        let context = &format!("{branch:?}: {pose:?}");
+        let known = mechanism.solve_at(&pose, &q, branch, None).expect(context);
+        same_pose(&mechanism.pose(&known), &pose, 1e-12, context);
+        let named = mechanism.branch_of(&known);
+        assert_eq!(named.legs, branch.legs, "{context}");
+        let back = mechanism.solve(&q, named, None).expect(context);
+        same_pose(&mechanism.pose(&back), &pose, 1e-12, context);
+        assert_eq!(mechanism.branch_of(&back), named, "{context}");
+
+        // Without a number there is either this one pose only, or a refusal that says how many.
+        match (named.assembly, mechanism.solve(&q, branch, None)) {
+            (None, found) => {
+                same_pose(&mechanism.pose(&found.expect(context)), &pose, 1e-12, context)
+            }
+            (Some(number), Err(error)) => {
+                assert_eq!((error.code, error.limit), ("ambiguous_assembly", 1.0), "{context}");
+                assert!(
+                    error.value >= 2.0 && f64::from(number) <= error.value,
+                    "{context} {error}"
+                );
+                each_assembly_closes(&mechanism, &q, branch, error.value as i32, context);
+                ambiguous += 1;
+            }
+            (Some(number), Ok(_)) => panic!("assembly {number} is not the only one: {context}"),
+        }
+        // A solution near by goes on as it is, whichever it is.
+        let near = mechanism.solve(&q, branch, Some(&known)).expect(context);
+        same_pose(&mechanism.pose(&near), &pose, 1e-12, context);
+    }
+    assert!(ambiguous > 3, "only {ambiguous} of the poses are not the only ones");
+}
+
+/// Each number gives another pose on the same feet; beyond the last there is none.
+fn each_assembly_closes(
+    mechanism: &TriPlanar,
+    q: &Joints<6>,
+    branch: TriPlanarBranch,
+    count: i32,
+    context: &str,
+) {
+    let mut found: Vec<Pose> = Vec::new();
+    for number in 1..=count {
+        let chosen = branch.choose("assembly", &[number]).unwrap();
+        let chain = mechanism.solve(q, chosen, None).expect(context);
+        assert_eq!(mechanism.branch_of(&chain), chosen, "{context}");
+        let pose = mechanism.pose(&chain);
+        let feet = unlimited(mechanism).inverse(&pose, branch, &at_rest()).expect(context);
+        near((feet - q).amax(), 0.0, 1e-9, context);
+        let tilt = pose.rotation[(2, 2)];
+        assert!(found.iter().all(|other| other.rotation[(2, 2)] >= tilt - 1e-9), "{context}");
+        assert!(found.iter().all(|other| (other.position - pose.position).amax() > 1e-6));
+        found.push(pose);
+    }
+    let beyond = branch.choose("assembly", &[count + 1]).unwrap();
+    let error = mechanism.solve(q, beyond, None).unwrap_err();
+    assert_eq!((error.code, error.limit), ("no_assembly", f64::from(count)), "{context}");
+}
+
+/// Which is why a cold start takes it at once.
+#[test]
+fn with_all_legs_outward_a_platform_tilted_by_less_than_45_degrees_is_the_only_one() {
+    let mechanism = mechanism(&golden("tri_planar")["params"]);
+    let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
+    let (mut random, outward) = (Random::new(77), TriPlanarBranch::default());
+    let mut count = 0;
+    while count < 3000 {
+        let pose = any_pose(&mut random, height, 0.75);
+        let Ok(q) = mechanism.inverse(&pose, outward, &at_rest()) else { continue };
+        if pose.rotation[(2, 2)] < 0.5_f64.sqrt() {
+            continue;
+        }
+        let context = &format!("{pose:?}");
+        let first = mechanism.solve(&q, outward.choose("assembly", &[1]).unwrap(), None);
+        same_pose(&mechanism.pose(&first.expect(context)), &pose, 1e-12, context);
+        if let Ok(second) = mechanism.solve(&q, outward.choose("assembly", &[2]).unwrap(), None) {
+            assert!(mechanism.pose(&second).rotation[(2, 2)] < 0.5_f64.sqrt(), "{context}");
+        }
+        let cold = mechanism.solve(&q, outward, None).expect(context);
+        same_pose(&mechanism.pose(&cold), &pose, 1e-12, context);
+        count += 1;
+    }
+}
+
+#[test]
+fn an_assembly_is_named_by_a_number_from_1() {
+    let outward = TriPlanarBranch::default();
+    let second = outward.choose("assembly", &[2]).unwrap();
+    assert_eq!(second.choices(), [("legs", vec![1, 1, 1]), ("assembly", vec![2])]);
+    assert_eq!(second.choose("assembly", &[]), Some(outward));
+    assert_eq!(second.in_any_turn(), outward);
+    for bad in [0, -1, 256] {
+        assert_eq!(outward.choose("assembly", &[bad]), None);
+    }
 }

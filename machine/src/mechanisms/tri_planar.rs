@@ -8,6 +8,7 @@
 //! A leg's tip must lie in the plane. Of the two turns about the hinge that bring it there, the
 //! outward one spreads the leg away from the platform and the inward one folds it below.
 
+mod assemblies;
 mod chain_state;
 mod dynamics;
 mod inverse;
@@ -48,20 +49,58 @@ impl Fold {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Legs(pub [Fold; 3]);
 
-impl Branch for Legs {
+impl Legs {
+    fn is_outward(self) -> bool {
+        self.0 == [Fold::Outward; 3]
+    }
+}
+
+/// Which of the poses that close the legs on the feet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct TriPlanarBranch {
+    /// How the legs lean.
+    pub legs: Legs,
+    /// Where more than one pose has legs that lean so: its number, from 1, the most level one first.
+    /// `None` is the only one there, the one that a solution near by goes on to, or, with all legs
+    /// outward, the one that is tilted by at most 45°.
+    pub assembly: Option<u8>,
+}
+
+impl From<Legs> for TriPlanarBranch {
+    fn from(legs: Legs) -> Self {
+        Self { legs, assembly: None }
+    }
+}
+
+impl Branch for TriPlanarBranch {
     fn choices(&self) -> Vec<(&'static str, Vec<i32>)> {
-        let values = self.0.map(|fold| if fold == Fold::Outward { 1 } else { -1 });
-        vec![("legs", values.to_vec())]
+        let legs = self.legs.0.map(|fold| if fold == Fold::Outward { 1 } else { -1 });
+        let assembly = self.assembly.map(|number| ("assembly", vec![i32::from(number)]));
+        [("legs", legs.to_vec())].into_iter().chain(assembly).collect()
     }
 
     fn choose(self, name: &str, values: &[i32]) -> Option<Self> {
-        let ("legs", &[d, e, f]) = (name, values) else { return None };
         let fold = |value| match value {
             1 => Some(Fold::Outward),
             -1 => Some(Fold::Inward),
             _ => None,
         };
-        Some(Self([fold(d)?, fold(e)?, fold(f)?]))
+        match (name, values) {
+            ("legs", &[d, e, f]) => {
+                Some(Self { legs: Legs([fold(d)?, fold(e)?, fold(f)?]), ..self })
+            }
+            ("assembly", []) => Some(Self { assembly: None, ..self }),
+            ("assembly", &[number]) => {
+                let number = u8::try_from(number).ok().filter(|number| *number > 0)?;
+                Some(Self { assembly: Some(number), ..self })
+            }
+            _ => None,
+        }
+    }
+
+    /// An assembly's number is that of one place only.
+    fn in_any_turn(self) -> Self {
+        Self { assembly: None, ..self }
     }
 }
 
@@ -119,7 +158,7 @@ impl TriPlanar {
 }
 
 impl Mechanism<6> for TriPlanar {
-    type Branch = Legs;
+    type Branch = TriPlanarBranch;
     type ChainState = TriPlanarChainState;
 
     const NAME: &'static str = "tri_planar";
@@ -128,14 +167,14 @@ impl Mechanism<6> for TriPlanar {
         TaskSpace::Pose
     }
 
-    fn branch(&self) -> Legs {
-        self.legs
+    fn branch(&self) -> TriPlanarBranch {
+        self.legs.into()
     }
 
     fn solve(
         &self,
         q: &Joints<6>,
-        branch: Legs,
+        branch: TriPlanarBranch,
         near: Option<&TriPlanarChainState>,
     ) -> Result<TriPlanarChainState, KinematicsError> {
         chain_state::solve(self, q, branch, near)
@@ -145,10 +184,10 @@ impl Mechanism<6> for TriPlanar {
         &self,
         pose: &Pose,
         q: &Joints<6>,
-        branch: Legs,
+        branch: TriPlanarBranch,
         near: Option<&TriPlanarChainState>,
     ) -> Result<TriPlanarChainState, KinematicsError> {
-        chain_state::solve_at(self, pose, q, branch)
+        chain_state::solve_at(self, pose, q, branch.legs)
             .map_or_else(|| chain_state::solve(self, q, branch, near), Ok)
     }
 
@@ -159,14 +198,14 @@ impl Mechanism<6> for TriPlanar {
     fn locate(
         &self,
         q: &Joints<6>,
-        branch: Legs,
+        branch: TriPlanarBranch,
         near: Option<&TriPlanarChainState>,
     ) -> Result<Pose, KinematicsError> {
         chain_state::locate(self, q, branch, near)
     }
 
-    fn branch_of(&self, chain: &TriPlanarChainState) -> Legs {
-        chain.folds()
+    fn branch_of(&self, chain: &TriPlanarChainState) -> TriPlanarBranch {
+        chain_state::branch_of(self, chain)
     }
 
     fn jacobian(&self, chain: &TriPlanarChainState) -> Jacobian<6> {
@@ -180,12 +219,12 @@ impl Mechanism<6> for TriPlanar {
     fn inverse(
         &self,
         pose: &Pose,
-        branch: Legs,
+        branch: TriPlanarBranch,
         _previous: &Joints<6>,
     ) -> Result<Joints<6>, KinematicsError> {
         let rotation =
             core::array::from_fn(|row| core::array::from_fn(|column| pose.rotation[(row, column)]));
-        let joints = inverse::feet(self, &pose.position.into(), &rotation, branch)?;
+        let joints = inverse::feet(self, &pose.position.into(), &rotation, branch.legs)?;
         let joints = SVector::from(joints);
         limits::check(self, pose, &joints)?;
         Ok(joints)
@@ -194,10 +233,10 @@ impl Mechanism<6> for TriPlanar {
     fn joint_motion(
         &self,
         tool: &ToolMotion,
-        branch: Legs,
+        branch: TriPlanarBranch,
         _previous: &Joints<6>,
     ) -> Result<JointMotion<6>, KinematicsError> {
-        let joints = inverse::feet(self, &tool.series(), &tool.attitude.series(), branch)?;
+        let joints = inverse::feet(self, &tool.series(), &tool.attitude.series(), branch.legs)?;
         let motion = JointMotion::of_series(&joints);
         limits::check(self, &tool.pose(), &motion.position)?;
         Ok(motion)

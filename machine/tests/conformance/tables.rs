@@ -71,7 +71,7 @@ fn the_platform_on_planar_motors_conforms() {
             legs,
             elasticity: Some([SCREW; 6]),
         };
-        conforms(&mechanism, &[legs], |random| {
+        conforms(&mechanism, &[legs.into()], |random| {
             loop {
                 let spot = random.vector(1.0);
                 let tilt = random.vector(0.3);
@@ -80,7 +80,7 @@ fn the_platform_on_planar_motors_conforms() {
                     rotation: Rotation3::from_euler_angles(tilt.x, tilt.y, 3.0 * tilt.z)
                         .into_inner(),
                 };
-                if let Ok(q) = mechanism.inverse(&pose, legs, &Joints::zeros()) {
+                if let Ok(q) = mechanism.inverse(&pose, legs.into(), &Joints::zeros()) {
                     return q;
                 }
             }

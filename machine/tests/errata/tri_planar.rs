@@ -60,7 +60,7 @@ fn the_foot_hangs_on_the_far_side_of_its_hinge() {
         let inner = m * m * p * p - square * (p * p - n * n);
         assert!(inner > 0.0, "{case}");
         let feet = machine()
-            .inverse(&Pose { position, rotation: *r }, Legs::default(), &Joints::zeros())
+            .inverse(&Pose { position, rotation: *r }, machine().branch(), &Joints::zeros())
             .unwrap();
         for root in [inner.sqrt(), -inner.sqrt()] {
             roots += 1;

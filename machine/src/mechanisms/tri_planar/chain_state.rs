@@ -1,12 +1,11 @@
 //! From the feet to the platform's pose, and all that follows from it.
 
 use messages::math;
-use nalgebra::{
-    Matrix3, Quaternion, Rotation3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3,
-};
+use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
 
+use super::assemblies::Assemblies;
 use super::struts::{CLOSED, State, Struts, invert, struts};
-use super::{Fold, Legs, OUTWARD, TriPlanar};
+use super::{Fold, Legs, OUTWARD, TriPlanar, TriPlanarBranch};
 use crate::kinematics::{Jacobian, Joints, KinematicsError, Pose};
 
 /// A leg of a solved chain; vectors in the machine frame.
@@ -103,8 +102,8 @@ const NEARBY: f64 = 0.968_912_421_710_644_8;
 /// Heights of level starts, in heights of the triangle.
 const LEVELS: [f64; 8] = [0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 0.97];
 
-/// Tangent of half the tilt of further starts, about 25°.
-const TILT: f64 = 0.22;
+/// Cosine of 45°: with all legs outward there is never a second solution that is tilted less.
+const NEAR_LEVEL: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
 /// Closes the chain at `q`, as [`find`] says.
 ///
@@ -113,7 +112,7 @@ const TILT: f64 = 0.22;
 pub(super) fn solve(
     mechanism: &TriPlanar,
     q: &Joints<6>,
-    branch: Legs,
+    branch: TriPlanarBranch,
     near: Option<&TriPlanarChainState>,
 ) -> Result<TriPlanarChainState, KinematicsError> {
     let feet = Feet::of(mechanism, q);
@@ -127,7 +126,7 @@ pub(super) fn solve(
 pub(super) fn locate(
     mechanism: &TriPlanar,
     q: &Joints<6>,
-    branch: Legs,
+    branch: TriPlanarBranch,
     near: Option<&TriPlanarChainState>,
 ) -> Result<Pose, KinematicsError> {
     let feet = Feet::of(mechanism, q);
@@ -141,7 +140,7 @@ pub(super) fn solve_at(
     mechanism: &TriPlanar,
     pose: &Pose,
     q: &Joints<6>,
-    branch: Legs,
+    legs: Legs,
 ) -> Option<TriPlanarChainState> {
     let feet = Feet::of(mechanism, q);
     let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
@@ -152,14 +151,14 @@ pub(super) fn solve_at(
     let found = feet.equations.solve(start)?;
     // A singular pose might lead elsewhere.
     let stays = found.attitude.coords.dot(&start.attitude.coords).abs() > NEARBY;
-    if stays { complete(&feet, &stand(&feet, &found, branch)?, q).ok() } else { None }
+    if stays { complete(&feet, &stand(&feet, &found, legs)?, q).ok() } else { None }
 }
 
 /// Where the feet are.
-struct Feet<'a> {
+pub(super) struct Feet<'a> {
     /// The equations of the struts, counted from the centroid: so rounding does not grow with the
     /// size of the stator.
-    equations: Struts<'a>,
+    pub(super) equations: Struts<'a>,
     /// The centroid, in the machine frame [m].
     centroid: Vector3<f64>,
 }
@@ -181,38 +180,45 @@ impl<'a> Feet<'a> {
 }
 
 /// A solved pose that the machine can stand in.
-struct Stance {
-    state: State,
-    rotation: Matrix3<f64>,
+#[derive(Clone, Copy)]
+pub(super) struct Stance {
+    pub(super) state: State,
+    pub(super) rotation: Matrix3<f64>,
     /// From the centroid to the corners [m].
     arms: [Vector3<f64>; 3],
     legs: [Leg; 3],
 }
 
+impl Stance {
+    /// Tilted by at most 45°.
+    fn is_near_level(&self) -> bool {
+        self.rotation[(2, 2)] >= NEAR_LEVEL
+    }
+}
+
 /// What `accept` makes of the pose that closes the chain.
 ///
-/// Of the poses that close it, one has all corners above the stator (source 001), the platform not
-/// turned upside down; it is accepted if its legs lean as `branch` says, and nothing else is. Past
-/// 45° of tilt, and where legs of both kinds are mixed, there may be a second one: a cold start
-/// takes what Newton's method reaches from level, and a solution near by goes on as it is.
+/// Of the poses that close it, few have all corners above the stator (source 001), the platform not
+/// upside down and legs that lean as `branch` says; mostly one. A solution near by goes on as it is,
+/// where `branch` does not number an assembly.
 ///
 /// # Errors
-/// `no_assembly` where no start leads to such a pose.
+/// `no_assembly` where there is no such pose, `ambiguous_assembly` where there are several.
 #[inline(always)] // What it finds would be copied on the way out.
 fn find<T>(
     feet: &Feet<'_>,
-    branch: Legs,
+    branch: TriPlanarBranch,
     near: Option<&TriPlanarChainState>,
     accept: impl Fn(&Stance) -> Result<T, KinematicsError>,
 ) -> Result<T, KinematicsError> {
-    if let Some(near) = near {
+    if let (Some(near), None) = (near, branch.assembly) {
         let start = State { position: near.position - feet.centroid, ..near.state };
         let found = feet
             .equations
             .follow(start, &near.loosened)
             .or_else(|| feet.equations.solve(start))
             .filter(|found| found.attitude.coords.dot(&start.attitude.coords).abs() > NEARBY);
-        if let Some(stance) = found.and_then(|found| stand(feet, &found, branch)) {
+        if let Some(stance) = found.and_then(|found| stand(feet, &found, branch.legs)) {
             let done = accept(&stance);
             if done.is_ok() {
                 return done;
@@ -223,34 +229,61 @@ fn find<T>(
     accept(&stance)
 }
 
-/// The stance that Newton's method reaches first from level and tilted starts, the best ahead.
+/// The stance of `branch` on the feet, from nothing.
 #[cold]
 #[inline(never)]
-fn search(feet: &Feet<'_>, branch: Legs) -> Result<Stance, KinematicsError> {
+fn search(feet: &Feet<'_>, branch: TriPlanarBranch) -> Result<Stance, KinematicsError> {
     let equations = &feet.equations;
-    let reach = |start| stand(feet, &equations.solve(start)?, branch);
     let mut starts = LEVELS.map(|level| {
-        let start = equations.level(level, branch);
+        let start = equations.level(level, branch.legs);
         (equations.residual(&start).norm(), start)
     });
     starts.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
-    for (_, start) in &starts {
-        if let Some(stance) = reach(*start) {
-            return Ok(stance);
-        }
-    }
-    for (_, start) in &starts {
-        for [x, y] in OUTWARD {
-            for tilt in [TILT, -TILT] {
-                let turn = Quaternion::new(1.0, x * tilt, y * tilt, 0.0);
-                let attitude = UnitQuaternion::new_normalize(turn * start.attitude.into_inner());
-                if let Some(stance) = reach(State { attitude, ..*start }) {
-                    return Ok(stance);
-                }
+    if branch.legs.is_outward() && branch.assembly.is_none() {
+        for (_, start) in &starts {
+            let found = equations.solve(*start).and_then(|found| stand(feet, &found, branch.legs));
+            if let Some(stance) = found.filter(Stance::is_near_level) {
+                return Ok(stance);
             }
         }
     }
-    Err(no_assembly(starts[0].0))
+    let found = Assemblies::of(feet, branch.legs);
+    let missing = || no_assembly(starts[0].0);
+    match (found.count(), branch.assembly) {
+        (0, _) => Err(missing()),
+        (1, None) => found.get(0).ok_or_else(missing),
+        (count, None) => Err(KinematicsError {
+            code: "ambiguous_assembly",
+            axis: None,
+            value: count as f64,
+            limit: 1.0,
+            detail: "several poses close the legs on these feet; name one by `assembly` of the \
+                     branch, from 1, the most level one first",
+        }),
+        (count, Some(number)) => {
+            found.get(usize::from(number).wrapping_sub(1)).ok_or(KinematicsError {
+                code: "no_assembly",
+                axis: None,
+                value: f64::from(number),
+                limit: count as f64,
+                detail: "fewer poses than `assembly` counts close the legs on these feet",
+            })
+        }
+    }
+}
+
+/// The branch of a solved chain, its assembly numbered where it is not the only one.
+pub(super) fn branch_of(mechanism: &TriPlanar, chain: &TriPlanarChainState) -> TriPlanarBranch {
+    let legs = chain.folds();
+    let level = chain.rotation[(2, 2)] >= NEAR_LEVEL;
+    if legs.is_outward() && level {
+        return legs.into();
+    }
+    let feet = Feet::of(mechanism, &chain.feet);
+    let start = State { position: chain.position - feet.centroid, ..chain.state };
+    let found = Assemblies::of(&feet, legs);
+    let number = found.place_of(&start).filter(|_| found.count() > 1);
+    TriPlanarBranch { legs, assembly: number.and_then(|index| u8::try_from(index + 1).ok()) }
 }
 
 /// The failure, with the best start's residual.
@@ -283,8 +316,8 @@ fn leg(equations: &Struts<'_>, state: &State, rotation: &Matrix3<f64>, index: us
     Leg { middle, hinge, shank, normal, turn }
 }
 
-/// The stance of a solved pose, if it is the one that the machine stands in: see [`find`].
-fn stand(feet: &Feet<'_>, state: &State, branch: Legs) -> Option<Stance> {
+/// The stance of a solved pose, if it is one that the machine can stand in: see [`find`].
+pub(super) fn stand(feet: &Feet<'_>, state: &State, folds: Legs) -> Option<Stance> {
     let equations = &feet.equations;
     let rotation = state.attitude.to_rotation_matrix().into_inner();
     let arms = equations.mechanism.arms(&rotation);
@@ -295,7 +328,7 @@ fn stand(feet: &Feet<'_>, state: &State, branch: Legs) -> Option<Stance> {
     let leg = |index: usize| leg(equations, state, &rotation, index);
     let legs = [leg(0), leg(1), leg(2)];
     let leans = |(leg, fold): (&Leg, Fold)| leg.normal.z.abs() > 0.0 && fold == leg.fold();
-    let stands = legs.iter().zip(branch.0).all(leans);
+    let stands = legs.iter().zip(folds.0).all(leans);
     stands.then_some(Stance { state: *state, rotation, arms, legs })
 }
 
