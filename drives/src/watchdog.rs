@@ -4,8 +4,10 @@
 //!
 //! - **Gate**: open only in a cycle with a fresh command. The first cycle without one is dark; the
 //!   axes go on with the last command for it, which at constant speed is the right voltage.
+//! - **Lost peer**: the gate stays closed whatever the command says. The command stays fresh: how the
+//!   axes come to rest is the controller's to say.
 //! - **Axes**: once more cycles in a row than the tolerated stall has ([`StallTolerance`]) lack a
-//!   fresh command, or at once for a command that makes no sense, a fault of the port or a lost peer,
+//!   fresh command, or at once for a command that makes no sense, a fault of the port or a lost controller,
 //!   they are stopped by the drive's own brake, in the dark and with all outputs off. Until then they
 //!   go on with the last command.
 //! - **Skipped cycles**, for whose deadlines drives was too late, are cycles without a fresh command.
@@ -39,7 +41,7 @@ pub enum GatePermission {
     /// Every peer lives: the command decides.
     #[default]
     Granted,
-    /// A peer was found dead: closed whatever the command says.
+    /// A peer was found dead: closed whatever the command says. The axes follow the command.
     Inhibited,
 }
 
@@ -124,7 +126,7 @@ impl Watchdog {
         let lacking = self.misses.saturating_add(cycles).saturating_add(1);
         for _ in 0..cycles.min(MOST_PASSED) {
             self.missed(lacking, now);
-            self.watch_gate();
+            self.watch_gate(GatePermission::Granted);
             passed(&self.last);
         }
         if self.watch != Watch::Waiting {
@@ -148,15 +150,16 @@ impl Watchdog {
             None => self.missed(self.misses.saturating_add(1), now),
         }
         if permission == GatePermission::Inhibited {
-            self.darken();
+            self.last.laser = LaserCycle::OFF;
         }
-        self.watch_gate();
+        self.watch_gate(permission);
         self.last
     }
 
-    /// Counts an open gate that was closed for want of a command.
-    fn watch_gate(&mut self) {
-        let commanded = self.last.freshness == Freshness::Fresh;
+    /// Counts an open gate that was closed for want of a command, or of a peer.
+    fn watch_gate(&mut self, permission: GatePermission) {
+        let commanded =
+            self.last.freshness == Freshness::Fresh && permission == GatePermission::Granted;
         self.counts.gate_trips += u64::from(self.gate != 0 && !commanded);
         (self.gate, _) = self.last.laser.last();
     }
@@ -232,7 +235,7 @@ impl Watchdog {
         self.last
     }
 
-    /// Keeps the gate closed in what is in force.
+    /// No command stands behind what is in force any more: the gate stays closed.
     fn darken(&mut self) {
         self.last.freshness = Freshness::Stale;
         self.last.laser = LaserCycle::OFF;

@@ -31,7 +31,11 @@ struct Run {
 
 impl Run {
     fn new(deadlines: Deadlines) -> Self {
-        let port = SimulatedPlant::new(&Machine::builtin(), PlantOptions::default()).unwrap();
+        Self::of(&Machine::builtin(), deadlines)
+    }
+
+    fn of(machine: &Machine, deadlines: Deadlines) -> Self {
+        let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
         let bridge = Bridge::new(port, options(deadlines));
         Self { bridge, deadline: Nanoseconds(5_000_000_000) }
     }
@@ -297,6 +301,62 @@ fn a_dead_peer_closes_the_gate_and_leaves_the_axes_to_the_controller() {
     }
     assert_eq!(run.bridge.report(facts()).gate_trips, 1);
     assert_eq!(run.bridge.feedback().missed, 0);
+}
+
+/// How a controller brings the axes to rest is its own to say, whoever else has died: drivers that took
+/// its positions for stale would go on at the speed of the last cycle before.
+#[test]
+fn steppers_follow_the_controller_to_rest_in_the_dark_after_a_peer_has_died() {
+    /// From this cycle on a peer is dead.
+    const DEATH: u32 = 60;
+    /// Cycles from full speed to rest.
+    const STOP: u32 = 150;
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../machines");
+    let machine = Machine::load(&folder.join("cartesian_steppers.toml"), &[]).unwrap();
+    let pulse = machine.axes[0].encoder.resolution();
+    // Slow enough that no following error would ever be noticed, and fast.
+    for speed in [0.01, 0.2] {
+        let mut run = Run::of(&machine, Deadlines::Strict);
+        let home = run.answered(CommandMode::Disabled, LaserCycle::OFF).position;
+        let fastest = speed / machine.axes[0].ratio;
+        let mut told = home;
+        for cycle in 0..DEATH + STOP + 50 {
+            let rate = match cycle {
+                0..DEATH => f64::from(cycle + 1) / f64::from(DEATH),
+                _ => 1.0 - f64::from(cycle - DEATH).min(f64::from(STOP)) / f64::from(STOP),
+            };
+            let dead = cycle >= DEATH;
+            run.bridge.permit(if dead {
+                GatePermission::Inhibited
+            } else {
+                GatePermission::Granted
+            });
+            let mut velocity = [0.0; 8];
+            velocity[0] = rate * fastest;
+            let before = told;
+            told[0] += velocity[0] * 1e-3;
+            let feedback = run.cycle(|feedback| {
+                let moving = command(feedback, CommandMode::Position, lit());
+                Some(Command { position: told, velocity, ..moving })
+            });
+            // What is told now acts from the next deadline to the one after.
+            let late = 2.0 * velocity[0].max(fastest / f64::from(STOP)) * 1e-3;
+            let off = (feedback.position[0] - before[0]).abs();
+            assert!(off <= late + pulse, "{off} rad off in cycle {cycle} at {speed} m/s");
+            assert!(!feedback.has(status::WATCHDOG_TRIPPED), "{:?}", feedback.fault);
+            assert!(cycle <= DEATH || !feedback.laser.is_lit(), "lit in cycle {cycle}");
+        }
+        // It stands where it was told to, to the pulse.
+        let stands = run.cycle(|feedback| {
+            let moving = command(feedback, CommandMode::Position, LaserCycle::OFF);
+            Some(Command { position: told, velocity: [0.0; 8], ..moving })
+        });
+        assert!((stands.position[0] - told[0]).abs() <= pulse, "{stands:?}");
+        assert_eq!(stands.velocity[0], 0.0);
+        assert!(told[0] - home[0] > 50.0 * pulse);
+        // The gate was open, and was closed though a fresh command asked for light.
+        assert_eq!(run.bridge.report(facts()).gate_trips, 1);
+    }
 }
 
 #[test]
