@@ -156,10 +156,11 @@ impl Controller {
         if let Some(finding) = finding {
             self.fail(finding, now);
         }
-        self.compensate_missed(elapsed, now);
+        let settling = self.pass_missed(elapsed, feedback, now);
         outputs.reply = inputs.request.map(|request| self.request(&request, feedback.cycle));
         self.transition(now, feedback);
-        self.go_on(elapsed, feedback, now);
+        self.advance(feedback);
+        self.await_settled(settling, now);
         if self.state.follows()
             && let Err(finding) = self.supervision.motion(feedback, &self.feedforward.now().angle)
         {
@@ -239,16 +240,6 @@ impl Controller {
         (elapsed, found().find(|finding| worse(finding)).or_else(|| found().next()).copied())
     }
 
-    /// Drives kept cycles dark for want of a command: the light lost in them is made up for.
-    fn compensate_missed(&mut self, elapsed: Elapsed, now: Nanoseconds) {
-        if self.playing == 0 {
-            return;
-        }
-        if let Some(from) = self.player.miss(elapsed, self.intake.lookahead()) {
-            self.go_back_for_light(from, now);
-        }
-    }
-
     /// Holds, because marks from `from` on were not lit; the resume goes back to mark them.
     fn go_back_for_light(&mut self, from: StreamTime, now: Nanoseconds) {
         let same_place = self.losses > 0 && from < self.lost_at + ONE_PLACE;
@@ -282,33 +273,49 @@ impl Controller {
         };
     }
 
-    /// Goes on along the stream by the cycles that went by: references are a function of time, so that
-    /// axes which kept their speed in a stall are about where they should be. Positions take the rest
-    /// back without a step; light waits for axes that are off the plan.
-    fn go_on(&mut self, elapsed: Elapsed, feedback: &Feedback, now: Nanoseconds) {
-        // The end of the command that drives had last.
-        let last = match elapsed.missed >= elapsed.cycles {
-            true => *self.feedforward.next(),
-            false => *self.feedforward.after(),
-        };
-        if elapsed.missed > 0 {
-            self.catch_up = CatchUp::default();
+    /// Goes on through the cycles for which drives had no command: references are a function of time, so
+    /// that axes which kept their speed in a stall are about where they should be. Positions take the
+    /// rest back without a step. Gives the cycles until the axes are on the plan again.
+    fn pass_missed(&mut self, elapsed: Elapsed, feedback: &Feedback, now: Nanoseconds) -> u64 {
+        if elapsed.missed == 0 {
+            return 0;
         }
-        for _ in 0..elapsed.cycles {
+        self.catch_up = CatchUp::default();
+        // The newest command may have come too late; for the cycles after its own there was none.
+        let newest_missed = elapsed.missed >= elapsed.cycles;
+        let last = *if newest_missed { self.feedforward.next() } else { self.feedforward.after() };
+        if newest_missed {
+            self.pass_in_the_dark(now);
+        }
+        for _ in 1..elapsed.cycles {
             self.advance(feedback);
+            self.pass_in_the_dark(now);
         }
-        if elapsed.missed == 0 || !self.state.follows() {
-            return;
+        if !self.state.follows() {
+            return 0;
         }
-        let mut catch_up = self.feedforward.coasted(&last, elapsed.missed);
-        let settling = catch_up.settling(&self.machine);
+        let catch_up = self.feedforward.coasted(&last, elapsed.missed);
         if self.drive == CommandMode::Position {
-            self.feedforward.put_coasted(&last, elapsed.missed, &mut catch_up);
+            self.feedforward.put_coasted(&last, elapsed.missed);
             self.catch_up = catch_up;
         }
-        if settling > 0
+        catch_up.settling(&self.machine)
+    }
+
+    /// Drives kept the cycle of the newest command dark: light that was lost in it is gone back for.
+    fn pass_in_the_dark(&mut self, now: Nanoseconds) {
+        if self.playing != 0
+            && let Some(from) = self.player.pass_in_the_dark(self.intake.lookahead())
+        {
+            self.go_back_for_light(from, now);
+        }
+    }
+
+    /// Light waits for axes that need so many cycles to be on the plan again.
+    fn await_settled(&mut self, cycles: u64, now: Nanoseconds) {
+        if cycles > 0
             && self.playing != 0
-            && let Some(from) = self.player.unsettle(settling, self.intake.lookahead())
+            && let Some(from) = self.player.unsettle(cycles, self.intake.lookahead())
         {
             self.go_back_for_light(from, now);
         }
@@ -340,10 +347,13 @@ impl Controller {
         self.alignment.apply(&mut planned);
         self.catch_up.apply(&mut planned);
         self.feedforward.advance(planned);
-        match event {
-            Event::Paused => self.state = State::Holding(AfterRest::Wait),
-            Event::Starved => self.state = State::Holding(AfterRest::Supply { waited: 0 }),
-            Event::None | Event::Ended => {}
+        // Whoever stops for good does not wait.
+        if matches!(self.state, State::Running | State::Holding(_)) {
+            match event {
+                Event::Paused => self.state = State::Holding(AfterRest::Wait),
+                Event::Starved => self.state = State::Holding(AfterRest::Supply { waited: 0 }),
+                Event::None | Event::Ended => {}
+            }
         }
     }
 

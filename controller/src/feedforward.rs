@@ -89,19 +89,18 @@ impl Feedforward {
     }
 
     /// The way back to the plan for axes that went on from `last` by themselves, for `cycles`, to the
-    /// start of the cycle in which the command acts.
+    /// end of the newest command.
     pub fn coasted(&self, last: &Planned, cycles: u64) -> CatchUp {
-        CatchUp::new(&last.coasted(cycles), &self.next)
+        CatchUp::new(&last.coasted(cycles), &self.after)
     }
 
-    /// Has the axes where such a coasting left them, and the end of the cycle on the way back.
-    pub fn put_coasted(&mut self, last: &Planned, cycles: u64, way: &mut CatchUp) {
+    /// Has the axes where such a coasting left them, and where they were a cycle before.
+    pub fn put_coasted(&mut self, last: &Planned, cycles: u64) {
         let put = |planned: &mut Planned, coasted: &Planned| {
             (planned.angle, planned.speed) = (coasted.angle, coasted.speed);
         };
-        put(&mut self.now, &last.coasted(cycles.saturating_sub(1)));
-        put(&mut self.next, &last.coasted(cycles));
-        way.apply(&mut self.after);
+        put(&mut self.next, &last.coasted(cycles.saturating_sub(1)));
+        put(&mut self.after, &last.coasted(cycles));
     }
 
     /// Rests at `angle` [rad] from now on, as if it always had; the tool at `tool`, in metres.

@@ -15,7 +15,6 @@ use crate::lookahead::Lookahead;
 use crate::motion_limits::{Course, MotionLimits};
 use crate::ramp::{Ramp, Rate, Slew};
 use crate::stream_time::{ONE, StreamTime};
-use crate::supervision::Elapsed;
 use machine::Machine;
 use messages::LaserCycle;
 use messages::setpoint::flags;
@@ -58,7 +57,7 @@ pub struct Instant {
 pub enum Event {
     /// Nothing.
     None,
-    /// The program pauses at `after`.
+    /// The program pauses at `after`, and no light before it was left out.
     Paused,
     /// The stream ends at `after`.
     Ended,
@@ -191,22 +190,15 @@ impl Player {
         }
     }
 
-    /// Drives kept the last of the `elapsed` cycles dark. If they should have been lit: brakes, and gives the
-    /// stream time at which the first of them began.
-    pub fn miss(&mut self, elapsed: Elapsed, lookahead: &Lookahead) -> Option<StreamTime> {
-        // The command given last acts from `next` to `after`; for later cycles there was none.
-        let sent = elapsed.missed >= elapsed.cycles && self.marking;
-        let unsent = elapsed.cycles > 1 && matches!(self.activity, Activity::Playing(_));
-        let cycles = elapsed.cycles.saturating_sub(1) as i64;
-        let from = if sent { self.next.time } else { self.after.time };
-        let from = from.max(self.dark_until);
-        let to = self.after.time + StreamTime(cycles * ONE);
-        let lost = elapsed.missed > 0 && (sent || unsent) && lookahead.is_lit(from, to);
-        if !lost {
+    /// Drives had no command for the stretch from `next` to `after`, which was dark: brakes if light was
+    /// to be given in it, and gives the place where it was lost.
+    pub fn pass_in_the_dark(&mut self, lookahead: &Lookahead) -> Option<StreamTime> {
+        let marking = core::mem::take(&mut self.marking);
+        if !marking || !self.is_light_due(lookahead) {
             return None;
         }
+        let from = self.next.time.max(self.dark_until);
         self.brake_in_the_dark(from);
-        self.marking = false;
         self.unlit_from = Some(from);
         Some(from)
     }
@@ -248,15 +240,19 @@ impl Player {
         let light_from = self.unlit_from.or(light_ahead.then_some(here));
         match light_from.map(|light| light - start) {
             Some(back) if back < here => self.activity = Activity::Rewinding(back),
-            _ => self.set_off(resting),
+            _ => self.set_off(resting, lookahead),
         }
         self.at_planned_rest = false;
     }
 
-    /// From rest forward: where the stream rests too, the rate may jump.
-    fn set_off(&mut self, resting: bool) {
-        self.activity = if resting {
-            self.ramp = Ramp::even(self.wanted());
+    /// From rest forward: where the stream rests too, the rate may jump, to one with the distance to stop
+    /// in hand.
+    fn set_off(&mut self, resting: bool, lookahead: &Lookahead) {
+        let even = Ramp::even(self.wanted());
+        let stop = StreamTime(HINDRANCE * even.stopping_distance().0);
+        let enough = lookahead.is_complete() || self.after.time + stop <= lookahead.end() - RESERVE;
+        self.activity = if resting && enough {
+            self.ramp = even;
             Activity::Playing(Slew::OVERRIDE)
         } else {
             Activity::Playing(Slew::STOP)
@@ -278,7 +274,8 @@ impl Player {
         }
         let before = self.ramp;
         let mut event = self.change_rate(lookahead, from);
-        let time = from + self.ramp.advance(before);
+        // There always is enough in hand to stop: nothing is played beyond it, whatever happens.
+        let time = (from + self.ramp.advance(before)).min(lookahead.end().max(from));
         let reached = self.ramp.rate().value();
         self.after = Instant { time, rate: reached, rate_change: self.rate_change(reached) };
         if time < StreamTime::default() {
@@ -287,26 +284,44 @@ impl Player {
             if matches!(self.activity, Activity::Braking(_)) {
                 self.activity = Activity::Resting;
             } else {
-                self.set_off(true);
+                self.set_off(true, lookahead);
             }
-        } else if let Some(found) = self.planned_rest(lookahead) {
+        } else if let Some((sequence, found)) = self.planned_rest(lookahead) {
             // A planned rest on the way is as good a place to stop as any.
             let playing = matches!(self.activity, Activity::Playing(_));
+            self.stop_at(StreamTime::of(sequence));
             self.activity = Activity::Resting;
             self.at_planned_rest = true;
-            if playing {
+            self.note_dark(lookahead);
+            // Where light was left out before it, the stream will come here once more.
+            if playing || self.unlit_from.is_none() {
+                self.paused_until = sequence + 1;
                 event = found;
             }
         } else if self.ramp.is_still() {
             match self.activity {
                 Activity::Turning => {
-                    self.set_off(lookahead.is_resting(self.after.time));
+                    self.set_off(lookahead.is_resting(self.after.time), lookahead);
                 }
                 Activity::Braking(_) => self.activity = Activity::Resting,
                 _ => {}
             }
         }
+        self.note_dark(lookahead);
         event
+    }
+
+    /// Remembers where light beyond `dark_until` is first left out.
+    fn note_dark(&mut self, lookahead: &Lookahead) {
+        if !self.marking && self.unlit_from.is_none() && self.is_light_due(lookahead) {
+            self.unlit_from = Some(self.next.time.max(self.dark_until));
+        }
+    }
+
+    /// Whether the stream has light between `next` and `after` that was not given before.
+    fn is_light_due(&self, lookahead: &Lookahead) -> bool {
+        // More of it than can be told is light too.
+        self.light(lookahead).map_or(true, |cycle| cycle.is_lit())
     }
 
     /// One cycle of the rate, from `from` on, as the activity asks and the limits allow; and what comes
@@ -355,9 +370,16 @@ impl Player {
             }
             Activity::Resting | Activity::Turning => toward(Rate::ZERO, Slew::STOP),
         };
-        if scarce && stops(self.ramp, 1) > end {
-            // There is no more way to wait for room on.
+        // There is no more way to wait for room on, ahead or back.
+        let too_far = scarce && stops(self.ramp, 1) > end;
+        let beginning = lookahead.beginning();
+        let too_far_back =
+            beginning > StreamTime::default() && stops(self.ramp, 1) < beginning + RESERVE;
+        if too_far || too_far_back {
             self.ramp = before.unhindered(Rate::ZERO, Slew::STOP);
+        }
+        if too_far_back && matches!(self.activity, Activity::Rewinding(_)) {
+            self.activity = Activity::Turning;
         }
         event
     }
@@ -366,16 +388,14 @@ impl Player {
     ///
     /// # Errors
     /// More edges than a cycle can hold.
-    pub fn laser(&mut self, lookahead: &Lookahead) -> Result<LaserCycle, TooManyEdges> {
+    pub fn laser(&self, lookahead: &Lookahead) -> Result<LaserCycle, TooManyEdges> {
+        if self.marking { self.light(lookahead) } else { Ok(LaserCycle::OFF) }
+    }
+
+    /// What the stream has of light between `next` and `after` that was not given before.
+    fn light(&self, lookahead: &Lookahead) -> Result<LaserCycle, TooManyEdges> {
         let stretch = Stretch { from: self.next.time, to: self.after.time };
-        let cycle = gate::laser(lookahead, stretch, self.dark_until);
-        if self.marking {
-            return cycle;
-        }
-        if cycle.map_or(true, |cycle| cycle.is_lit()) && self.unlit_from.is_none() {
-            self.unlit_from = Some(stretch.from.max(self.dark_until));
-        }
-        Ok(LaserCycle::OFF)
+        gate::laser(lookahead, stretch, self.dark_until)
     }
 
     /// Where the digital outputs stand: they do not go back with a rewind.
@@ -383,20 +403,17 @@ impl Player {
         self.next.time.max(self.dark_until)
     }
 
-    /// Whether `after` came to a setpoint where the stream itself rests; stops exactly there.
-    fn planned_rest(&mut self, lookahead: &Lookahead) -> Option<Event> {
+    /// The setpoint where the stream itself rests that `after` has come to, and whether the program
+    /// pauses or ends there.
+    fn planned_rest(&self, lookahead: &Lookahead) -> Option<(u64, Event)> {
         let first = self.next.time.sequence() + 1;
-        for sequence in first..=self.after.time.sequence() {
+        (first..=self.after.time.sequence()).find_map(|sequence| {
             let setpoint = lookahead.setpoint(sequence);
             let pauses = setpoint.has(flags::PAUSE) && sequence >= self.paused_until;
             let ends = lookahead.is_complete() && StreamTime::of(sequence) >= lookahead.end();
-            if pauses || ends {
-                self.paused_until = sequence + 1;
-                self.stop_at(StreamTime::of(sequence));
-                return Some(if ends { Event::Ended } else { Event::Paused });
-            }
-        }
-        None
+            let found = if ends { Event::Ended } else { Event::Paused };
+            (pauses || ends).then_some((sequence, found))
+        })
     }
 
     /// Rests at `time` at once; only where the stream rests.

@@ -278,6 +278,22 @@ mod tests {
     }
 
     #[test]
+    fn a_ramp_that_the_limits_bent_finds_its_way_to_rest_too() {
+        for rate in [-1.0, -0.3, 0.0, 1e-6, 0.2, 1.0] {
+            for change in [-1.0, -0.37, 0.0, 0.5, 1.0] {
+                for bend in [-2.0, -1.0, 0.0, 0.4, 2.0] {
+                    let change = (Slew::STOP.change as f64 * change) as i64;
+                    let bend = (Slew::STOP.bend as f64 * bend) as i64;
+                    let ramp = Ramp { rate: Rate::nearest(rate).0, change, bend };
+                    let (ramps, way) = run(ramp, Rate::ZERO, Slew::STOP);
+                    assert_eq!(ramp.stopping_distance(), way, "{ramp:?}");
+                    assert!(ramps.len() < 320, "{} cycles from {ramp:?}", ramps.len());
+                }
+            }
+        }
+    }
+
+    #[test]
     fn an_unhindered_hold_takes_what_the_header_says() {
         let (ramps, _) = run(Ramp::even(Rate::ONE), Rate::ZERO, Slew::STOP);
         assert!((131..=134).contains(&ramps.len()), "{} cycles", ramps.len());

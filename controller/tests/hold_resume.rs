@@ -6,19 +6,7 @@ mod support;
 
 use machine::Machine;
 use messages::{ControllerState, OperatorVerb};
-use support::{Move, Part, Record, check_marks, job, reach, started, two_marks};
-
-/// Largest second difference of the references, as an acceleration of the joints [m/s²].
-fn sharpest(records: &[Record], machine: &Machine) -> f64 {
-    let axes = machine.axes.iter().enumerate();
-    axes.flat_map(|(index, axis)| {
-        records.windows(3).map(move |window| {
-            let [a, b, c] = [0, 1, 2].map(|at| window[at].command.reference[index]);
-            ((c - b) - (b - a)).abs() * axis.ratio / 1e-6
-        })
-    })
-    .fold(0.0, f64::max)
-}
+use support::{Move, Part, check_marks, job, reach, sharpest, started, two_marks};
 
 #[test]
 fn holds_anywhere_and_goes_on_without_losing_or_doubling_a_mark() {

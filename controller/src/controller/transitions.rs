@@ -33,8 +33,9 @@ impl Controller {
             State::Running if !self.is_over() && self.alignment.is_done() => {
                 self.player.resume(self.intake.lookahead());
             }
+            // Whatever it was held for, it needs the way to stop again.
             State::Holding(AfterRest::Resume) if self.player.is_at_rest() => {
-                self.state = State::Running;
+                self.await_supply(now, 0);
             }
             State::Holding(AfterRest::Supply { waited }) if self.player.is_at_rest() => {
                 self.await_supply(now, waited);

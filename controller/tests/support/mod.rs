@@ -17,6 +17,9 @@ use messages::{
 /// 0.25 m/s.
 const STEP: f64 = 2e-6;
 
+/// The same where only the commands are looked at.
+pub const COARSE: f64 = 40e-6;
+
 const CYCLE_TIME: f64 = 1e-3;
 
 /// A DC motor with a rigid load, true stiction, and an encoder.
@@ -40,23 +43,23 @@ impl Motor {
     }
 
     /// One cycle with `voltage`, or with the phases open.
-    fn run(&mut self, voltage: Option<f64>) {
+    fn run(&mut self, voltage: Option<f64>, step: f64) {
         let (motor, friction) = (*self.axis.motor.dc().unwrap(), self.axis.friction);
         let inertia = self.axis.gains.inertia;
-        for _ in 0..(CYCLE_TIME / STEP).round() as usize {
+        for _ in 0..(CYCLE_TIME / step).round() as usize {
             self.current = match voltage {
                 Some(voltage) => {
                     let voltage = voltage.clamp(-motor.voltage, motor.voltage);
-                    self.current + motor.current_rate(voltage, self.current, self.speed) * STEP
+                    self.current + motor.current_rate(voltage, self.current, self.speed) * step
                 }
                 None => 0.0,
             };
             let torque = motor.torque_constant * self.current - friction.viscous * self.speed;
-            let free = self.speed + torque / inertia * STEP;
-            let held = friction.coulomb / inertia * STEP;
+            let free = self.speed + torque / inertia * step;
+            let held = friction.coulomb / inertia * step;
             let before = self.speed;
             self.speed = free - free.clamp(-held, held);
-            self.angle += (before + self.speed) / 2.0 * STEP;
+            self.angle += (before + self.speed) / 2.0 * step;
         }
     }
 }
@@ -123,6 +126,10 @@ pub enum Part {
     Rest(f64),
     /// A move in both joints, with these shares of the path coordinate; the cruise is marked.
     Mark(Move, [f64; 2]),
+    /// The same, lit in these stretches of time since its begin [s] only.
+    Dashes(Move, [f64; 2], Vec<(f64, f64)>),
+    /// Standing, and lit [s].
+    Dot(f64),
     /// A programmed pause.
     Pause,
 }
@@ -141,14 +148,20 @@ pub fn job(machine: &Machine, stream: u64, parts: &[Part], power: f64) -> Job {
     let (mut lit, mut pauses) = (Vec::new(), Vec::new());
     for part in parts {
         match part {
-            Part::Rest(time) => {
+            Part::Rest(time) | Part::Dot(time) => {
                 spans.push((begin, begin + time, origin, None));
+                if matches!(part, Part::Dot(_)) {
+                    lit.push((begin, begin + time));
+                }
                 begin += time;
             }
-            Part::Mark(path, shares) => {
+            Part::Mark(path, shares) | Part::Dashes(path, shares, _) => {
                 spans.push((begin, begin + path.duration(), origin, Some((path, *shares))));
-                let (on, off) = path.cruise();
-                lit.push((begin + on, begin + off));
+                let dashes = match part {
+                    Part::Dashes(_, _, dashes) => dashes.clone(),
+                    _ => vec![path.cruise()],
+                };
+                lit.extend(dashes.iter().map(|(on, off)| (begin + on, begin + off)));
                 let length = path.at(path.duration())[0];
                 origin = [0, 1].map(|axis| origin[axis] + shares[axis] * length);
                 begin += path.duration();
@@ -226,10 +239,19 @@ pub fn stalling(tolerance: Nanoseconds) -> Machine {
     Machine { stall: StallTolerance::new(tolerance).unwrap(), ..Machine::builtin() }
 }
 
-/// Joints of a CoreXY at home.
+/// Joints at home of a CoreXY, or of a Cartesian machine, whose motors are steppers here.
 pub fn home(machine: &Machine) -> [f64; 2] {
     let [x, y, _] = machine.home;
-    [x + y, x - y]
+    match machine.axes[0].motor {
+        machine::Motor::Dc(_) => [x + y, x - y],
+        machine::Motor::Stepper(_) => [x, y],
+    }
+}
+
+/// The machine file of this name.
+pub fn load(name: &str) -> Machine {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../machines");
+    Machine::load(&folder.join(name), &[]).unwrap()
 }
 
 /// Tool of a CoreXY.
@@ -262,6 +284,8 @@ pub struct Bench {
     pub supply: usize,
     /// Commands that will come too late for their cycle.
     pub late: u32,
+    /// Steps in which the motors are integrated [s].
+    pub step: f64,
     latched: Command,
     in_force: Command,
     ticket: u32,
@@ -288,6 +312,7 @@ impl Bench {
             sent: 0,
             supply: usize::MAX,
             late: 0,
+            step: STEP,
             latched: Command::default(),
             in_force: Command::default(),
             ticket: 0,
@@ -387,7 +412,11 @@ impl Bench {
     /// and nobody measures. The records keep what the controller had promised.
     pub fn stall(&mut self, cycles: u64) {
         self.latched = self.in_force;
-        self.records.last_mut().unwrap().command.laser = LaserCycle::OFF;
+        let [.., before, last] = &mut self.records[..] else { panic!("nothing came before") };
+        last.command.laser = LaserCycle::OFF;
+        // Out of a planned rest the rate jumps: the command in force has told so by its light.
+        let sets_off = last.command.rate == 0.0 && before.command.laser.is_lit();
+        let rate = if sets_off { 1.0 } else { last.command.rate };
         self.miss();
         for _ in 0..cycles {
             self.feedback.cycle = self.feedback.cycle.next();
@@ -397,7 +426,7 @@ impl Bench {
             self.run_motors();
             self.miss();
             let mut record = *self.last();
-            record.command.stream_time += CYCLE_TIME * record.command.rate;
+            record.command.stream_time += CYCLE_TIME * rate;
             self.records.push(record);
         }
     }
@@ -416,7 +445,7 @@ impl Bench {
                 CommandMode::Voltage => Some(self.latched.voltage[index]),
                 _ => Some(0.0),
             };
-            motor.run(voltage);
+            motor.run(voltage, self.step);
         }
     }
 
@@ -437,7 +466,12 @@ impl Bench {
 
     /// Enabled and idle.
     pub fn enabled(machine: &Machine) -> Self {
-        let mut bench = Self::new(machine);
+        Self::enabled_with(machine, STEP)
+    }
+
+    /// Enabled and idle, its motors integrated in steps of `step` [s].
+    pub fn enabled_with(machine: &Machine, step: f64) -> Self {
+        let mut bench = Self { step, ..Self::new(machine) };
         bench.run(None, 3);
         assert!(bench.ask(None, OperatorVerb::Enable, 0.0));
         bench.run(None, 40);
@@ -509,7 +543,12 @@ pub fn check_marks(bench: &Bench, job: &Job, power: f64, case: &str) {
 
 /// A bench that has just begun to play `job`.
 pub fn started(machine: &Machine, job: &Job) -> Bench {
-    let mut bench = Bench::enabled(machine);
+    started_with(machine, job, STEP)
+}
+
+/// The same, its motors integrated in steps of `step` [s].
+pub fn started_with(machine: &Machine, job: &Job, step: f64) -> Bench {
+    let mut bench = Bench::enabled_with(machine, step);
     assert!(bench.ask(Some(job), OperatorVerb::Start, 1.0));
     bench.until(Some(job), ControllerState::Running, 20);
     bench
@@ -520,4 +559,16 @@ pub fn reach(bench: &mut Bench, job: &Job, time: f64) {
     while bench.last().command.stream_time < time - 2e-3 {
         bench.run(Some(job), 1);
     }
+}
+
+/// Largest second difference of the references, as an acceleration of the joints [m/s²].
+pub fn sharpest(records: &[Record], machine: &Machine) -> f64 {
+    let axes = machine.axes.iter().enumerate();
+    axes.flat_map(|(index, axis)| {
+        records.windows(3).map(move |window| {
+            let [a, b, c] = [0, 1, 2].map(|at| window[at].command.reference[index]);
+            ((c - b) - (b - a)).abs() * axis.ratio / 1e-6
+        })
+    })
+    .fold(0.0, f64::max)
 }
