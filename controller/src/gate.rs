@@ -26,7 +26,8 @@ impl Stretch {
 pub struct TooManyEdges;
 
 /// The laser over `stretch`, dark before `dark_until`. Edges keep their stream time; power follows
-/// the rate, so that each length of line gets the same light.
+/// the rate, so that each length of line gets the same light, down to `min_power`: below it the source
+/// might not light at all.
 ///
 /// # Errors
 /// More changes than a cycle can hold: none is left out silently.
@@ -34,6 +35,7 @@ pub fn laser(
     lookahead: &Lookahead,
     stretch: Stretch,
     dark_until: StreamTime,
+    min_power: f64,
 ) -> Result<LaserCycle, TooManyEdges> {
     let rate = stretch.rate();
     if stretch.to <= stretch.from || stretch.to <= dark_until {
@@ -56,7 +58,7 @@ pub fn laser(
         .take_while(|edge| f64::from(edge.offset) <= passed)
         .last()
         .map_or((planned.gate, planned.power), |edge| (edge.gate, edge.power));
-    let power_at_rate = |power: f64| (power * rate).min(1.0);
+    let power_at_rate = |power: f64| (power * rate).max(power.min(min_power)).min(1.0);
     if start == stretch.from {
         (cycle.gate, cycle.power) = (gate, power_at_rate(power));
     } else if gate != 0 {
@@ -124,7 +126,7 @@ mod tests {
         let (mut lit, mut exposure, mut now) = (0.0, 0.0, at(from));
         while now < at(to) {
             let stretch = Stretch { from: now, to: now + at(rate) };
-            let cycle = laser(&ring, stretch, at(dark_until)).unwrap();
+            let cycle = laser(&ring, stretch, at(dark_until), 0.0).unwrap();
             assert!(cycle.is_valid(), "{cycle:?}");
             let (mut since, mut gate, mut power) = (0.0, cycle.gate, cycle.power);
             let end = GateEdge { offset: 1_000_000, gate: 0, power: 0.0 };
@@ -166,12 +168,30 @@ mod tests {
     }
 
     #[test]
+    fn no_light_is_weaker_than_the_source_can_give_nor_stronger_than_planned_for_that() {
+        let ring = ring();
+        let told = |min_power: f64, rate: f64| {
+            let (from, to) = (at(2.1), at(2.1 + rate));
+            laser(&ring, Stretch { from, to }, StreamTime(0), min_power).unwrap().power
+        };
+        let off = |min_power: f64, rate: f64, power: f64| (told(min_power, rate) - power).abs();
+        for (min_power, rate, power) in
+            [(0.1, 0.5, 0.2), (0.3, 0.5, 0.3), (0.3, 0.1, 0.3), (0.3, 0.9, 0.36), (0.7, 0.5, 0.4)]
+        {
+            assert!(off(min_power, rate, power) < 1e-9, "{min_power} at {rate}");
+        }
+        // Nothing is lit for that.
+        let dark = Stretch { from: at(4.0), to: at(4.3) };
+        assert_eq!(laser(&ring, dark, StreamTime(0), 0.3), Ok(LaserCycle::OFF));
+    }
+
+    #[test]
     fn as_planned_is_the_planners_own_cycle() {
         let ring = ring();
         for sequence in 0..7 {
             let stretch =
                 Stretch { from: StreamTime::of(sequence), to: StreamTime::of(sequence + 1) };
-            let cycle = laser(&ring, stretch, StreamTime(0));
+            let cycle = laser(&ring, stretch, StreamTime(0), 0.3);
             assert_eq!(cycle, Ok(ring.setpoint(sequence).laser));
         }
     }
@@ -181,7 +201,7 @@ mod tests {
         let ring = ring();
         for (from, to) in [(3.0, 2.0), (2.0, 2.0)] {
             let stretch = Stretch { from: at(from), to: at(to) };
-            assert_eq!(laser(&ring, stretch, StreamTime(0)), Ok(LaserCycle::OFF));
+            assert_eq!(laser(&ring, stretch, StreamTime(0), 0.3), Ok(LaserCycle::OFF));
         }
     }
 
@@ -197,7 +217,8 @@ mod tests {
             }
             ring.accept(&setpoint).unwrap();
         }
-        let play = |from, to| laser(&ring, Stretch { from: at(from), to: at(to) }, StreamTime(0));
+        let stretch = |from, to| Stretch { from: at(from), to: at(to) };
+        let play = |from, to| laser(&ring, stretch(from, to), StreamTime(0), 0.0);
         assert_eq!(play(0.0, 1.0).unwrap().edges().len(), 10);
         assert_eq!(play(0.0, 2.0), Err(TooManyEdges));
     }

@@ -97,6 +97,8 @@ pub struct Player {
     /// Pauses below this sequence number have been kept.
     paused_until: u64,
     limits: MotionLimits,
+    /// The least power at which the source gives light, 0..=1.
+    min_power: f64,
     /// The override asked for.
     asked: f64,
 }
@@ -116,6 +118,7 @@ impl Player {
             at_planned_rest: true,
             paused_until: 0,
             limits: MotionLimits::new(machine),
+            min_power: machine.laser.min_power,
             asked: 1.0,
         }
     }
@@ -395,7 +398,7 @@ impl Player {
     /// What the stream has of light between `next` and `after` that was not given before.
     fn light(&self, lookahead: &Lookahead) -> Result<LaserCycle, TooManyEdges> {
         let stretch = Stretch { from: self.next.time, to: self.after.time };
-        gate::laser(lookahead, stretch, self.dark_until)
+        gate::laser(lookahead, stretch, self.dark_until, self.min_power)
     }
 
     /// Where the digital outputs stand: they do not go back with a rewind.

@@ -6,7 +6,7 @@ mod support;
 
 use machine::Machine;
 use messages::{ControllerReport, ControllerState, OperatorVerb};
-use support::{Bench, Move, Part, job, lit_stretches, two_marks};
+use support::{Bench, COARSE, Move, Part, job, lit_stretches, two_marks};
 
 /// Plays a gentle job with an override set after `cycles`; its largest rate and its report.
 fn play(rate: f64, cycles: usize) -> (f64, ControllerReport) {
@@ -83,4 +83,36 @@ fn two_runs_have_one_digest() {
     };
     assert_eq!(digest(0.5), digest(0.5));
     assert_ne!(digest(0.5), digest(0.25));
+}
+
+#[test]
+fn no_light_is_weaker_than_the_source_can_give_at_any_rate() {
+    let mut machine = Machine::builtin();
+    machine.laser.min_power = 0.2;
+    let job = two_marks(&machine, 0.25, 0.3);
+    for rate in [0.1, 0.4, 0.7, 0.9] {
+        let mut bench = Bench::enabled_with(&machine, COARSE);
+        assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
+        assert!(bench.ask(Some(&job), OperatorVerb::Override, rate));
+        bench.run(Some(&job), 300);
+        assert!(bench.ask(Some(&job), OperatorVerb::Hold, 0.0));
+        bench.run(Some(&job), 200);
+        assert!(bench.ask(Some(&job), OperatorVerb::Resume, 0.0));
+        bench.until(Some(&job), ControllerState::Idle, 12_000);
+        let commands = bench.played().map(|record| &record.command.laser);
+        let powers: Vec<f64> = commands
+            .flat_map(|laser| {
+                let edges = laser.edges().iter().map(|edge| (edge.gate, edge.power));
+                core::iter::once((laser.gate, laser.power)).chain(edges)
+            })
+            .filter_map(|(gate, power)| (gate != 0).then_some(power))
+            .collect();
+        let [least, most] =
+            [f64::min, f64::max].map(|choose| powers.iter().copied().reduce(choose).unwrap());
+        assert!(least >= 0.2 && most <= 0.3 + 1e-12, "{least} to {most} at {rate}");
+        // Above two thirds of the rate nothing is stronger than in proportion.
+        let expected = f64::max(0.2, 0.3 * rate);
+        let common = powers.iter().filter(|power| (**power - expected).abs() < 1e-6).count();
+        assert!(common * 2 > powers.len(), "{common} of {} at {rate}", powers.len());
+    }
 }
