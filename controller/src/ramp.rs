@@ -81,6 +81,12 @@ impl Slew {
     }
 }
 
+/// The most by which the rate changes [1/s].
+pub const LARGEST_CHANGE: f64 = Slew::STOP.change as f64 / Rate::ONE.0 as f64 / CYCLE_TIME;
+
+/// The most by which that changes from one cycle to the next [1/s].
+pub const LARGEST_TURN: f64 = LARGEST_BEND as f64 / Rate::ONE.0 as f64 / CYCLE_TIME;
+
 /// A rate on its way.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Ramp {

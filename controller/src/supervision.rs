@@ -3,6 +3,7 @@
 //! A finding says what is wrong and whether the axes can still be trusted to follow the plan. If
 //! so they come to rest along the path, else the drives brake them.
 
+use crate::ramp::{LARGEST_CHANGE, LARGEST_TURN};
 use machine::trip::Limit;
 use machine::trip::following::{CREEP, DISCONTINUITY, LEAD_STEP};
 use machine::{Axis, DcMotor, Machine, StallTolerance};
@@ -251,7 +252,7 @@ impl Supervision {
     }
 
     /// Whether `setpoint` continues from `before`, or starts at rest without one, and rests where it
-    /// promises to.
+    /// promises to: at any rate, and while that changes.
     ///
     /// # Errors
     /// A jump of position or lead, motion or light at a planned rest; with the axis and joint units.
@@ -261,22 +262,35 @@ impl Supervision {
         setpoint: &Setpoint,
     ) -> Result<(), Finding> {
         let ends = setpoint.has(flags::LAST) || setpoint.has(flags::PAUSE);
+        let starts = before.is_none();
         if ends && setpoint.laser.is_lit() {
             return Err(Finding::sound(impossible_light(setpoint)));
         }
         for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
             let unit = axis.limits.following_error;
-            let (jump, step) = before.map_or((0.0, 0.0), |before| {
-                let speeds = before.velocity[index] + setpoint.velocity[index];
-                let moved = setpoint.position[index] - before.position[index];
-                let lead = setpoint.lead[index] - before.lead[index];
-                (moved - speeds / 2.0 * CYCLE_TIME, lead)
-            });
-            let rests = ends || before.is_none();
+            let before = before.unwrap_or(setpoint);
+            let rests = ends || starts;
+            let speeds = before.velocity[index] + setpoint.velocity[index];
+            let moved = setpoint.position[index] - before.position[index];
+            let jump = if starts { 0.0 } else { moved - speeds / 2.0 * CYCLE_TIME };
             let creep = if rests { setpoint.velocity[index] * CYCLE_TIME } else { 0.0 };
+            let step = |of: fn(&Setpoint) -> &AxisArray| of(setpoint)[index] - of(before)[index];
+            // What is left of the lead in a hold, and what a change of the rate adds to it.
+            let at_rest = setpoint.lead[index] - setpoint.static_lead[index];
+            let momentum = setpoint.lead_momentum[index];
+            let leads = [
+                step(|setpoint| &setpoint.lead),
+                step(|setpoint| &setpoint.static_lead),
+                if rests { at_rest } else { 0.0 },
+                step(|setpoint| &setpoint.lead_momentum) * LARGEST_CHANGE,
+                momentum * LARGEST_TURN,
+            ];
+            let lead = leads.into_iter().fold(0.0, |largest: f64, lead| {
+                if lead.abs() > largest.abs() { lead } else { largest }
+            });
             let steps = [
                 (FaultQuantity::Jump, jump, DISCONTINUITY * unit),
-                (FaultQuantity::LeadJump, step, LEAD_STEP * unit),
+                (FaultQuantity::LeadJump, lead, LEAD_STEP * unit),
                 (FaultQuantity::Creep, creep, CREEP * unit),
             ];
             let broken = steps.iter().find(|(_, value, limit)| value.abs() > *limit);

@@ -139,7 +139,7 @@ fn a_lost_peer_stops_the_axes_along_the_path() {
 #[test]
 fn setpoints_that_break_the_stream_or_a_limit_are_never_played() {
     type Spoil = fn(&mut Setpoint);
-    let cases: [(FaultCode, Spoil); 13] = [
+    let cases: [(FaultCode, Spoil); 17] = [
         (FaultCode::StreamBroken, |setpoint| setpoint.sequence += 1),
         (FaultCode::StreamBroken, |setpoint| setpoint.stream = 2),
         (FaultCode::SetpointLimit, |setpoint| setpoint.velocity[1] = 0.7),
@@ -147,6 +147,11 @@ fn setpoints_that_break_the_stream_or_a_limit_are_never_played() {
         // Within every limit, and not where the one before leads to.
         (FaultCode::SetpointLimit, |setpoint| setpoint.position[1] += 20e-6),
         (FaultCode::SetpointLimit, |setpoint| setpoint.lead[0] = 300e-6),
+        // Nothing of these is seen before the rate changes.
+        (FaultCode::SetpointLimit, |setpoint| setpoint.static_lead[0] = 300e-6),
+        (FaultCode::SetpointLimit, |setpoint| setpoint.static_lead[1] = -300e-6),
+        (FaultCode::SetpointLimit, |setpoint| setpoint.lead_momentum[0] = 30e-6),
+        (FaultCode::SetpointLimit, |setpoint| setpoint.lead_momentum[1] = -1.0),
         (FaultCode::SetpointLimit, |setpoint| setpoint.effort[0] = 0.12),
         // A rest that is none.
         (FaultCode::SetpointLimit, |setpoint| setpoint.flags |= flags::PAUSE),
@@ -173,6 +178,26 @@ fn setpoints_that_break_the_stream_or_a_limit_are_never_played() {
         let furthest = bench.played().map(|record| record.command.stream_time).fold(0.0, f64::max);
         assert!(furthest < 0.419, "{furthest}");
         settle(&mut bench, &job, code);
+    }
+}
+
+/// What gravity takes of the lead stays in a hold: a stream that says anything else where it rests would
+/// carry the axes off when it is held.
+#[test]
+fn a_stream_whose_lead_at_rest_is_not_that_of_its_rests_is_never_played() {
+    let machine = Machine::builtin();
+    let spoils: [fn(&mut Setpoint); 2] =
+        [|setpoint| setpoint.static_lead[0] = 260e-6, |setpoint| setpoint.lead[1] = -260e-6];
+    for spoil in spoils {
+        let mut job = two_marks(&machine, 0.25, 0.5);
+        job.setpoints.iter_mut().for_each(spoil);
+        let mut bench = Bench::enabled(&machine);
+        assert!(bench.ask(None, OperatorVerb::Start, 1.0));
+        bench.run(Some(&job), 1);
+        let fault = bench.last().command.fault;
+        assert_eq!(fault.code(), FaultCode::SetpointLimit);
+        assert_eq!((fault.value.abs(), fault.limit), (260e-6, 250e-6));
+        assert_eq!(bench.played().count(), 0);
     }
 }
 
