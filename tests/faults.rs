@@ -6,8 +6,8 @@
 
 mod support;
 
-use messages::Nanoseconds;
 use messages::random::SplitMix64;
+use messages::{CommandMode, Nanoseconds};
 use monitor::recording::CycleRecord;
 use runtime::clock;
 use runtime::peer::Peer;
@@ -62,11 +62,16 @@ struct Aftermath {
     ended: Ended,
 }
 
-/// Runs four lines and kills one service at a moment that `random` chooses.
+/// Runs four lines on the built-in machine and kills one service at a moment that `random` chooses.
 fn kill_during_run(role: &str, random: &mut SplitMix64) -> Aftermath {
+    kill_during_run_of(&[], role, random)
+}
+
+/// The same with these arguments of `graver run`.
+fn kill_during_run_of(more: &[&str], role: &str, random: &mut SplitMix64) -> Aftermath {
     let place = Place::new();
     let job = place.file("lines.ngc", &lines(4));
-    let mut running = place.run(&job, RUN, &[]);
+    let mut running = place.run(&job, RUN, more);
     let played = 20 + random.below(1400);
     let status = place.await_played(&mut running, played);
     let services = services(&status);
@@ -126,6 +131,61 @@ fn without_a_planner_the_controller_brings_the_axes_to_rest_in_the_dark() {
         support::assert_ends_dark_and_at_rest(&records, 2);
         aftermath.place.assert_nothing_left(&aftermath.services);
         assert_starts_clean(&aftermath.place);
+    }
+}
+
+/// Asserts that steppers came to rest where the controller had them: each axis within a few of its
+/// pulses of the reference for as long as it was followed. A feedback of a slow axis would not tell.
+fn assert_rest_on_the_path(records: &[CycleRecord], axes: usize, what: &str) {
+    let followed = |record: &&CycleRecord| record.command.mode() == CommandMode::Position;
+    let last: Vec<_> = records.iter().filter(followed).collect();
+    assert!(last.len() > 100, "{what}: {} cycles", last.len());
+    for record in &last[last.len() - 100..] {
+        let cycle = record.feedback.cycle.0;
+        for axis in 0..axes {
+            let off = record.command.following_error[axis].abs();
+            // 200 steps of 16 microsteps.
+            assert!(off <= 3.0 * core::f64::consts::TAU / 3200.0, "{what}: {off} rad in {cycle}");
+        }
+    }
+}
+
+#[test]
+fn steppers_come_to_rest_on_the_path_whoever_else_is_killed() {
+    let machine = support::source("machines/cartesian_steppers.toml");
+    let steppers = ["--machine", machine.to_str().unwrap()];
+    let mut random = SplitMix64::new(8);
+    for _ in 0..2 {
+        let aftermath = kill_during_run_of(&steppers, "planner", &mut random);
+        let summary = aftermath.aborted("planner");
+        assert_eq!(summary["fault"]["code"], "planner_lost", "{}", aftermath.moment);
+        let records = aftermath.place.recording(RUN);
+        assert_dark_since(aftermath.death, &records, &aftermath.moment);
+        assert_rest_on_the_path(&records, 2, &aftermath.moment);
+        support::assert_ends_dark_and_at_rest(&records, 2);
+    }
+    // A supervisor that is killed, and drives that are told to end.
+    for ordered in [false, true] {
+        let place = Place::new();
+        let job = place.file("lines.ngc", &lines(8));
+        let mut running = place.run(&job, RUN, &steppers);
+        let status = place.await_played(&mut running, 20 + random.below(1400));
+        let what = format!("ended at {}, ordered {ordered}", status["played"]);
+        let services = services(&status);
+        let death = if ordered {
+            service(&status, "drives").signal(TERMINATE).unwrap();
+            None
+        } else {
+            Some(kill(&running.peer()))
+        };
+        running.wait();
+        place.assert_nothing_left(&services);
+        let records = place.recording(RUN);
+        if let Some(death) = death {
+            assert_dark_since(death, &records, &what);
+        }
+        assert_rest_on_the_path(&records, 2, &what);
+        support::assert_ends_dark_and_at_rest(&records, 2);
     }
 }
 

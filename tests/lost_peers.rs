@@ -1,0 +1,109 @@
+//! Planner or supervisor die while the machine moves, in virtual time: the gate is closed from that
+//! deadline on, and the axes, motors or steppers, come to rest where the controller has them.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use controller::{Controller, Inputs, Outputs, Peers, Presence};
+use drives::{Bridge, BridgeOptions, Deadlines, GatePermission, PlantOptions, SimulatedPlant};
+use machine::Machine;
+use messages::time::CYCLE_PERIOD;
+use messages::{
+    CommandMode, ControllerState, FaultCode, Nanoseconds, OperatorRequest, OperatorVerb, Setpoint,
+};
+use planner::job::Job;
+use planner::{Plan, plan};
+
+/// The cycle in which the job starts.
+const START: u64 = 100;
+
+/// The largest distance of an axis from its reference while the loops or the pulses hold it [m or rad],
+/// and the fastest that one moved in the cycle of the death [m/s or rad/s].
+struct Rest {
+    off: f64,
+    speed: f64,
+}
+
+/// Plays the sample job until a peer dies in the cycle `death`, which the controller learns `late`
+/// cycles later, and on until the machine has faulted.
+fn play(machine: &Machine, plan: &Plan, death: u64, late: u64, lost: (Peers, FaultCode)) -> Rest {
+    let case = format!("{}, {:?} at {death}, {late} late", machine.name, lost.1);
+    let mut setpoints = plan.setpoints(1);
+    let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
+    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
+    let mut bridge = Bridge::new(port, options);
+    let mut controller = Controller::new(machine);
+    let mut outputs = Outputs::default();
+    let (mut deadline, mut rest) = (Nanoseconds(0), Rest { off: 0.0, speed: 0.0 });
+    for step in 1..death + 3000 {
+        deadline = deadline + CYCLE_PERIOD;
+        if step >= death {
+            bridge.permit(GatePermission::Inhibited);
+        }
+        bridge.begin(deadline, deadline);
+        let feedback = *bridge.feedback();
+        // The light of a cycle is measured at its end.
+        assert!(step <= death || !feedback.laser.is_lit(), "{case}: lit in {step}");
+        let verb = match step {
+            2 => Some((OperatorVerb::Enable, 0.0)),
+            START => Some((OperatorVerb::Start, 1.0)),
+            _ => None,
+        };
+        let request =
+            verb.map(|(verb, value)| OperatorRequest { verb: verb as u32, ticket: 1, value });
+        let room = if step > START && step < death { controller.room().min(16) } else { 0 };
+        let batch: Vec<Setpoint> = setpoints.by_ref().take(room).collect();
+        let peers = if step < death + late { Peers::default() } else { lost.0 };
+        let inputs =
+            Inputs { feedback: &feedback, received: deadline, setpoints: &batch, request, peers };
+        controller.step(deadline, &inputs, &mut outputs);
+        bridge.latch(&outputs.command, deadline);
+        bridge.finish(deadline);
+        let axes = || machine.axes.iter().enumerate();
+        if step == death {
+            let speeds = axes().map(|(index, axis)| (feedback.velocity[index] * axis.ratio).abs());
+            rest.speed = speeds.fold(0.0, f64::max);
+        }
+        let follows =
+            matches!(outputs.command.mode(), CommandMode::Voltage | CommandMode::Position);
+        if step > death && follows {
+            let errors = &outputs.command.following_error;
+            let off = axes().map(|(index, axis)| (errors[index] * axis.ratio).abs());
+            rest.off = off.fold(rest.off, f64::max);
+        }
+        if outputs.command.state() == ControllerState::Faulted {
+            assert_eq!(outputs.command.fault.code(), lost.1, "{case}");
+            assert!(step > death + 20, "{case}: faulted after {} cycles", step - death);
+            return rest;
+        }
+    }
+    panic!("{case}: {:?}", outputs.command.state());
+}
+
+#[test]
+fn the_axes_come_to_rest_where_the_controller_has_them() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("machines");
+    let planner = Peers { planner: Presence::Lost, ..Peers::default() };
+    let supervisor = Peers { supervisor: Presence::Lost, ..Peers::default() };
+    for name in ["corexy", "cartesian_steppers", "twin_actuator", "tri_planar"] {
+        let machine = Machine::load(&folder.join(name).with_extension("toml"), &[]).unwrap();
+        let plan = plan(&machine, &Job::builtin(&[], &machine).unwrap()).unwrap();
+        let mut fastest: f64 = 0.0;
+        for moment in [37, 110, 250, 410, 633, 900] {
+            for lost in [(planner, FaultCode::PlannerLost), (supervisor, FaultCode::SupervisorLost)]
+            {
+                // Drives counts a dead peer as one that closes the gate, which the controller hears of
+                // in the same cycle, unless it has found out by itself.
+                let rest = play(&machine, &plan, START + moment, 0, lost);
+                fastest = fastest.max(rest.speed);
+                let most = 0.1 * machine.axes[0].limits.following_error;
+                assert!(rest.off < most, "{name} at {moment}: {} off", rest.off);
+                let (peers, _) = lost;
+                let rest = play(&machine, &plan, START + moment, 3, (peers, FaultCode::DriveFault));
+                assert!(rest.off < most, "{name} at {moment}: {} off", rest.off);
+            }
+        }
+        assert!(fastest > 0.02, "{name}: {fastest}");
+    }
+}
