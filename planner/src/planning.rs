@@ -30,7 +30,7 @@ use crate::drawing::{Note, Turns};
 use crate::error::{Place, PlanError};
 use crate::geometry::contour::Contour;
 use crate::geometry::operation::OperationKind;
-use crate::joint_space::configuration::{Configuration, Refused};
+use crate::joint_space::configuration::Configuration;
 use crate::joint_space::joint_move::JointMove;
 use crate::joint_space::route::{Router, still};
 use crate::law::flight::State;
@@ -64,6 +64,13 @@ const REMEMBERED: f64 = 2.0 * CYCLE_TIME;
 
 /// Samples checked between two questions whether anybody still waits for the plan.
 const ASK: u64 = 4096;
+
+/// The most setpoints of a window: a motion that lasts longer is checked as a whole, and then sampled
+/// again window by window.
+const MOST_SETPOINTS: usize = 4096;
+
+/// The longest part of a rest that is one window [s].
+const LONGEST_REST: f64 = 2.0;
 
 /// The rest before the first motion [s]: whole cycles, so that a source that is told ahead of the first
 /// light is told at rest.
@@ -112,6 +119,8 @@ struct Front<const N: usize, M: Mechanism<N>> {
     run: Option<PathRun<N>>,
     /// Whether that goes on in the next operation.
     goes_on: bool,
+    /// How much longer it stands where it is [s].
+    standing: f64,
     /// Number of the next operation, and parts of a path that was divided.
     next: usize,
     parts: VecDeque<Arc<Contour>>,
@@ -211,6 +220,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             moving: None,
             run: None,
             goes_on: false,
+            standing: 0.0,
             next: 0,
             parts: VecDeque::new(),
             time: before,
@@ -342,22 +352,55 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             bound: BindingTimes::default(),
             speed: 0.0,
         };
+        if !self.has_enough() {
+            self.extend(&mut draft)?;
+            if self.has_enough() {
+                self.rehearse(abandoned)?;
+            }
+        }
+        let setpoints = self.sample(MOST_SETPOINTS, abandoned)?;
+        Ok((draft, setpoints))
+    }
+
+    /// Whether there is motion for more than one window.
+    fn has_enough(&self) -> bool {
+        self.front.sampler.due() > MOST_SETPOINTS
+    }
+
+    /// Adds motion to `draft` and to what is sampled, unless there is none left.
+    fn extend(&mut self, draft: &mut Draft<'_>) -> Result<(), PlanError> {
+        if self.front.sampler.is_complete() {
+            return Ok(());
+        }
         draft.trajectory.pieces.extend(self.front.lead_in.take());
         self.hold_height();
-        let is_last = !self.advance(&mut draft)?;
+        let is_last = !self.advance(draft)?;
         let light = &mut self.front.light;
         draft.trajectory.laser =
             if is_last { light.take_all() } else { light.take(self.front.time) };
-        if self.front.time > LONGEST || self.front.time.is_nan() {
-            return Err(PlanError::TooLong { duration: self.front.time });
+        let duration = self.front.time + self.front.standing;
+        if duration > LONGEST || duration.is_nan() {
+            return Err(PlanError::TooLong { duration });
         }
         self.front.sampler.extend(&draft.trajectory, is_last);
-        let setpoints = self.sample(abandoned)?;
-        Ok((draft, setpoints))
+        Ok(())
+    }
+
+    /// Checks all samples of what is known of the motion, and keeps none: nothing of a motion may be
+    /// handed on before all of it is known to keep the limits.
+    fn rehearse(&mut self, abandoned: &dyn Fn() -> bool) -> Result<(), PlanError> {
+        let front = self.front.clone();
+        while !self.sample(MOST_SETPOINTS, abandoned)?.is_empty() {}
+        self.front = front;
+        Ok(())
     }
 
     /// Adds the next stretch of motion to `draft`. Says whether there was any left.
     fn advance(&mut self, draft: &mut Draft<'_>) -> Result<bool, PlanError> {
+        if self.front.standing > 0.0 {
+            self.stand(self.front.standing, draft);
+            return Ok(true);
+        }
         if self.front.run.is_some() {
             self.go_on(draft)?;
             return Ok(true);
@@ -446,11 +489,13 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         self.front.time += duration;
     }
 
-    /// Stands where the joints are.
+    /// Stands where the joints are, now and in as many of the next windows as `duration` takes [s].
     fn stand(&mut self, duration: f64, draft: &mut Draft<'_>) {
+        let now = duration.min(LONGEST_REST);
+        self.front.standing = duration - now;
         let rest = JointMove::standing(&self.front.now.joints, self.front.now.branch);
         let stroke = self.front.light.stroke;
-        self.push(duration, Motion::Rest(rest), stroke, draft);
+        self.push(now, Motion::Rest(rest), stroke, draft);
     }
 
     /// Comes to rest, then goes to `to` in the dark.
@@ -468,10 +513,8 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
 
     /// Puts the joints where the tool's motion says, which the last move led to.
     fn settle_at(&mut self, tool: &machine::kinematics::ToolMotion) -> Result<(), PlanError> {
-        let Configuration { joints, mut branch } = self.front.now;
-        let motion = self.limits.follow(tool, &mut branch, &joints);
-        let motion = motion.map_err(|cause| self.refusal(Refused::Kinematics(cause)))?;
-        self.front.now = Configuration { joints: motion.position, branch };
+        let now = self.joints_at(tool, &self.front.now);
+        self.front.now = now.map_err(|cause| self.refusal(cause))?;
         Ok(())
     }
 
@@ -479,10 +522,14 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         Router { limits: &self.limits, area: self.area, shares, now: self.front.now }
     }
 
-    /// Samples as far as the motion is known, and checks each sample.
-    fn sample(&mut self, abandoned: &dyn Fn() -> bool) -> Result<Vec<Setpoint>, PlanError> {
-        let mut setpoints = Vec::with_capacity(self.front.sampler.due());
-        while self.front.sampler.push_to(&mut setpoints) {
+    /// Samples as far as the motion is known, `most` times at most, and checks each sample.
+    fn sample(
+        &mut self,
+        most: usize,
+        abandoned: &dyn Fn() -> bool,
+    ) -> Result<Vec<Setpoint>, PlanError> {
+        let mut setpoints = Vec::with_capacity(self.front.sampler.due().min(most));
+        while setpoints.len() < most && self.front.sampler.push_to(&mut setpoints) {
             let Some(setpoint) = setpoints.last() else { break };
             self.front.samples += 1;
             if self.front.samples.is_multiple_of(ASK) && abandoned() {

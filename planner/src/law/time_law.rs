@@ -74,6 +74,14 @@ impl TimeLaw {
         self.cells.last().map_or(0.0, |cell| cell.time + cell.duration)
     }
 
+    /// Whether it is at `speed` all along [m/s].
+    pub(crate) fn is_even_at(&self, speed: f64) -> bool {
+        let is_even = |cell: &Cell| {
+            cell.motion == Motion::Jerk(0.0) && cell.speed == speed && cell.acceleration == 0.0
+        };
+        self.cells.iter().all(is_even)
+    }
+
     /// Whether the law goes nowhere.
     pub fn is_empty(&self) -> bool {
         self.cells.is_empty()

@@ -154,7 +154,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         found.first().map(|(start, _)| *start).ok_or(Refused::NoConfiguration { tried: 0 })
     }
 
-    fn joints_at(
+    /// The configuration in which the tool moves as `first` says, near another.
+    pub(super) fn joints_at(
         &self,
         first: &ToolMotion,
         near: &Configuration<N>,

@@ -20,6 +20,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let ahead = run.map_or(0.0, |run| {
             self.estimate_of(&run.contour) * (1.0 - run.at / run.contour.length())
         });
+        let ahead = ahead + self.front.standing;
         let parts = self.front.parts.iter().map(|part| self.estimate_of(part));
         let ahead = parts.fold(ahead, |sum, part| sum + part);
         let done = (estimated - ahead).max(0.0);

@@ -5,12 +5,11 @@ use std::sync::Arc;
 
 use machine::Mechanism;
 
-use super::paths::PathRun;
+use super::paths::{END_SHARE, PathRun};
 use super::windows::WINDOW;
 use super::{Draft, Planning, plateau};
 use crate::error::PlanError;
 use crate::geometry::contour::Contour;
-use crate::geometry::path::Path;
 use crate::joint_space::configuration::{Configuration, trail};
 use crate::law::End;
 use crate::law::row::Side;
@@ -106,13 +105,13 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let (contour, left_out) = run.contour.followed_by(run.at, next);
         let path = contour.trace(run.smoothed_for, &self.limits.path);
         let near = run.trail.partition_point(|(at, _)| *at <= left_out).max(1) - 1;
-        let Configuration { joints, mut branch } = run.trail[near].1;
         let tool = path.at(0.0).motion(1.0, 0.0, 0.0);
-        let first = self.limits.follow(&tool, &mut branch, &joints).ok()?;
-        let start = Configuration { joints: first.position, branch };
+        let start = self.joints_at(&tool, &run.trail[near].1).ok()?;
         let trail = trail(&self.limits, &start, &path).ok()?;
         let within = |(_, now): &(f64, Configuration<N>)| self.is_within_travel(now);
-        if !trail.iter().all(within) || !self.is_within_travel(&self.end_of(&path, &trail)?) {
+        let end = path.end().motion(1.0, 0.0, 0.0);
+        let end = self.joints_at(&end, &trail.last()?.1).ok()?;
+        if !trail.iter().all(within) || !self.is_within_travel(&end) {
             return None;
         }
         let was_lit = run.contour.demands().last().is_some_and(|demand| demand.power > 0.0);
@@ -134,8 +133,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             ..run.clone()
         };
         longer.least_reach = self.least_reach(&longer.speeds);
-        longer.even = longer.even.filter(|speed| {
-            longer.speeds.iter().all(|limit| limit.speed == *speed)
+        longer.even = longer.even.filter(|_| {
+            longer.speeds.iter().all(|limit| limit.speed == run.speeds[0].speed)
                 && self.goes_evenly(
                     &longer,
                     longer.at.max(known - run.contour.last_length()),
@@ -150,14 +149,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let Some(speed) = run.even else { return false };
         let mut along = AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
         along.is_tool_free = true;
-        keeps_even(&mut along, place, run.path.length(), shares.speed * speed)
-    }
-
-    fn end_of(&self, path: &Path, trail: &[(f64, Configuration<N>)]) -> Option<Configuration<N>> {
-        let Configuration { joints, mut branch } = trail.last()?.1;
-        let tool = path.at(path.length()).motion(1.0, 0.0, 0.0);
-        let motion = self.limits.follow(&tool, &mut branch, &joints).ok()?;
-        Some(Configuration { joints: motion.position, branch })
+        keeps_even(&mut along, place, run.path.length(), speed)
     }
 
     fn is_within_travel(&self, now: &Configuration<N>) -> bool {
@@ -170,7 +162,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     /// policy has it, else at rest.
     pub(super) fn choose_exit(&self, run: &mut PathRun<N>, shares: &Tightening) {
         run.exit = End::Rest;
-        if let Some(speed) = run.even.map(|speed| speed * shares.speed)
+        if let Some(speed) = run.even
             && self.can_leave(run, speed, shares)
         {
             run.exit = End::Moving { speed, acceleration: 0.0 };
@@ -185,8 +177,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         along.is_exact = true;
         let most = self.limits.path.rapid.max(self.limits.path.speed) * 2.0;
         let allowed = even_speed(&mut along, length, Side::Before, most);
-        let asked = run.speeds.last().map_or(0.0, |last| shares.speed * last.speed);
-        let mut speed = if allowed >= asked * (1.0 - 1e-9) { asked } else { 0.995 * allowed };
+        let asked = shares.speed * limit_before(&run.speeds, length).speed;
+        let mut speed = if allowed >= asked * (1.0 - 1e-9) { asked } else { END_SHARE * allowed };
         for _ in 0..TRIALS {
             if self.can_leave(run, speed, shares) {
                 run.exit = End::Moving { speed, acceleration: 0.0 };
@@ -205,6 +197,16 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         self.rate = rate;
         let Some(mut run) = self.front.run.take() else { return };
         let mut speeds = self.limits_for(&run.contour, run.most);
+        if let Some(speed) = run.even
+            && !self.front.goes_on
+        {
+            // Near its end a path at one speed is ended at it, of which it is known that it can be left.
+            let most = speeds.iter().map(|limit| limit.speed).fold(speed, f64::max);
+            if run.path.length() - run.at < self.way_to_slow_down(most) {
+                self.front.run = Some(run);
+                return;
+            }
+        }
         if let End::Moving { speed, acceleration } = run.begin {
             // What it still gains before its acceleration is gone.
             let quickening = acceleration.max(0.0);
@@ -221,12 +223,23 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         self.front.run = Some(run);
     }
 
-    /// A way on which the tool surely comes from `speed` to any lower one [m].
+    /// A way on which the tool surely comes from `speed` to any lower one, or from any lower one to it
+    /// [m].
     fn way_to_slow_down(&self, speed: f64) -> f64 {
         let limits = &self.limits.path;
         let time = speed / limits.acceleration + limits.acceleration / limits.jerk;
         GENTLE * speed * time
     }
+}
+
+/// The limit just before `place` [m].
+pub(super) fn limit_before(speeds: &[SpeedLimit], place: f64) -> &SpeedLimit {
+    &speeds[speeds.partition_point(|limit| limit.from < place).max(1) - 1]
+}
+
+/// The limit from `place` on [m].
+pub(super) fn limit_at(speeds: &[SpeedLimit], place: f64) -> &SpeedLimit {
+    &speeds[speeds.partition_point(|limit| limit.from <= place).max(1) - 1]
 }
 
 /// Speeds along a path that begins `distance` later [m].

@@ -29,11 +29,11 @@ use crate::verify::checker::{LimitViolation, Quantity};
 
 /// How much of the speed that an end allows it is passed at, so that its limits leave room to
 /// begin to change it.
-const END_SHARE: f64 = 0.995;
+pub(super) const END_SHARE: f64 = 0.995;
 
 /// How much slower an end is tried that cannot be met, and how often before it is met at rest.
-const END_SLOWER: f64 = 0.8;
-const END_TRIALS: usize = 14;
+pub(super) const END_SLOWER: f64 = 0.8;
+pub(super) const END_TRIALS: usize = 14;
 
 /// Notes of paths that are divided, at most.
 const MOST_NOTES: usize = 100;
@@ -361,9 +361,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         }
         let first = path.at(0.0).motion(1.0, 0.0, 0.0);
         if self.limits.mechanism.is_linear() {
-            let Configuration { joints, mut branch } = self.front.now;
-            let motion = self.limits.follow(&first, &mut branch, &joints)?;
-            let start = Configuration { joints: motion.position, branch };
+            let start = self.joints_at(&first, &self.front.now)?;
             walk(&self.limits, start, &[middle])?.within(&self.limits)?;
             return Ok(start);
         }
@@ -389,7 +387,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             along.is_tool_free = true;
             let even = fastest * shares.speed;
             if evenly && *ends == [true; 2] && keeps_even(&mut along, 0.0, length, even) {
-                run.even = Some(fastest);
+                run.even = Some(even);
             }
             if let Some(cause) = along.error {
                 return Err(Refused::Kinematics(cause));
@@ -408,13 +406,13 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
                 speeds[end] = if is_asked { asked } else { END_SHARE * allowed };
             }
         }
-        if run.even.is_some() {
-            run.begin = End::Moving { speed: fastest * shares.speed, acceleration: 0.0 };
+        if let Some(speed) = run.even {
+            run.begin = End::Moving { speed, acceleration: 0.0 };
             run.exit = run.begin;
             // The way to rest is there from the end of the path at this speed, or else from rest.
-            let law = TimeLaw::even(0.0, length, fastest * shares.speed, 0);
+            let law = TimeLaw::even(0.0, length, speed, 0);
             let keeps = || !self.tighten_tail(run, &law, &mut shares.clone());
-            let leaves = || self.can_leave(run, fastest * shares.speed, shares);
+            let leaves = || self.can_leave(run, speed, shares);
             if self.front.goes_on || (keeps() && leaves()) {
                 return self.time(run, shares)?.map_err(|_| Refused::NoConfiguration { tried: 1 });
             }

@@ -65,9 +65,9 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         }
         let end = run.path.end();
         let tool = end.motion(1.0, 0.0, 0.0);
-        let Configuration { joints, mut branch } = run.trail[run.trail.len() - 1].1;
-        let Ok(motion) = self.limits.follow(&tool, &mut branch, &joints) else { return false };
-        let now = Configuration { joints: motion.position, branch };
+        let Ok(now) = self.joints_at(&tool, &run.trail[run.trail.len() - 1].1) else {
+            return false;
+        };
         self.run_out(&state(&end, speed), &now, &shares.with_reserve()).is_some()
     }
 

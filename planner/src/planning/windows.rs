@@ -8,13 +8,13 @@ use messages::artwork::{Artwork, ArtworkLine, Stroke};
 use messages::time::CYCLE_TIME;
 use nalgebra::Vector3;
 
-use super::paths::PathRun;
+use super::paths::{END_SHARE, END_SLOWER, END_TRIALS, PathRun};
+use super::run_in_out::state;
 use super::{Draft, Planning, Slowed, plateau};
 use crate::error::PlanError;
 use crate::geometry::contour::{Contour, Demand};
-use crate::joint_space::configuration::{Configuration, Refused};
+use crate::joint_space::configuration::Refused;
 use crate::joint_space::follow_flight::uses;
-use crate::law::flight::State;
 use crate::law::time_law::TimeLaw;
 use crate::law::windows::{between, keeps_even, straight};
 use crate::law::{End, Infeasible};
@@ -26,6 +26,10 @@ use crate::trajectory::Motion;
 
 /// The time that a window should take [s].
 pub(super) const WINDOW: f64 = 1.2;
+
+/// The longest law of a whole straight path that is one window [s]: what is longer goes by windows, so
+/// that an override acts soon.
+const LONGEST_STRAIGHT: f64 = 4.0;
 
 /// How long the tool goes on at its speed where it cannot change it yet [s].
 const STEP: f64 = 0.05;
@@ -147,23 +151,27 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let length = run.path.length();
         let mut along = AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
         let goes_on = self.front.goes_on;
-        // A speed that the tool has it cannot leave at once.
-        let even =
-            run.even.map(|speed| End::Moving { speed: speed * shares.speed, acceleration: 0.0 });
-        if let Some(next @ End::Moving { speed, .. }) = even
-            && (run.at == 0.0 || run.begin == next)
+        // What one speed takes too much of, that speed does not mend.
+        if let Some(speed) = run.even
+            && (run.at == 0.0 || *shares == Tightening::none(N))
         {
-            let to = (run.at + speed * WINDOW).min(length);
+            let next = End::Moving { speed, acceleration: 0.0 };
+            let to = run.at + speed * WINDOW;
+            // The last window begins where there is still room for a stop.
+            let to = if goes_on || to + run.stopping_room() < length { to } else { length };
             let law = TimeLaw::even(run.at, to, speed, run.speeds[0].source.0);
-            // Of a path that goes on nobody knows yet how it can be left.
-            let fallback =
-                if goes_on { plateau::rest_from(run, &mut along, to, next) } else { None };
-            return Ok(Ok(Timed { law, next: (to < length).then_some(next), fallback }));
+            if to >= length {
+                return Ok(Ok(Timed { law, next: None, fallback: None }));
+            }
+            let fallback = plateau::rest_from(run, &mut along, to, next);
+            return Ok(Ok(Timed { law, next: Some(next), fallback }));
         }
         let is_whole = !goes_on && run.at == 0.0 && run.begin == End::Rest && run.exit == End::Rest;
         if is_whole && run.path.is_straight() {
             along.is_exact = true;
-            if let Some(law) = straight(&mut along, length) {
+            if let Some(law) = straight(&mut along, length)
+                && law.duration() <= LONGEST_STRAIGHT
+            {
                 return Ok(Ok(Timed { law, next: None, fallback: None }));
             }
             along.is_exact = false;
@@ -186,12 +194,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         }
         let law = match law {
             Ok(law) => law,
-            Err(infeasible) => {
-                let Some(fallback) = &run.fallback else { return Ok(Err(infeasible)) };
-                let law = fallback.clone();
-                let next = (law.places().end < length).then_some(End::Rest);
-                return Ok(Ok(Timed { law, next, fallback: None }));
-            }
+            Err(infeasible) => return Ok(Err(infeasible)),
         };
         if to >= length {
             return Ok(Ok(Timed { law, next: None, fallback: None }));
@@ -205,41 +208,75 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let Some(mut run) = self.front.run.take() else { return Ok(()) };
         self.lengthen(&mut run, draft)?;
         self.front.line = run.line_at(run.at);
-        let timed = self.time(&run, draft.shares).map_err(|cause| self.refusal(cause))?;
-        let timed = match timed {
-            Ok(timed) => timed,
-            // The end cannot be met at its speed: it is met at rest.
-            Err(_) => {
-                let exit = core::mem::replace(&mut run.exit, End::Rest);
-                let timed = self.time(&run, draft.shares).map_err(|cause| self.refusal(cause))?;
-                match (timed, self.step_evenly(&run, draft.shares)) {
-                    (Ok(timed), _) => {
-                        run.follows = true;
-                        timed
-                    }
-                    (Err(_), Some(step)) => {
-                        run.exit = exit;
-                        step
-                    }
-                    (Err(found), None) => return Err(self.stuck(&run, &found)),
-                }
-            }
-        };
+        let timed = self.time_somehow(&mut run, draft.shares);
+        let timed = timed.map_err(|cause| self.refusal(cause))?;
+        let timed = timed.map_err(|found| self.stuck(&run, &found))?;
         self.add(run, timed, draft)
     }
 
+    /// Times the next stretch of `run` as it shall end, or else as it can: with a slower end, with an end
+    /// at rest, by the way to rest that is known, or a little way on as it is.
+    fn time_somehow(
+        &self,
+        run: &mut PathRun<N>,
+        shares: &Tightening,
+    ) -> Result<Result<Timed, Infeasible>, Refused> {
+        let found = match self.time(run, shares)? {
+            Ok(timed) => return Ok(Ok(timed)),
+            Err(found) => found,
+        };
+        let (exit, follows) = (run.exit, run.follows);
+        if let (true, End::Moving { speed, .. }) = (found.at_end, exit) {
+            let mut speed = speed * END_SHARE;
+            for _ in 0..END_TRIALS {
+                run.exit = End::Moving { speed, acceleration: 0.0 };
+                if self.can_leave(run, speed, shares)
+                    && let Ok(timed) = self.time(run, shares)?
+                {
+                    return Ok(Ok(timed));
+                }
+                speed *= END_SLOWER;
+            }
+        }
+        if found.at_end || run.fallback.is_none() {
+            (run.exit, run.follows) = (End::Rest, true);
+            if let Ok(timed) = self.time(run, shares)? {
+                return Ok(Ok(timed));
+            }
+            (run.exit, run.follows) = (exit, follows);
+        }
+        if let Some(law) = run.fallback.clone() {
+            let next = if law.places().end < run.path.length() {
+                Some(End::Rest)
+            } else {
+                run.exit = End::Rest;
+                None
+            };
+            return Ok(Ok(Timed { law, next, fallback: None }));
+        }
+        Ok(self.step_evenly(run, shares).ok_or(found))
+    }
+
     /// A little way on at the speed that the tool has, where there is no other yet: the limits that leave
-    /// no room to change it here may do so there.
-    fn step_evenly(&self, run: &PathRun<N>, shares: &Tightening) -> Option<Timed> {
-        let next @ End::Moving { speed, acceleration: 0.0 } = run.begin else { return None };
-        let to = run.at + speed * STEP;
+    /// no room to change it here may do so there, or behind the end.
+    fn step_evenly(&self, run: &mut PathRun<N>, shares: &Tightening) -> Option<Timed> {
+        let begin @ End::Moving { speed, acceleration: 0.0 } = run.begin else { return None };
+        let length = run.path.length();
+        let to = (run.at + speed * STEP).min(length);
         let mut along = AlongPath::new(&self.limits, &run.path, &run.speeds, &run.trail, shares);
         along.is_tool_free = true;
-        if to >= run.path.length() || !keeps_even(&mut along, run.at, to, speed) {
+        if !keeps_even(&mut along, run.at, to, speed) {
             return None;
         }
         let law = TimeLaw::even(run.at, to, speed, run.speeds[0].source.0);
-        Some(Timed { law, next: Some(next), fallback: None })
+        if to < length {
+            return Some(Timed { law, next: Some(begin), fallback: None });
+        }
+        if self.front.goes_on || !self.can_leave(run, speed, shares) {
+            return None;
+        }
+        run.exit = begin;
+        Some(Timed { law, next: None, fallback: None })
     }
 
     /// A motion that cannot go on, which the plan of the window before excludes.
@@ -285,8 +322,12 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         if begins {
             self.note_drawn(&run.contour, false, draft);
         }
+        if run.even.is_some_and(|speed| !law.is_even_at(speed)) {
+            run.even = None;
+        }
         self.account(&run, &law, draft);
         let places = law.places();
+        let last = law.at(duration);
         run.reach = (WINDOW * (places.end - places.start) / duration).max(run.least_reach);
         let motion = Motion::Path {
             path: run.path.clone(),
@@ -301,7 +342,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
                 run.fallback = fallback;
                 self.front.run = Some(run);
             }
-            None => self.leave(&run, draft.shares)?,
+            None => self.leave(&run, last.velocity)?,
         }
         Ok(())
     }
@@ -316,27 +357,13 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         }
     }
 
-    /// Ends a path: the joints are where it ends, at rest or moving.
-    fn leave(&mut self, run: &PathRun<N>, shares: &Tightening) -> Result<(), PlanError> {
+    /// Ends a path: the joints are where it ends, at rest or moving at `speed` [m/s].
+    fn leave(&mut self, run: &PathRun<N>, speed: f64) -> Result<(), PlanError> {
         let end = run.path.end();
         let tool = end.motion(1.0, 0.0, 0.0);
-        let Configuration { joints, mut branch } = run.trail[run.trail.len() - 1].1;
-        let motion = self.limits.follow(&tool, &mut branch, &joints);
-        let motion = motion.map_err(|cause| self.refusal(Refused::Kinematics(cause)))?;
-        self.front.now = Configuration { joints: motion.position, branch };
-        let speed = match (run.even, run.exit) {
-            (Some(speed), End::Moving { .. }) => Some(speed * shares.speed),
-            (None, End::Moving { speed, .. }) => Some(speed),
-            (_, End::Rest) => None,
-        };
-        self.front.moving = speed.map(|speed| {
-            let tool = end.motion(speed, 0.0, 0.0);
-            State {
-                position: tool.position,
-                velocity: tool.velocity,
-                acceleration: tool.acceleration,
-            }
-        });
+        let now = self.joints_at(&tool, &run.trail[run.trail.len() - 1].1);
+        self.front.now = now.map_err(|cause| self.refusal(cause))?;
+        self.front.moving = (run.exit != End::Rest).then(|| state(&end, speed));
         Ok(())
     }
 
@@ -356,7 +383,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             let asked = self.task.speeds.of(demand.speed) * self.faster(demand);
             let asked = if is_named { asked } else { limit };
             let mean = (part.places.end - part.places.start) / part.duration;
-            let speed = run.even.map_or(mean.min(limit), |even| even * draft.shares.speed);
+            let speed = run.even.unwrap_or(mean.min(limit));
             draft.speed = draft.speed.max(speed);
             let slowed = Slowed { line, asked, speed, place: position };
             let worse = slowest.is_none_or(|worst| speed / asked < worst.speed / worst.asked);

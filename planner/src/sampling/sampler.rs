@@ -219,6 +219,11 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         self.is_complete || self.trajectory.end() >= ahead * CYCLE_TIME
     }
 
+    /// Whether nothing comes after what is known of the motion.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.is_complete
+    }
+
     /// Whether the last setpoint has been made.
     pub(crate) fn has_ended(&self) -> bool {
         self.state != Stream::Running
