@@ -1,7 +1,6 @@
 //! Why a job was refused.
 
 use machine::kinematics::KinematicsError;
-use messages::MAX_EDGES;
 
 use crate::verify::checker::{LimitViolation, Quantity};
 
@@ -39,14 +38,6 @@ pub enum PlanError {
         line: u64,
         /// How long it lasts [s].
         duration: f64,
-    },
-    /// The laser changes more often in one cycle than a setpoint can say.
-    #[error("the laser would change more than {MAX_EDGES} times in the millisecond at {time:.3} s")]
-    TooManyEdges {
-        /// Line of the job file, 0 for none.
-        line: u64,
-        /// Stream time [s].
-        time: f64,
     },
     /// The tool cannot get there.
     #[error("{place}: the tool cannot be there: {cause}")]
@@ -142,7 +133,6 @@ impl PlanError {
         match self {
             Self::IdealOnly(_) | Self::Abandoned | Self::TooLong { .. } => 0,
             Self::TooShort { line, .. }
-            | Self::TooManyEdges { line, .. }
             | Self::Unreadable { line, .. }
             | Self::Unreachable { line, .. }
             | Self::NoConfiguration { line, .. }

@@ -46,6 +46,7 @@ use crate::verify::interpolation::InterpolationCheck;
 use account::{Account, Asked, Slowed};
 use operations::OperationQueue;
 use paths::PathRun;
+use refusals::too_short;
 pub(crate) use trials::{Failure, Trials};
 use windows::dot as dot_of;
 
@@ -442,8 +443,8 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
                 self.note_rapid(&dot.at);
                 self.go_to(dot.at, draft)?;
                 let start = self.front.time;
-                let lit = self.front.light.dot(start, &dot.exposures);
-                lit.map_err(|short| self.too_short(short))?;
+                let light = &mut self.front.light;
+                light.dot(start, &dot.exposures, operation.line).map_err(too_short)?;
                 draft.strokes.push(dot_of(&dot.at, operation.line));
                 let time = dot.exposures.iter().map(|(time, _)| time).sum();
                 self.front.estimated += time;
@@ -536,6 +537,9 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
                 return Err(PlanError::Abandoned);
             }
             let front = &mut self.front;
+            if front.sampler.is_crowded() {
+                return Err(self.limit(LimitViolation::too_many_changes(setpoint)));
+            }
             if let Err(violation) = front.checker.check(setpoint, self.limits.axes, self.area) {
                 return Err(self.limit(violation));
             }

@@ -331,22 +331,3 @@ impl Contour {
         self.end().first.normalize()
     }
 }
-
-impl Contour {
-    /// Lowers the speed asked for wherever the light would change more than `most` times in `time`
-    /// [s], `top` being the machine's speed [m/s]. Gives the first line that is slowed.
-    pub(crate) fn limit_change_rate(&mut self, most: usize, time: f64, top: f64) -> Option<u64> {
-        let mut slowed = None;
-        for first in 0..self.demands.len().saturating_sub(most) {
-            let room = self.demands[first + most].from - self.demands[first].from;
-            let speed = room / time;
-            for demand in &mut self.demands[first..first + most] {
-                if speed < demand.speed.unwrap_or(top) {
-                    demand.speed = Some(speed);
-                    slowed = slowed.or(Some(demand.line));
-                }
-            }
-        }
-        slowed
-    }
-}

@@ -7,8 +7,6 @@ use std::sync::Arc;
 use machine::kinematics::KinematicsError;
 use machine::surface::Surface;
 use machine::{CornerMode, LaserSource, PathLimits};
-use messages::MAX_EDGES;
-use messages::time::CYCLE_TIME;
 use nalgebra::Vector3;
 
 use crate::drawing::{Action, Corners, Curve, Note, Step};
@@ -16,14 +14,12 @@ use crate::geometry::contour::{Contour, Demand, GAP, Joining};
 use crate::geometry::polyline::{Chord, Polyline, goes_straight};
 use crate::geometry::projected;
 use crate::geometry::track::Track;
-use crate::job::Marking;
+use crate::job::{Marking, MarkingSpeed};
 use crate::light::Policy;
+use crate::light::exposure::change_speeds;
 
 /// Shorter moves are not made [m].
 const NOTHING: f64 = 1e-12;
-
-/// Changes of the light that a cycle has room for beside those that follow the speed.
-const EDGES: usize = MAX_EDGES - 2;
 
 /// A step between two rows of a raster is shorter than this [m], and than this share of the rows.
 const ROW_STEP: f64 = 1e-3;
@@ -366,8 +362,8 @@ impl<'a> Operations<'a> {
         let line = contour.line;
         let is_first = !contour.goes_on_from_before();
         let extent = Extent::of(&contour);
-        let (mut contour, left) = without_dark_ends(contour, goes_on, &self.limits);
-        self.limit_changes(&mut contour);
+        let (contour, left) = without_dark_ends(contour, goes_on, &self.limits);
+        self.note_changes(&contour);
         if is_first {
             self.leave_approach();
             self.leave_row_step(&extent);
@@ -404,13 +400,20 @@ impl<'a> Operations<'a> {
         least
     }
 
-    /// Slows the path where the light would change more often than a cycle can say.
-    fn limit_changes(&mut self, contour: &mut Contour) {
-        if let Some(line) = contour.limit_change_rate(EDGES, CYCLE_TIME, self.limits.speed) {
+    /// Tells of a path that is slowed since its light would change more often than a cycle can say.
+    fn note_changes(&mut self, contour: &Contour) {
+        let top = self.limits.speed;
+        let asked = |demand: &Demand| match self.marking.speed {
+            Some(MarkingSpeed::Constant(speed)) => speed.min(top),
+            _ => demand.speed.unwrap_or(top).min(top),
+        };
+        let mut slowed = contour.demands().iter().zip(change_speeds(contour));
+        if let Some((Demand { line, .. }, _)) = slowed.find(|(demand, most)| *most < asked(demand))
+        {
             let text =
                 "slowed here: the power changes more often than a 1 ms cycle can carry".to_owned();
             if !self.notes.iter().any(|note| note.text == text) {
-                self.notes.push(Note { line, text });
+                self.notes.push(Note { line: *line, text });
             }
         }
     }

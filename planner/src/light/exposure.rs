@@ -1,12 +1,13 @@
 //! When the laser changes along a path, and to which power.
 
 use machine::LaserSource;
-use messages::Nanoseconds;
 use messages::time::CYCLE_TIME;
+use messages::{MAX_EDGES, Nanoseconds};
 
 use crate::geometry::contour::{Contour, Demand, GAP};
 use crate::law::time_law::TimeLaw;
 use crate::light::Policy;
+use crate::limits::along::SpeedLimit;
 use crate::trajectory::LaserChange;
 
 /// The laser along a job so far.
@@ -25,8 +26,16 @@ pub(crate) struct Light {
 /// Light that is shorter than the source can switch, or its pause.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TooShort {
+    /// Line of the job file, 0 for none.
+    pub(crate) line: u64,
     /// How long it lasts [s].
     pub(crate) duration: f64,
+}
+
+impl TooShort {
+    fn at(self, line: u64) -> Self {
+        Self { line, ..self }
+    }
 }
 
 impl Light {
@@ -48,8 +57,14 @@ impl Light {
         core::mem::take(&mut self.changes)
     }
 
-    /// Lights a dot from `start` on, one exposure after the other: times [s] and powers.
-    pub(crate) fn dot(&mut self, start: f64, exposures: &[(f64, f64)]) -> Result<(), TooShort> {
+    /// Lights the dot of a line of the job file from `start` on, one exposure after the other: times [s] and
+    /// powers.
+    pub(crate) fn dot(
+        &mut self,
+        start: f64,
+        exposures: &[(f64, f64)],
+        line: u64,
+    ) -> Result<(), TooShort> {
         self.stroke += 1;
         let duration: f64 = exposures.iter().map(|(time, _)| time).sum();
         let mut time = start;
@@ -57,20 +72,21 @@ impl Light {
             self.to(time, *power);
             time += length;
         }
-        self.off(time, duration)
+        self.off(time, duration).map_err(|short| short.at(line))
     }
 
     /// Lights the stretches of `contour` that `law` goes through from `start` on [s]. Power that is
     /// asked for at a speed follows the true one where the policy, or the lack of room for a
-    /// run-in, says so. `asked` gives the speed of a demand as the job has it [m/s], and how much faster it
-    /// is asked for now, which the power makes up for.
+    /// run-in, says so. Where the `limits` in force allow more than the job asks for, as `asked` gives it
+    /// for a demand [m/s], power makes up for what the tool is faster.
     pub(crate) fn path(
         &mut self,
         contour: &Contour,
         law: &TimeLaw,
         start: f64,
         follows: bool,
-        asked: &dyn Fn(&Demand) -> (f64, f64),
+        asked: &dyn Fn(&Demand) -> f64,
+        limits: &[SpeedLimit],
     ) -> Result<(), TooShort> {
         let places = law.places();
         let follows = follows || contour.policy == Policy::Proportional;
@@ -82,50 +98,50 @@ impl Light {
             let [begin, until] = [from, to].map(|place| start + law.time_at(place));
             if demand.power <= 0.0 {
                 if self.is_lit && to - from > GAP {
-                    self.off(begin, f64::INFINITY)?;
+                    self.off(begin, f64::INFINITY).map_err(|short| short.at(demand.line))?;
                 }
                 continue;
             }
             if !self.is_lit {
                 self.stroke += 1;
             }
-            let (speed, faster) = asked(&demand);
+            let power = demand.power;
+            let exposure = Exposure { power, speed: asked(&demand), limits };
+            let LaserSource { min_power, proportional_floor, .. } = self.source;
             if follows {
-                self.follow(
-                    [demand.power, demand.power * faster],
-                    speed,
-                    law,
-                    [start, begin, until],
-                );
+                let least = (power * proportional_floor).max(min_power).min(power);
+                self.follow(&exposure, least, law, [start, begin, until]);
+            } else if exposure.most([from, to]) > power {
+                self.follow(&exposure, power, law, [start, begin, until]);
             } else {
-                self.to(begin, demand.power * faster);
+                self.to(begin, power);
             }
         }
         if places.end >= contour.length() - GAP && self.is_lit {
-            let duration = until_end(law, start) - self.last.time.seconds();
-            self.off(start + law.duration(), duration)?;
+            let end = start + law.duration();
+            let duration = end - self.last.time.seconds();
+            let line = contour.demands().last().map_or(contour.line, |demand| demand.line);
+            self.off(end, duration).map_err(|short| short.at(line))?;
         }
         Ok(())
     }
 
-    /// Power in proportion to the mean speed of each cycle, `power` at the speed `asked` [m/s] and `most`
-    /// at most, down to what the source and the policy leave.
+    /// Power in proportion to the mean speed of each cycle, not below `least`.
     fn follow(
         &mut self,
-        [power, most]: [f64; 2],
-        asked: f64,
+        exposure: &Exposure<'_>,
+        least: f64,
         law: &TimeLaw,
         [start, begin, until]: [f64; 3],
     ) {
-        let LaserSource { min_power, proportional_floor, .. } = self.source;
-        let least = (power * proportional_floor).max(min_power).min(power);
         let mut from = begin;
         while from < until {
             let border = ((from / CYCLE_TIME + 1e-6).floor() + 1.0) * CYCLE_TIME;
             let to = border.min(until);
             let [here, there] = [from, to].map(|time| law.at(time - start).position);
             let speed = (there - here) / (to - from);
-            self.to(from, (power * speed / asked).min(most).max(least));
+            let most = exposure.most([here, there]);
+            self.to(from, (exposure.power * speed / exposure.speed).min(most).max(least));
             from = to;
         }
     }
@@ -149,7 +165,7 @@ impl Light {
         self.is_lit = false;
         let on = self.changes.iter().rev().take_while(|change| change.stroke == self.stroke).last();
         if on.is_some_and(|on| time <= on.time) {
-            return Err(TooShort { duration });
+            return Err(TooShort { line: 0, duration });
         }
         while self.changes.last().is_some_and(|change| change.time >= time) {
             self.changes.pop();
@@ -169,8 +185,29 @@ pub(crate) fn told_ahead(source: &LaserSource) -> f64 {
     source.on_delay.max(source.off_delay)
 }
 
-fn until_end(law: &TimeLaw, start: f64) -> f64 {
-    start + law.duration()
+/// What a job asks for: so much power at a speed [m/s].
+struct Exposure<'a> {
+    power: f64,
+    speed: f64,
+    /// The limits of the speed that are in force.
+    limits: &'a [SpeedLimit],
+}
+
+impl Exposure<'_> {
+    /// The power that makes up for the largest speed that is allowed between two places [m], never less
+    /// than what is asked for and never more than there is.
+    fn most(&self, [from, to]: [f64; 2]) -> f64 {
+        /// What rounding may add to a speed that is as asked for.
+        const ROUNDING: f64 = 1e-9;
+        let first = self.limits.partition_point(|limit| limit.from <= from).max(1) - 1;
+        let between = self.limits[first..].iter().take_while(|limit| limit.from <= to);
+        let fastest = between.map(|limit| limit.speed).fold(0.0, f64::max);
+        if fastest > self.speed * (1.0 + ROUNDING) {
+            (self.power * fastest / self.speed).min(1.0)
+        } else {
+            self.power
+        }
+    }
 }
 
 /// The speed at which each stretch of light, and each pause between two, lasts long enough for the
@@ -193,4 +230,21 @@ pub(crate) fn source_speeds(contour: &Contour, source: &LaserSource) -> Vec<f64>
             (to - demand.from) / (least + APART)
         })
         .collect()
+}
+
+/// Changes of the light that a cycle has room for beside those that follow the speed.
+const CHANGES: usize = MAX_EDGES - 2;
+
+/// The speed at which the light changes no more often than a cycle can say [m/s]: by stretch, infinite
+/// where there is no such need.
+pub(crate) fn change_speeds(contour: &Contour) -> Vec<f64> {
+    let demands = contour.demands();
+    let mut speeds = vec![f64::INFINITY; demands.len()];
+    for first in 0..demands.len().saturating_sub(CHANGES) {
+        let room = demands[first + CHANGES].from - demands[first].from;
+        for speed in &mut speeds[first..first + CHANGES] {
+            *speed = speed.min(room / CYCLE_TIME);
+        }
+    }
+    speeds
 }

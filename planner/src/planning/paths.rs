@@ -20,7 +20,7 @@ use crate::law::row::Side;
 use crate::law::time_law::TimeLaw;
 use crate::law::windows::{even_speed, keeps_even};
 use crate::light::Policy;
-use crate::light::exposure::source_speeds;
+use crate::light::exposure::{change_speeds, source_speeds};
 use crate::limits::along::{AlongPath, SpeedLimit};
 use crate::limits::limit_id::LimitId;
 use crate::limits::motion_limits::Scope;
@@ -159,8 +159,10 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     pub(super) fn speed_limits(&self, contour: &Contour) -> Vec<SpeedLimit> {
         let path = &self.limits.path;
         let by_source = source_speeds(contour, &self.task.machine.laser);
+        let by_light = by_source.into_iter().zip(change_speeds(contour));
+        let by_light = by_light.map(|(source, changes)| source.min(changes));
         let mut limits: Vec<SpeedLimit> = Vec::new();
-        for (demand, least) in contour.demands().iter().zip(by_source) {
+        for (demand, least) in contour.demands().iter().zip(by_light) {
             let (speed, source) = if demand.power > 0.0 {
                 let most = self.task.speeds.most;
                 let asked = self.task.speeds.of(demand.speed) * self.faster(demand);

@@ -9,6 +9,11 @@ use crate::light::exposure::TooShort;
 use crate::sampling::sampler::Unreachable;
 use crate::verify::checker::{LimitViolation, Quantity};
 
+/// What it means that light is too short for the source.
+pub(super) fn too_short(TooShort { line, duration }: TooShort) -> PlanError {
+    PlanError::TooShort { line, duration }
+}
+
 impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     fn place(&self, time: f64) -> (u64, Place) {
         let piece = self.front.sampler.piece_at(time);
@@ -24,10 +29,6 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     pub(super) fn unreachable(&self, found: Unreachable) -> PlanError {
         let (line, place) = self.place(found.time);
         PlanError::Unreachable { line, place, cause: found.cause }
-    }
-
-    pub(super) fn too_short(&self, short: TooShort) -> PlanError {
-        PlanError::TooShort { line: self.front.line, duration: short.duration }
     }
 
     /// What it means that nothing can be done from where the job is now.

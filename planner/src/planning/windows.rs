@@ -9,6 +9,7 @@ use messages::time::CYCLE_TIME;
 use nalgebra::Vector3;
 
 use super::paths::{END_SHARE, END_SLOWER, END_TRIALS, PathRun};
+use super::refusals::too_short;
 use super::run_in_out::state;
 use super::{Draft, Planning, Slowed, plateau};
 use crate::error::PlanError;
@@ -309,11 +310,9 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let stops = next == Some(End::Rest) || (run.at > 0.0 && run.begin == End::Rest);
         let follows = run.follows || stops;
         let speeds = &self.task.speeds;
-        let asked = |demand: &Demand| (speeds.asked(demand.speed), self.faster(demand));
-        let mut light = self.front.light.clone();
-        let lit = light.path(&run.contour, &law, start, follows, &asked);
-        self.front.light = light;
-        lit.map_err(|short| self.too_short(short))?;
+        let asked = |demand: &Demand| speeds.asked(demand.speed);
+        let light = &mut self.front.light;
+        light.path(&run.contour, &law, start, follows, &asked, &run.speeds).map_err(too_short)?;
         let stroke = if run.contour.is_lit() {
             (before + 1).min(self.front.light.stroke.max(1))
         } else {

@@ -63,6 +63,7 @@ pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
     motor_velocity: Joints<N>,
     effort: Joints<N>,
     laser: Gate,
+    is_crowded: bool,
     next_output: usize,
     outputs: u64,
     next_pause: usize,
@@ -171,6 +172,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             motor_velocity: Joints::zeros(),
             effort,
             laser: Gate::default(),
+            is_crowded: false,
             next_output: 0,
             outputs: 0,
             next_pause: 0,
@@ -217,6 +219,11 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     fn is_known(&self) -> bool {
         let ahead = self.sequence as f64 + 1.0 + self.told_ahead;
         self.is_complete || self.trajectory.end() >= ahead * CYCLE_TIME
+    }
+
+    /// Whether the laser changes more often in the cycle of the last sample than a setpoint can say.
+    pub(crate) fn is_crowded(&self) -> bool {
+        self.is_crowded
     }
 
     /// Whether nothing comes after what is known of the motion.
@@ -370,9 +377,9 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     }
 
     /// Puts the laser in the cycle that starts with this sample, and the stroke it lights, into
-    /// `setpoint`. A change that the cycle cannot hold is left to the next one; the checker refuses such
-    /// a stream.
+    /// `setpoint`. A change that the cycle cannot hold is left to the next one, and told.
     fn light(&mut self, setpoint: &mut Setpoint) {
+        self.is_crowded = false;
         let start = self.sequence as i64 * CYCLE;
         let cycle = &mut setpoint.laser;
         cycle.gate = gate(self.laser.power, self.laser.stroke);
@@ -389,6 +396,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
                 power: change.power,
             };
             if !cycle.push(edge) {
+                self.is_crowded = true;
                 break;
             }
             self.laser =

@@ -4,7 +4,7 @@ use machine::trip::Limit;
 use machine::trip::following::DISCONTINUITY;
 use machine::{Axis, DcMotor, Friction, Machine, Motor, PathLimits, WorkArea};
 use messages::time::CYCLE_TIME;
-use messages::{AxisArray, MAX_AXES, Setpoint};
+use messages::{AxisArray, MAX_AXES, MAX_EDGES, Setpoint};
 
 use messages::plan::LimitUtilization;
 
@@ -54,6 +54,10 @@ pub enum Quantity {
     MotorTorque,
     /// Rate of a stepper's pulses [1/s].
     PulseRate,
+    /// Power of the laser [fraction of full scale].
+    LaserPower,
+    /// Changes of the laser in a cycle.
+    LaserChanges,
 }
 
 impl Quantity {
@@ -77,6 +81,8 @@ impl Quantity {
             Self::HeatingCurrent => "root mean square of current",
             Self::MotorTorque => "motor torque",
             Self::PulseRate => "pulse rate",
+            Self::LaserPower => "power of the laser",
+            Self::LaserChanges => "changes of the laser in a millisecond",
         }
     }
 
@@ -85,9 +91,9 @@ impl Quantity {
         matches!(self, Self::ToolPosition(_) | Self::JointPosition | Self::JointJump)
     }
 
-    /// Whether it comes of all the motion before, and not of that at one instant.
-    pub fn sums_up(self) -> bool {
-        self == Self::HeatingCurrent
+    /// Whether it is of the light, of which the source is told ahead of the motion that it belongs to.
+    pub fn is_light(self) -> bool {
+        matches!(self, Self::LaserPower | Self::LaserChanges)
     }
 }
 
@@ -112,6 +118,20 @@ pub struct LimitViolation {
     pub limit: f64,
     /// The unit of both.
     pub unit: &'static str,
+}
+
+impl LimitViolation {
+    /// More changes of the laser in the cycle of `setpoint` than it has room for.
+    pub(crate) fn too_many_changes(setpoint: &Setpoint) -> Self {
+        Self {
+            time: setpoint.sequence as f64 * CYCLE_TIME,
+            axis: None,
+            quantity: Quantity::LaserChanges,
+            value: (MAX_EDGES + 1) as f64,
+            limit: MAX_EDGES as f64,
+            unit: "changes",
+        }
+    }
 }
 
 /// The largest value so far of a quantity whose limit stays the same. Only a value beyond it needs to be
@@ -228,6 +248,7 @@ impl Checker {
         area: &WorkArea,
     ) -> Result<(), LimitViolation> {
         let time = setpoint.sequence as f64 * CYCLE_TIME;
+        light(setpoint, time)?;
         self.path(setpoint, time)?;
         if self.scope == Scope::PathAlone {
             return Ok(());
@@ -390,6 +411,20 @@ fn sizing(axis: &Axis, effort: f64, acceleration: f64, speed: f64) -> f64 {
 /// `speed`, or 0 of a motor that stands: whatever stands is taken to be starting.
 fn standing(speed: f64) -> f64 {
     if Friction::is_standing(speed) { 0.0 } else { speed }
+}
+
+/// Whether drives can do what is asked of the laser.
+#[inline]
+fn light(setpoint: &Setpoint, time: f64) -> Result<(), LimitViolation> {
+    let laser = &setpoint.laser;
+    if laser.is_valid() {
+        return Ok(());
+    }
+    for power in laser.edges().iter().map(|edge| edge.power).chain([laser.power]) {
+        let quantity = Quantity::LaserPower;
+        within(power, power.clamp(0.0, 1.0), Named { time, axis: None, quantity, unit: "" })?;
+    }
+    Err(LimitViolation::too_many_changes(setpoint))
 }
 
 #[inline]
