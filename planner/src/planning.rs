@@ -47,7 +47,7 @@ use account::{Account, Asked, Slowed};
 use operations::OperationQueue;
 use paths::PathRun;
 use refusals::too_short;
-pub(crate) use trials::{Failure, Trials};
+use trials::{Failure, Trials};
 use windows::dot as dot_of;
 
 /// Rest before and after an output changes [s]: a cycle each.
@@ -109,6 +109,9 @@ pub(crate) struct Window {
     /// Stream time at its end [s], and an estimate of that at the end of the job.
     pub(crate) end: f64,
     pub(crate) estimate: f64,
+    /// Up to when the motion must have been sampled before nothing of the window can be found to break a
+    /// limit [s].
+    pub(crate) needed: f64,
 }
 
 /// What the planning of a window changes.
@@ -145,14 +148,14 @@ struct Front<const N: usize, M: Mechanism<N>> {
 
 /// Where planning can go back to.
 #[derive(Clone)]
-pub(crate) struct Checkpoint<const N: usize, M: Mechanism<N>> {
+struct Checkpoint<const N: usize, M: Mechanism<N>> {
     front: Front<N, M>,
     account: Account,
 }
 
 impl<const N: usize, M: Mechanism<N>> Checkpoint<N, M> {
     /// Stream time at which the next window begins [s].
-    pub(crate) fn time(&self) -> f64 {
+    fn time(&self) -> f64 {
         self.front.time
     }
 }
@@ -241,42 +244,64 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         Ok(Self { limits, area: &machine.area, task, operations, front, account, rate: 1.0 })
     }
 
-    /// The next window, with less and less of the limits that it breaks, from `trials` on; `None` after
-    /// the last. `may_go_back` says whether the window before can still be planned again.
+    /// The next window from `checkpoint` on, where planning is, with less and less of the limits that it
+    /// breaks, from `trials` on; `None` after the last. `may_go_back` says whether a window before can
+    /// still be planned again.
     ///
     /// # Errors
-    /// What no speed can do, with its place; or what only the window before can mend.
-    pub(crate) fn next_window(
+    /// What no speed can do, with its place; or what only a window before can mend.
+    fn next_window(
         &mut self,
-        mut trials: Trials,
+        checkpoint: &Checkpoint<N, M>,
+        trials: &mut Trials,
         may_go_back: bool,
         abandoned: &dyn Fn() -> bool,
     ) -> Result<Option<Window>, Failure> {
         if self.front.sampler.has_ended() {
             return Ok(None);
         }
-        let checkpoint = self.front.clone();
+        // What was broken last, and the first of it that the end of the window before has a part in.
         let mut before: Option<LimitViolation> = None;
+        let mut early: Option<PlanError> = None;
         loop {
+            if abandoned() {
+                return Err(Failure::Here(PlanError::Abandoned));
+            }
             let error = match self.attempt(trials.shares(), abandoned) {
                 Ok(draft) => return Ok(Some(self.keep(draft))),
                 Err(error) => error,
             };
             let PlanError::Limit { violation, .. } = &error else {
-                return Err(Failure::Here(error));
+                return Err(match early {
+                    Some(early) if error != PlanError::Abandoned => Failure::Before(early),
+                    _ => Failure::Here(error),
+                });
             };
-            let is_early = violation.time < checkpoint.time + REMEMBERED;
-            let is_the_same = before.as_ref() == Some(violation);
-            if may_go_back && is_early && is_the_same && trials.has_been_slowed() {
+            let may_mend = may_go_back && !violation.quantity.is_place();
+            let begins_after =
+                |time: f64| may_mend && !violation.quantity.is_light() && time < checkpoint.time();
+            let is_early = begins_after(violation.time - REMEMBERED);
+            let is_the_same = is_early && before.as_ref() == Some(violation);
+            // Nothing of this window has a part in it, or nothing that it does mends it.
+            if begins_after(violation.time + CYCLE_TIME / 2.0)
+                || (is_the_same && trials.has_been_slowed())
+            {
                 return Err(Failure::Before(error));
             }
-            if may_go_back && is_early && is_the_same {
+            if is_the_same {
                 trials.slow();
             } else if !trials.tighten(violation, self.limits.axes) {
-                return Err(Failure::Here(error));
+                return Err(match early {
+                    Some(early) => Failure::Before(early),
+                    None if is_early => Failure::Before(error),
+                    None => Failure::Here(error),
+                });
             }
             before = Some(violation.clone());
-            self.front = checkpoint.clone();
+            if is_early {
+                early.get_or_insert(error);
+            }
+            self.front = checkpoint.front.clone();
         }
     }
 
@@ -291,7 +316,14 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         account.length += length;
         account.strokes += strokes.iter().filter(|stroke| !stroke.goes_on).count() as u64;
         let (end, estimate) = (self.front.time, self.estimate());
-        Window { setpoints, trajectory, strokes, end, estimate }
+        // Of a motion that goes on for many windows all samples but the last have been checked.
+        let needed = if self.has_enough() { 0.0 } else { end + REMEMBERED };
+        Window { setpoints, trajectory, strokes, end, estimate, needed }
+    }
+
+    /// Up to when the motion has been sampled and checked [s].
+    fn sampled(&self) -> f64 {
+        self.front.sampler.time()
     }
 
     /// From the first motion to the end of the last window [s].
@@ -315,24 +347,23 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     }
 
     /// Where planning can be taken up again.
-    pub(crate) fn checkpoint(&self) -> Checkpoint<N, M> {
+    fn checkpoint(&self) -> Checkpoint<N, M> {
         Checkpoint { front: self.front.clone(), account: self.account.clone() }
     }
 
     /// Goes back to where `checkpoint` was taken.
-    pub(crate) fn restore(&mut self, checkpoint: Checkpoint<N, M>) {
+    fn restore(&mut self, checkpoint: Checkpoint<N, M>) {
         (self.front, self.account) = (checkpoint.front, checkpoint.account);
     }
 
-    /// Lets a window that is planned again use less of what `error` says was broken. Says whether that is
-    /// worth another trial.
-    pub(crate) fn tighten(&self, trials: &mut Trials, error: &PlanError) -> bool {
-        let PlanError::Limit { violation, .. } = error else { return false };
+    /// Lets a window that is planned again use less of what was broken. Says whether that is worth another
+    /// trial.
+    fn tighten(&self, trials: &mut Trials, violation: &LimitViolation) -> bool {
         trials.tighten(violation, self.limits.axes)
     }
 
     /// Lets go of what is needed no more when planning goes back to `oldest` at most.
-    pub(crate) fn release(&mut self, oldest: &Checkpoint<N, M>) {
+    fn release(&mut self, oldest: &Checkpoint<N, M>) {
         self.operations.release(oldest.front.next);
     }
 
@@ -375,7 +406,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         }
         draft.trajectory.pieces.extend(self.front.lead_in.take());
         self.hold_height();
-        let is_last = !self.advance(draft)?;
+        let mut is_last = !self.advance(draft)?;
+        // What takes no time is no window of its own: planning it again would mend nothing.
+        while !is_last && draft.trajectory.pieces.is_empty() {
+            is_last = !self.advance(draft)?;
+        }
         let light = &mut self.front.light;
         draft.trajectory.laser =
             if is_last { light.take_all() } else { light.take(self.front.time) };

@@ -13,18 +13,30 @@ use messages::plan::PlanFacts;
 /// What a plan comes to.
 type FactsOf<'f, const N: usize, M> = dyn Fn(&Planning<'_, N, M>) -> PlanFacts + 'f;
 
+/// How often windows are planned again before one of them can be handed on.
+const MOST_AGAIN: usize = 1000;
+
+/// A window that has been planned.
+struct Planned<const N: usize, M: Mechanism<N>> {
+    /// Where it was planned from, and with how much of the limits.
+    checkpoint: Checkpoint<N, M>,
+    trials: Trials,
+    window: Box<Window>,
+}
+
 /// Windows on their way from the planning to who takes them.
 pub(super) struct Ahead<const N: usize, M: Mechanism<N>> {
-    /// Each with where it was planned from.
-    waiting: VecDeque<(Checkpoint<N, M>, Box<Window>)>,
+    waiting: VecDeque<Planned<N, M>>,
     /// Their setpoints.
     setpoints: usize,
     /// Whether there is no window after these.
     is_over: bool,
     /// Whether a window has been taken since the rate changed.
     has_moved: bool,
-    /// The window that was planned again last, by its start, and how.
-    again: Option<(f64, Trials)>,
+    /// How the next window is planned: with less of the limits where it is planned again.
+    trials: Trials,
+    /// How often one has been planned again since one was taken.
+    again: usize,
 }
 
 impl<const N: usize, M: Mechanism<N>> Default for Ahead<N, M> {
@@ -34,7 +46,8 @@ impl<const N: usize, M: Mechanism<N>> Default for Ahead<N, M> {
             setpoints: 0,
             is_over: false,
             has_moved: true,
-            again: None,
+            trials: Trials::new(N),
+            again: 0,
         }
     }
 }
@@ -52,8 +65,8 @@ impl<const N: usize, M: Mechanism<N>> Ahead<N, M> {
                 return Err(PlanError::Abandoned);
             }
             self.heed_rate(planning, outlet);
-            self.hand_on(outlet);
-            let has_room = self.waiting.len() < 2 || self.setpoints < outlet.ahead();
+            self.hand_on(planning, outlet);
+            let has_room = !self.is_ready(planning) || self.setpoints < outlet.ahead();
             if !self.is_over && has_room {
                 self.plan_next(planning, outlet, facts)?;
             } else if self.waiting.is_empty() {
@@ -72,7 +85,7 @@ impl<const N: usize, M: Mechanism<N>> Ahead<N, M> {
             return;
         }
         let count = self.waiting.len();
-        if let Some((checkpoint, _)) = self.waiting.pop_front() {
+        if let Some(Planned { checkpoint, .. }) = self.waiting.pop_front() {
             planning.restore(checkpoint);
             outlet.forget(count);
             *self = Self::default();
@@ -81,22 +94,32 @@ impl<const N: usize, M: Mechanism<N>> Ahead<N, M> {
         planning.set_rate(rate);
     }
 
-    /// Hands on what there is room for. The newest window stays until the next is known: only then all of
-    /// its samples have been checked.
-    fn hand_on(&mut self, outlet: &mut dyn Outlet) {
-        while self.is_over || self.waiting.len() > 1 {
-            let Some((checkpoint, window)) = self.waiting.pop_front() else { return };
+    /// Whether the oldest window can be handed on: all samples that it has a part in have been checked, and
+    /// there is another to go on from, unless it is the last.
+    fn is_ready(&self, planning: &Planning<'_, N, M>) -> bool {
+        let Some(oldest) = self.waiting.front() else { return false };
+        let is_checked = oldest.window.needed <= planning.sampled();
+        self.is_over || (is_checked && self.waiting.len() > 1)
+    }
+
+    /// Hands on what there is room for.
+    fn hand_on(&mut self, planning: &Planning<'_, N, M>, outlet: &mut dyn Outlet) {
+        while self.is_ready(planning) {
+            let Some(Planned { checkpoint, trials, window }) = self.waiting.pop_front() else {
+                return;
+            };
             let count = window.setpoints.len();
             if let Err(window) = outlet.take(window) {
-                self.waiting.push_front((checkpoint, window));
+                self.waiting.push_front(Planned { checkpoint, trials, window });
                 return;
             }
             self.setpoints -= count;
             self.has_moved = true;
+            self.again = 0;
         }
     }
 
-    /// Plans the next window, or the last one again where only that can mend what the next would break.
+    /// Plans the next window, or one before it again where only that can mend what the next would break.
     fn plan_next(
         &mut self,
         planning: &mut Planning<'_, N, M>,
@@ -104,14 +127,16 @@ impl<const N: usize, M: Mechanism<N>> Ahead<N, M> {
         facts: &FactsOf<'_, N, M>,
     ) -> Result<(), PlanError> {
         let checkpoint = planning.checkpoint();
-        planning.release(self.waiting.front().map_or(&checkpoint, |(oldest, _)| oldest));
-        let trials = self.trials_at(checkpoint.time());
-        let may_go_back = !self.waiting.is_empty();
-        match planning.next_window(trials, may_go_back, &|| outlet.is_abandoned()) {
+        planning.release(self.waiting.front().map_or(&checkpoint, |oldest| &oldest.checkpoint));
+        let mut trials = core::mem::replace(&mut self.trials, Trials::new(N));
+        let may_go_back = !self.waiting.is_empty() && self.again < MOST_AGAIN;
+        let abandoned = || outlet.is_abandoned();
+        match planning.next_window(&checkpoint, &mut trials, may_go_back, &abandoned) {
             Ok(Some(window)) => {
                 self.setpoints += window.setpoints.len();
                 outlet.note(&window);
-                self.waiting.push_back((checkpoint, Box::new(window)));
+                let window = Box::new(window);
+                self.waiting.push_back(Planned { checkpoint, trials, window });
                 outlet.heed(&|| facts(planning), false);
             }
             Ok(None) => {
@@ -119,26 +144,35 @@ impl<const N: usize, M: Mechanism<N>> Ahead<N, M> {
                 outlet.heed(&|| facts(planning), true);
             }
             Err(Failure::Here(error)) => return Err(error),
-            Err(Failure::Before(error)) => {
-                let Some((before, window)) = self.waiting.pop_back() else { return Err(error) };
-                let mut trials = self.trials_at(before.time());
-                if !planning.tighten(&mut trials, &error) {
-                    return Err(error);
-                }
-                self.again = Some((before.time(), trials));
-                self.setpoints -= window.setpoints.len();
-                outlet.forget(1);
-                planning.restore(before);
-            }
+            Err(Failure::Before(error)) => self.go_back(error, planning, outlet)?,
         }
         Ok(())
     }
 
-    /// How the window that begins at `start` [s] is planned: less and less of the limits each time.
-    fn trials_at(&self, start: f64) -> Trials {
-        match &self.again {
-            Some((at, trials)) if *at == start => trials.clone(),
-            _ => Trials::new(N),
+    /// Goes back to the window in which `error` says that a limit is broken, or to the oldest that is still
+    /// here, and leaves it less of that limit.
+    fn go_back(
+        &mut self,
+        error: PlanError,
+        planning: &mut Planning<'_, N, M>,
+        outlet: &mut dyn Outlet,
+    ) -> Result<(), PlanError> {
+        let PlanError::Limit { violation, .. } = &error else { return Err(error) };
+        let is_begun = |planned: &Planned<N, M>| planned.checkpoint.time() <= violation.time;
+        let index = self.waiting.iter().rposition(is_begun).unwrap_or(0);
+        let mut again = self.waiting.drain(index..);
+        let Some(Planned { checkpoint, mut trials, window }) = again.next() else {
+            return Err(error);
+        };
+        if !planning.tighten(&mut trials, violation) {
+            return Err(error);
         }
+        let others: Vec<usize> = again.map(|planned| planned.window.setpoints.len()).collect();
+        self.setpoints -= window.setpoints.len() + others.iter().sum::<usize>();
+        outlet.forget(1 + others.len());
+        planning.restore(checkpoint);
+        self.trials = trials;
+        self.again += 1;
+        Ok(())
     }
 }

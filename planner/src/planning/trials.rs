@@ -16,16 +16,16 @@ const SHARE: f64 = 0.85;
 
 /// Why there is no next window.
 #[derive(Debug)]
-pub(crate) enum Failure {
+pub(super) enum Failure {
     /// What cannot be done.
     Here(PlanError),
-    /// A limit that is broken whatever the window does: by the end of the one before.
+    /// A limit that is broken whatever the window does: by the end of one before.
     Before(PlanError),
 }
 
 /// What a window may use of the limits, less with each trial.
 #[derive(Debug, Clone)]
-pub(crate) struct Trials {
+pub(super) struct Trials {
     shares: Tightening,
     count: usize,
     is_slower: bool,

@@ -226,6 +226,11 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         self.is_crowded
     }
 
+    /// When the next sample is [s].
+    pub(crate) fn time(&self) -> f64 {
+        self.sequence as f64 * CYCLE_TIME
+    }
+
     /// Whether nothing comes after what is known of the motion.
     pub(crate) fn is_complete(&self) -> bool {
         self.is_complete

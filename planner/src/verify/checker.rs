@@ -420,9 +420,11 @@ fn light(setpoint: &Setpoint, time: f64) -> Result<(), LimitViolation> {
     if laser.is_valid() {
         return Ok(());
     }
-    for power in laser.edges().iter().map(|edge| edge.power).chain([laser.power]) {
+    let mut powers = laser.edges().iter().map(|edge| edge.power).chain([laser.power]);
+    if let Some(power) = powers.find(|power| !(0.0..=1.0).contains(power)) {
         let quantity = Quantity::LaserPower;
-        within(power, power.clamp(0.0, 1.0), Named { time, axis: None, quantity, unit: "" })?;
+        let named = Named { time, axis: None, quantity, unit: "of full scale" };
+        return Err(named.broken(power, 1.0));
     }
     Err(LimitViolation::too_many_changes(setpoint))
 }
