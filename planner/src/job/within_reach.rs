@@ -4,12 +4,12 @@
 //! any of it is sent, and that tells what is wrong, and where.
 
 use machine::kinematics::Joints;
-use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea, ZMeaning};
+use machine::{Axis, Machine, Mechanism, MechanismVisitor, PathLimits, Pose, WorkArea, ZMeaning};
 use messages::math;
 use nalgebra::Vector3;
 
-use super::Job;
-use crate::drawing::{Action, Curve, Step};
+use super::{Job, MarkingSpeed};
+use crate::drawing::{Action, Corners, Curve, Step};
 use crate::geometry::attitude::AttitudeLaw;
 use crate::geometry::track::Track;
 use crate::joint_space::configuration::branches;
@@ -34,11 +34,24 @@ impl Job {
         let is_plain = self.surface.is_none() && self.attitude == AttitudeLaw::Level;
         let laser = &machine.laser;
         let may_be_too_short = laser.off_delay > laser.on_delay;
-        let time = self.survey.as_ref().map_or(0.0, |survey| survey.time);
         is_plain
             && !may_be_too_short
-            && time < LONG
+            && self.time(machine) < LONG
             && machine.mechanism.visit(Within { job: self, machine })
+    }
+}
+
+impl Job {
+    /// How long it is estimated to take [s].
+    fn time(&self, machine: &Machine) -> f64 {
+        let rapid = self.rapid.unwrap_or(machine.path.rapid);
+        let limits = PathLimits { rapid, ..machine.path };
+        let fixed = match self.marking.speed {
+            Some(MarkingSpeed::Constant(speed)) => Some(speed),
+            Some(MarkingSpeed::Optimum) | None => None,
+        };
+        let speed = |asked: Option<f64>| fixed.or(asked).unwrap_or(limits.speed).min(limits.speed);
+        self.estimate(&limits, &speed)
     }
 }
 
@@ -53,10 +66,13 @@ impl MechanismVisitor for Within<'_> {
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> bool {
         let Self { job, machine } = self;
         let mut reach = Reach::new(mechanism, machine);
+        let tolerance = job.marking.tolerance.unwrap_or(machine.path.tolerance);
+        reach.allow(tolerance);
         let mut extent = Extent::at(job.drawing.start);
         if let (true, Some(survey)) = (reach.is_linear, &job.survey) {
             // The first reading of a program has found its extent.
             let facts = &survey.facts;
+            reach.allow(survey.tolerance);
             for mut corner in [facts.lower, facts.upper] {
                 if machine.gcode.z == ZMeaning::Ignored {
                     corner[2] = extent.place.z;
@@ -65,10 +81,7 @@ impl MechanismVisitor for Within<'_> {
             }
             return extent.corners().all(|corner| reach.holds_point(&corner));
         }
-        let limits = &machine.path;
-        let estimate =
-            job.estimate(limits, &|speed| speed.unwrap_or(limits.speed).min(limits.speed));
-        if !reach.is_linear && estimate <= SHORT {
+        if !reach.is_linear && job.time(machine) <= SHORT {
             return false;
         }
         let Ok(steps) = job.steps() else { return false };
@@ -133,13 +146,22 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
             mechanism,
             area: &machine.area,
             axes: &machine.axes,
-            margin: 2.0 * machine.path.tolerance + DIGITS,
+            margin: DIGITS,
             near: home,
         }
     }
 
+    /// Leaves room for a path that may be `tolerance` from the drawn line [m].
+    fn allow(&mut self, tolerance: f64) {
+        self.margin = self.margin.max(2.0 * tolerance + DIGITS);
+    }
+
     fn holds(&mut self, step: &Step, extent: &mut Extent) -> bool {
         let curve = match &step.action {
+            Action::Corners(Corners::Blend(Some(tolerance))) => {
+                self.allow(*tolerance);
+                return true;
+            }
             Action::Mark { curve, .. } | Action::Feed { curve, .. } => *curve,
             Action::Rapid { to } => Curve::Line { from: extent.place, to: *to },
             _ => return true,

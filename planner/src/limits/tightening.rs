@@ -59,12 +59,8 @@ impl Tightening {
         [BY_PLACES[0] * self.acceleration, BY_PLACES[1] * self.jerk]
     }
 
-    /// Leaves less of what `violation` says was broken. `index` is that of its axis. Says whether a
-    /// slower motion can mend it.
-    pub(crate) fn tighten(&mut self, violation: &LimitViolation, index: Option<usize>) -> bool {
-        if violation.quantity.is_place() {
-            return false;
-        }
+    /// Leaves less of what `violation` says was broken. `index` is that of its axis.
+    pub(crate) fn tighten(&mut self, violation: &LimitViolation, index: Option<usize>) {
         let used = violation.value.abs() / violation.limit;
         let share = (BELOW / used).clamp(ROUND[0], ROUND[1]);
         let share = if share.is_finite() { share } else { ROUND[0] };
@@ -81,7 +77,6 @@ impl Tightening {
             (Quantity::PulseRate, Some(axis)) => axis.velocity *= share,
             _ => self.slow(0.85),
         }
-        true
     }
 
     /// The same with 1 % of the axes' limits in reserve. The way out of a path is planned with these, so that it

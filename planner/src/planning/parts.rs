@@ -35,7 +35,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let mut contour = contour;
         self.front.goes_on = true;
         while contour.length() < self.look_ahead(&self.speed_limits(&contour)) {
-            let Some(next) = self.take_next_part()? else { return Ok(contour) };
+            let Some(next) = self.operations.next_part(self.front.next)? else { break };
+            self.take_part(&next);
             contour = Arc::new(contour.followed_by(0.0, &next).0);
         }
         self.front.goes_on = self.operations.next_part(self.front.next)?.is_some();
@@ -49,17 +50,14 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         draft: &mut Draft<'_>,
     ) -> Result<(), PlanError> {
         while self.front.goes_on && run.path.length() - run.at < self.look_ahead(&run.speeds) {
-            let (before, estimated) = (self.front.next, self.front.estimated);
-            let longer = match self.take_next_part()? {
-                Some(next) => self.longer(run, &next, draft),
-                None => None,
-            };
-            match longer {
-                Some(longer) => *run = longer,
-                // It ends here, and the next part is a path of its own.
-                None => {
-                    (self.front.goes_on, self.front.next) = (false, before);
-                    self.front.estimated = estimated;
+            self.front.goes_on = false;
+            // Where the joints cannot go on it ends here, and the next part is a path of its own.
+            if let Some(next) = self.operations.next_part(self.front.next)? {
+                self.stays_inside(&next)?;
+                if let Some(longer) = self.longer(run, &next, draft) {
+                    *run = longer;
+                    self.take_part(&next);
+                    self.front.goes_on = self.operations.next_part(self.front.next)?.is_some();
                 }
             }
             if !self.front.goes_on {
@@ -77,21 +75,12 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         top * (plateau::LONGEST + 2.0 * WINDOW) + 20.0 * (stop + 1e-5)
     }
 
-    /// The next part of the path under way, if there is one.
-    fn take_next_part(&mut self) -> Result<Option<Arc<Contour>>, PlanError> {
-        let next = self.operations.next_part(self.front.next)?;
-        match &next {
-            Some(contour) => {
-                self.stays_inside(contour)?;
-                self.go_as_low_as(contour);
-                self.front.next += 1;
-                self.front.estimated += self.estimate_of(contour);
-                self.front.place = contour.end().point;
-                self.front.goes_on = self.operations.next_part(self.front.next)?.is_some();
-            }
-            None => self.front.goes_on = false,
-        }
-        Ok(next)
+    /// Counts the next part as one of the path under way.
+    fn take_part(&mut self, next: &Contour) {
+        self.go_as_low_as(next);
+        self.front.next += 1;
+        self.front.estimated += self.estimate_of(next);
+        self.front.place = next.end().point;
     }
 
     /// `run` with `next` behind it; `None` where the joints cannot go there without being turned back

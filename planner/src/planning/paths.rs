@@ -5,6 +5,7 @@ use std::sync::Arc;
 use machine::Mechanism;
 
 use super::entry::Entry;
+use super::parts::limit_at;
 use super::windows::Timed;
 use super::{Draft, Planning};
 use crate::drawing::Note;
@@ -87,8 +88,7 @@ impl<const N: usize> PathRun<N> {
         let demands = self.contour.demands();
         let after = demands.partition_point(|demand| demand.from <= place);
         let demand = demands.get(after.max(1) - 1).filter(|demand| demand.power > 0.0)?;
-        let after = self.speeds.partition_point(|speed| speed.from <= place);
-        Some((demand, self.speeds[after.max(1) - 1].speed))
+        Some((demand, limit_at(&self.speeds, place).speed))
     }
 }
 

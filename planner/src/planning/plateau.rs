@@ -4,6 +4,7 @@
 use machine::Mechanism;
 
 use super::Planning;
+use super::parts::limit_at;
 use super::paths::PathRun;
 use super::windows::Timed;
 use crate::law::End;
@@ -72,8 +73,7 @@ fn asked<const N: usize, M: Mechanism<N>>(
     along: &mut AlongPath<'_, '_, N, M>,
     place: f64,
 ) -> (f64, u16) {
-    let after = run.speeds.partition_point(|speed| speed.from <= place);
-    let limit = run.speeds[after.max(1) - 1].source.0;
+    let limit = limit_at(&run.speeds, place).source.0;
     (along.site(place, Side::After, &mut Vec::new()).speed, limit)
 }
 

@@ -150,7 +150,7 @@ fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
         (farthest > (value - limit).abs() / 2.0).then_some((step.line, farthest))
     };
     let steps = job.steps().into_iter().flatten().map_while(Result::ok);
-    let mut near = steps.skip_while(|step| step.line < *line).take(Job::HELD as usize);
+    let mut near = steps.skip_while(|step| step.line < *line);
     if let Some((step, farthest)) = near.find_map(leaves) {
         *line = step;
         violation.value = limit + farthest * (value - limit).signum();

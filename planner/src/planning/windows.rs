@@ -8,6 +8,7 @@ use messages::artwork::{Artwork, ArtworkLine, Stroke};
 use messages::time::CYCLE_TIME;
 use nalgebra::Vector3;
 
+use super::parts::limit_at;
 use super::paths::{END_SHARE, END_SLOWER, END_TRIALS, PathRun};
 use super::refusals::too_short;
 use super::run_in_out::state;
@@ -106,8 +107,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             let time = begin + TAIL * f64::from(look) / f64::from(TAIL_SAMPLES);
             let now = law.at(time.max(0.0));
             let tool = run.path.at(now.position).motion(now.velocity, now.acceleration, now.jerk);
-            let after = run.speeds.partition_point(|speed| speed.from <= now.position);
-            let speed = run.speeds[after.max(1) - 1].speed;
+            let speed = limit_at(&run.speeds, now.position).speed;
             let used = [
                 tool.velocity.norm() / speed,
                 tool.acceleration.norm() / path.acceleration,

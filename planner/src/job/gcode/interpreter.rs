@@ -221,6 +221,9 @@ impl Interpreter {
         };
         if corners != self.modal.corners {
             self.modal.corners = corners;
+            if let Corners::Blend(Some(tolerance)) = corners {
+                self.tracer.tolerance = self.tracer.tolerance.max(tolerance);
+            }
             self.tracer.push(Action::Corners(corners));
         }
         Ok(())

@@ -94,6 +94,7 @@ impl<R: Read> Steps<R> {
             lines: tracer.line,
             steps: (dropped + tracer.steps.len()) as u64,
             time: tracer.time,
+            tolerance: tracer.tolerance,
         };
         Ok((survey, (tracer.line <= most).then_some(tracer.steps)))
     }

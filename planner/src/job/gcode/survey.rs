@@ -49,6 +49,8 @@ pub struct Survey {
     /// A rough estimate of its time [s]: each move at its speed or the machine's largest, and the
     /// dwells, as if the tool started, stopped and turned in no time. Pauses are not counted.
     pub time: f64,
+    /// The largest distance from the drawn line that it allows at corners [m], 0 if it says none.
+    pub tolerance: f64,
 }
 
 /// Reads the program at `path` once, whole, without keeping it.

@@ -44,6 +44,8 @@ pub(super) struct Tracer {
     pub(super) facts: ProgramFacts,
     /// Time so far, as if no corner and no start took any [s].
     pub(super) time: f64,
+    /// The largest distance from the drawn line that is allowed at corners so far [m].
+    pub(super) tolerance: f64,
     /// Largest speeds of a mark and in the dark [m/s].
     fastest: [f64; 2],
 }
@@ -68,6 +70,7 @@ impl Tracer {
                 upper: start,
             },
             time: 0.0,
+            tolerance: 0.0,
             fastest: [settings.mark_speed, settings.rapid],
         }
     }
