@@ -16,6 +16,9 @@ mod run_in_out;
 mod trials;
 mod windows;
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -112,6 +115,9 @@ pub(crate) struct Window {
     /// Up to when the motion must have been sampled before nothing of the window can be found to break a
     /// limit [s].
     pub(crate) needed: f64,
+    /// Whether it is the way to rest that was planned with the window before, and the same whatever it may
+    /// use of the limits.
+    pub(crate) is_fixed: bool,
 }
 
 /// What the planning of a window changes.
@@ -183,6 +189,7 @@ struct Draft<'s> {
     notes: Vec<Note>,
     bound: BindingTimes,
     speed: f64,
+    is_fixed: bool,
 }
 
 impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
@@ -293,7 +300,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             } else if !trials.tighten(violation, self.limits.axes) {
                 return Err(match early {
                     Some(early) => Failure::Before(early),
-                    None if is_early => Failure::Before(error),
+                    None if may_mend => Failure::Before(error),
                     None => Failure::Here(error),
                 });
             }
@@ -307,6 +314,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
 
     fn keep(&mut self, (draft, setpoints): (Draft<'_>, Vec<Setpoint>)) -> Window {
         let Draft { trajectory, strokes, slowed, notes, bound, speed, length, asked, .. } = draft;
+        let is_fixed = draft.is_fixed;
         let account = &mut self.account;
         account.note_slowed(&slowed);
         account.notes.extend(notes);
@@ -318,7 +326,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         let (end, estimate) = (self.front.time, self.estimate());
         // Of a motion that goes on for many windows all samples but the last have been checked.
         let needed = if self.has_enough() { 0.0 } else { end + REMEMBERED };
-        Window { setpoints, trajectory, strokes, end, estimate, needed }
+        Window { setpoints, trajectory, strokes, end, estimate, needed, is_fixed }
     }
 
     /// Up to when the motion has been sampled and checked [s].
@@ -383,6 +391,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             notes: Vec::new(),
             bound: BindingTimes::default(),
             speed: 0.0,
+            is_fixed: false,
         };
         if !self.has_enough() {
             self.extend(&mut draft)?;

@@ -224,3 +224,35 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
             })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    fn is_within(program: &str, settings: &[&str]) -> bool {
+        let machine = Machine::builtin();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("program.nc");
+        std::fs::write(&path, format!("G21 G90\n{program}")).unwrap();
+        let settings: Vec<machine::Override> =
+            settings.iter().map(|setting| setting.parse().unwrap()).collect();
+        Job::read(&path, &settings, &machine).unwrap().is_surely_within_reach(&machine)
+    }
+
+    #[test]
+    fn a_job_with_a_wide_tolerance_is_not_surely_within_reach_near_an_edge() {
+        let near = "M3 S500\nG1 X99.9 F3000\nG1 Y20\n";
+        assert!(is_within(near, &[]));
+        assert!(!is_within(&format!("G64 P0.1\n{near}"), &[]));
+        assert!(!is_within(near, &["marking.tolerance=0.1 mm"]));
+        assert!(is_within(near, &["marking.tolerance=0.01 mm"]));
+    }
+
+    #[test]
+    fn a_job_that_may_be_too_long_is_not_surely_within_reach() {
+        assert!(!is_within("G4 P100000\n", &[]));
+        assert!(is_within("G4 P1000\n", &[]));
+    }
+}

@@ -199,9 +199,10 @@ impl Exposure<'_> {
     fn most(&self, [from, to]: [f64; 2]) -> f64 {
         /// What rounding may add to a speed that is as asked for.
         const ROUNDING: f64 = 1e-9;
-        let first = self.limits.partition_point(|limit| limit.from <= from).max(1) - 1;
-        let between = self.limits[first..].iter().take_while(|limit| limit.from <= to);
-        let fastest = between.map(|limit| limit.speed).fold(0.0, f64::max);
+        // What begins where this ends is asked for by another stretch.
+        let first = self.limits.partition_point(|limit| limit.from <= from + GAP).max(1) - 1;
+        let others = self.limits[first + 1..].iter().take_while(|limit| limit.from < to - GAP);
+        let fastest = others.fold(self.limits[first].speed, |most, limit| most.max(limit.speed));
         if fastest > self.speed * (1.0 + ROUNDING) {
             (self.power * fastest / self.speed).min(1.0)
         } else {

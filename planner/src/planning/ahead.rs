@@ -14,7 +14,7 @@ use messages::plan::PlanFacts;
 type FactsOf<'f, const N: usize, M> = dyn Fn(&Planning<'_, N, M>) -> PlanFacts + 'f;
 
 /// How often windows are planned again before one of them can be handed on.
-const MOST_AGAIN: usize = 1000;
+const MOST_AGAIN: usize = 200;
 
 /// A window that has been planned.
 struct Planned<const N: usize, M: Mechanism<N>> {
@@ -149,8 +149,8 @@ impl<const N: usize, M: Mechanism<N>> Ahead<N, M> {
         Ok(())
     }
 
-    /// Goes back to the window in which `error` says that a limit is broken, or to the oldest that is still
-    /// here, and leaves it less of that limit.
+    /// Goes back to the window in which `error` says that a limit is broken, or to one before it where that
+    /// cannot mend it, and leaves it less of that limit.
     fn go_back(
         &mut self,
         error: PlanError,
@@ -158,15 +158,16 @@ impl<const N: usize, M: Mechanism<N>> Ahead<N, M> {
         outlet: &mut dyn Outlet,
     ) -> Result<(), PlanError> {
         let PlanError::Limit { violation, .. } = &error else { return Err(error) };
-        let is_begun = |planned: &Planned<N, M>| planned.checkpoint.time() <= violation.time;
-        let index = self.waiting.iter().rposition(is_begun).unwrap_or(0);
+        let mends = |planned: &mut Planned<N, M>| {
+            planned.checkpoint.time() <= violation.time
+                && !planned.window.is_fixed
+                && planning.tighten(&mut planned.trials, violation)
+        };
+        let Some(index) = self.waiting.iter_mut().rposition(mends) else { return Err(error) };
         let mut again = self.waiting.drain(index..);
-        let Some(Planned { checkpoint, mut trials, window }) = again.next() else {
+        let Some(Planned { checkpoint, trials, window }) = again.next() else {
             return Err(error);
         };
-        if !planning.tighten(&mut trials, violation) {
-            return Err(error);
-        }
         let others: Vec<usize> = again.map(|planned| planned.window.setpoints.len()).collect();
         self.setpoints -= window.setpoints.len() + others.iter().sum::<usize>();
         outlet.forget(1 + others.len());

@@ -306,6 +306,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let start = self.front.time;
         let before = self.front.light.stroke;
         let begins = run.at == 0.0;
+        draft.is_fixed = run.fallback.as_ref() == Some(&law);
         // A stop in the light would burn.
         let stops = next == Some(End::Rest) || (run.at > 0.0 && run.begin == End::Rest);
         let follows = run.follows || stops;

@@ -449,3 +449,35 @@ impl Named<'_> {
         LimitViolation { time, axis: axis.map(str::to_owned), quantity, value, limit, unit }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use messages::GateEdge;
+
+    use super::*;
+
+    #[test]
+    fn light_that_drives_refuse_is_refused_before() {
+        let machine = Machine::builtin();
+        let check = |change: &dyn Fn(&mut Setpoint)| {
+            let mut setpoint = Setpoint::default();
+            change(&mut setpoint);
+            light(&setpoint, 0.0).map_err(|violation| violation.quantity)
+        };
+        assert_eq!(check(&|_| ()), Ok(()));
+        assert_eq!(check(&|it| it.laser.power = 1.0), Ok(()));
+        let beyond = 1.0 + f64::EPSILON;
+        for power in [beyond, -1e-9, f64::NAN] {
+            assert_eq!(check(&|it| it.laser.power = power), Err(Quantity::LaserPower));
+            let edge = GateEdge { offset: 1, gate: 1, power };
+            assert_eq!(check(&|it| assert!(it.laser.push(edge))), Err(Quantity::LaserPower));
+        }
+        let mut setpoint = Setpoint { tool: machine.home, ..Setpoint::default() };
+        setpoint.laser.power = beyond;
+        let mut checker = Checker::new(&machine, machine.path, Scope::PathAlone);
+        let checked = checker.check(&setpoint, &machine.axes, &machine.area);
+        assert_eq!(checked.unwrap_err().quantity, Quantity::LaserPower);
+    }
+}
