@@ -11,7 +11,8 @@ use crate::job::Job;
 use crate::joint_space::joint_move::JointMove;
 use crate::limits::motion_limits::Scope;
 use crate::planning::Window;
-use crate::planning::run::{Outlet, plan_windows};
+use crate::planning::outlet::Outlet;
+use crate::planning::run::plan_windows;
 use crate::sampling::sampler::Sampler;
 use crate::trajectory::{Motion, Trajectory};
 

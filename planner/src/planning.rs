@@ -3,16 +3,28 @@
 
 mod account;
 mod ahead;
+mod constant;
+mod drawn;
 mod entry;
 mod estimate;
+mod front;
 mod height;
+mod open_speeds;
 pub(crate) mod operations;
+pub(crate) mod outlet;
 mod parts;
+mod path_run;
 mod paths;
 mod plateau;
+mod rate;
 mod refusals;
 pub(crate) mod run;
 mod run_in_out;
+mod speeds;
+mod standing;
+mod steps;
+mod tail;
+mod timing;
 mod trials;
 mod windows;
 
@@ -20,7 +32,6 @@ mod windows;
 mod tests;
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 
 use machine::kinematics::Joints;
 use machine::{Machine, Mechanism, PathLimits, WorkArea};
@@ -31,15 +42,11 @@ use nalgebra::Vector3;
 
 use crate::drawing::{Note, Turns};
 use crate::error::{Place, PlanError};
-use crate::geometry::contour::Contour;
-use crate::geometry::operation::OperationKind;
 use crate::joint_space::configuration::Configuration;
 use crate::joint_space::joint_move::JointMove;
-use crate::joint_space::route::{Router, still};
-use crate::law::flight::State;
 use crate::law::optimum::Speeds;
 use crate::light::exposure::{Light, told_ahead};
-use crate::limits::limit_id::{BindingTimes, LimitId};
+use crate::limits::limit_id::BindingTimes;
 use crate::limits::motion_limits::{MotionLimits, Scope};
 use crate::limits::tightening::Tightening;
 use crate::sampling::sampler::{Sampler, Unreachable};
@@ -47,17 +54,9 @@ use crate::trajectory::{BEFORE, Motion, Piece, Trajectory};
 use crate::verify::checker::{Checker, LimitViolation};
 use crate::verify::interpolation::InterpolationCheck;
 use account::{Account, Asked, Slowed};
+use front::{Checkpoint, Front};
 use operations::OperationQueue;
-use paths::PathRun;
-use refusals::too_short;
 use trials::{Failure, Trials};
-use windows::dot as dot_of;
-
-/// Rest before and after an output changes [s]: a cycle each.
-const OUTPUT_REST: f64 = CYCLE_TIME;
-
-/// Rest before a pause [s], so that the springs of the transmission have settled.
-const PAUSE_REST: f64 = 0.1;
 
 /// Jobs that last longer are refused, most likely for a wrong number [s].
 const LONGEST: f64 = 7.0 * 86_400.0;
@@ -72,9 +71,6 @@ const ASK: u64 = 4096;
 /// The most setpoints of a window: a motion that lasts longer is checked as a whole, and then sampled
 /// again window by window.
 const MOST_SETPOINTS: usize = 4096;
-
-/// The longest part of a rest that is one window [s].
-const LONGEST_REST: f64 = 2.0;
 
 /// The rest before the first motion [s]: whole cycles, so that a source that is told ahead of the first
 /// light is told at rest.
@@ -118,52 +114,6 @@ pub(crate) struct Window {
     /// Whether it is the way to rest that was planned with the window before, and the same whatever it may
     /// use of the limits.
     pub(crate) is_fixed: bool,
-}
-
-/// What the planning of a window changes.
-#[derive(Clone)]
-struct Front<const N: usize, M: Mechanism<N>> {
-    now: Configuration<N>,
-    /// The tool's state where it does not rest.
-    moving: Option<State>,
-    run: Option<PathRun<N>>,
-    /// Whether that goes on in the next operation.
-    goes_on: bool,
-    /// How much longer it stands where it is [s].
-    standing: f64,
-    /// Number of the next operation, and parts of a path that was divided.
-    next: usize,
-    parts: VecDeque<Arc<Contour>>,
-    time: f64,
-    outputs: u64,
-    light: Light,
-    line: u64,
-    sampler: Sampler<N, M>,
-    checker: Checker,
-    interpolation: Option<InterpolationCheck>,
-    samples: u64,
-    /// The first rest, which belongs to the first window.
-    lead_in: Option<Piece>,
-    /// How long the operations so far were estimated to take [s], and where the tool is after them
-    /// [m].
-    estimated: f64,
-    place: Vector3<f64>,
-    /// The least z that was written up to this path, and of it [m].
-    lowest: [f64; 2],
-}
-
-/// Where planning can go back to.
-#[derive(Clone)]
-struct Checkpoint<const N: usize, M: Mechanism<N>> {
-    front: Front<N, M>,
-    account: Account,
-}
-
-impl<const N: usize, M: Mechanism<N>> Checkpoint<N, M> {
-    /// Stream time at which the next window begins [s].
-    fn time(&self) -> f64 {
-        self.front.time
-    }
 }
 
 /// A job under way.
@@ -354,25 +304,10 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         self.rate
     }
 
-    /// Where planning can be taken up again.
-    fn checkpoint(&self) -> Checkpoint<N, M> {
-        Checkpoint { front: self.front.clone(), account: self.account.clone() }
-    }
-
-    /// Goes back to where `checkpoint` was taken.
-    fn restore(&mut self, checkpoint: Checkpoint<N, M>) {
-        (self.front, self.account) = (checkpoint.front, checkpoint.account);
-    }
-
     /// Lets a window that is planned again use less of what was broken. Says whether that is worth another
     /// trial.
     fn tighten(&self, trials: &mut Trials, violation: &LimitViolation) -> bool {
         trials.tighten(violation, self.limits.axes)
-    }
-
-    /// Lets go of what is needed no more when planning goes back to `oldest` at most.
-    fn release(&mut self, oldest: &Checkpoint<N, M>) {
-        self.operations.release(oldest.front.next);
     }
 
     /// Plans, samples and checks one window.
@@ -438,133 +373,6 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         while !self.sample(MOST_SETPOINTS, abandoned)?.is_empty() {}
         self.front = front;
         Ok(())
-    }
-
-    /// Adds the next stretch of motion to `draft`. Says whether there was any left.
-    fn advance(&mut self, draft: &mut Draft<'_>) -> Result<bool, PlanError> {
-        if self.front.standing > 0.0 {
-            self.stand(self.front.standing, draft);
-            return Ok(true);
-        }
-        if self.front.run.is_some() {
-            self.go_on(draft)?;
-            return Ok(true);
-        }
-        if let Some(part) = self.front.parts.pop_front() {
-            self.front.line = part.line;
-            self.begin_path(part, draft)?;
-            return Ok(true);
-        }
-        let Some(operation) = self.operations.get(self.front.next)?.cloned() else {
-            self.halt(draft)?;
-            return Ok(false);
-        };
-        self.front.next += 1;
-        self.front.line = operation.line;
-        match &operation.kind {
-            OperationKind::Path(contour) => {
-                let before = self.front.lowest[1].min(self.front.place.z);
-                self.front.lowest = [before, f64::INFINITY];
-                self.note_rapid(&contour.start().point);
-                self.front.estimated += self.estimate_of(contour);
-                self.go_as_low_as(contour);
-                let contour = self.with_next_parts(contour.clone())?;
-                self.front.place = contour.end().point;
-                self.begin_path(contour, draft)?;
-            }
-            OperationKind::Rapid(to) => {
-                self.note_rapid(to);
-                self.go_to(*to, draft)?;
-            }
-            OperationKind::Rest(time) => {
-                self.front.estimated += time;
-                self.halt(draft)?;
-                if *time > 0.0 {
-                    self.stand(*time, draft);
-                }
-            }
-            OperationKind::Dot(dot) => {
-                self.note_rapid(&dot.at);
-                self.go_to(dot.at, draft)?;
-                let start = self.front.time;
-                let light = &mut self.front.light;
-                light.dot(start, &dot.exposures, operation.line).map_err(too_short)?;
-                draft.strokes.push(dot_of(&dot.at, operation.line));
-                let time = dot.exposures.iter().map(|(time, _)| time).sum();
-                self.front.estimated += time;
-                self.stand(time, draft);
-            }
-            OperationKind::Output { bit, on } => {
-                self.halt(draft)?;
-                let mask = 1_u64.checked_shl(*bit).unwrap_or(0);
-                let outputs = self.front.outputs;
-                self.front.outputs = if *on { outputs | mask } else { outputs & !mask };
-                let change = (self.front.time + OUTPUT_REST, self.front.outputs);
-                draft.trajectory.outputs.push(change);
-                self.stand(2.0 * OUTPUT_REST, draft);
-            }
-            OperationKind::Pause => {
-                self.halt(draft)?;
-                // One cycle before the end, so that the sample that pauses is at rest.
-                draft.trajectory.pauses.push(self.front.time + PAUSE_REST - CYCLE_TIME);
-                self.stand(PAUSE_REST, draft);
-            }
-        }
-        Ok(true)
-    }
-
-    /// Adds a piece of motion.
-    fn push(&mut self, duration: f64, motion: Motion, stroke: u64, draft: &mut Draft<'_>) {
-        let line = self.front.line;
-        let start = self.front.time;
-        match &motion {
-            Motion::Flight(flight) => {
-                let position = flight.at(duration / 2.0).position.into();
-                draft.bound.add(LimitId::DARK_TURN, duration, line, position);
-            }
-            Motion::Joints(JointMove { law: Some(law), .. })
-            | Motion::Path { law, is_lit: false, .. } => {
-                for part in law.binding() {
-                    draft.bound.add(LimitId(part.limit), part.duration, line, [0.0; 3]);
-                }
-            }
-            _ => {}
-        }
-        draft.trajectory.pieces.push(Piece { start, duration, motion, line, stroke });
-        self.front.time += duration;
-    }
-
-    /// Stands where the joints are, now and in as many of the next windows as `duration` takes [s].
-    fn stand(&mut self, duration: f64, draft: &mut Draft<'_>) {
-        let now = duration.min(LONGEST_REST);
-        self.front.standing = duration - now;
-        let rest = JointMove::standing(&self.front.now.joints, self.front.now.branch);
-        let stroke = self.front.light.stroke;
-        self.push(now, Motion::Rest(rest), stroke, draft);
-    }
-
-    /// Comes to rest, then goes to `to` in the dark.
-    fn go_to(&mut self, to: Vector3<f64>, draft: &mut Draft<'_>) -> Result<(), PlanError> {
-        self.halt(draft)?;
-        let approach = self.router(draft.shares).approach(&still(to), &[]);
-        let approach = approach.map_err(|cause| self.refusal(cause))?;
-        if let Some((duration, motion)) = approach.motion {
-            self.push(duration, motion, self.front.light.stroke, draft);
-        }
-        self.front.now = approach.start;
-        self.settle_at(&still(to))?;
-        Ok(())
-    }
-
-    /// Puts the joints where the tool's motion says, which the last move led to.
-    fn settle_at(&mut self, tool: &machine::kinematics::ToolMotion) -> Result<(), PlanError> {
-        let now = self.joints_at(tool, &self.front.now);
-        self.front.now = now.map_err(|cause| self.refusal(cause))?;
-        Ok(())
-    }
-
-    fn router<'r>(&'r self, shares: &'r Tightening) -> Router<'r, 'a, N, M> {
-        Router { limits: &self.limits, area: self.area, shares, now: self.front.now }
     }
 
     /// Samples as far as the motion is known, `most` times at most, and checks each sample.

@@ -1,9 +1,13 @@
 //! What is told of the windows so far.
 
+use machine::Mechanism;
 use nalgebra::Vector3;
 
+use super::path_run::PathRun;
+use super::{Draft, Planning};
 use crate::drawing::Note;
-use crate::limits::limit_id::BindingTimes;
+use crate::law::time_law::TimeLaw;
+use crate::limits::limit_id::{BindingTimes, LimitId};
 
 /// A line that the limits slow below what was asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,5 +83,37 @@ impl Account {
             text.push_str(&format!("; {} lines are slowed somewhere", self.slowed_lines));
         }
         Some(Note { line, text })
+    }
+}
+
+/// A note names a line that is marked at less than this fraction of the speed asked for.
+const SLOW: f64 = 0.99;
+
+impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
+    /// Notes what bound the law, and where light was slower than asked.
+    pub(super) fn account(&self, run: &PathRun<N>, law: &TimeLaw, draft: &mut Draft<'_>) {
+        let mut slowest: Option<Slowed> = None;
+        for part in law.binding() {
+            let middle = (part.places.start + part.places.end) / 2.0;
+            let line = run.line_at(middle);
+            let position: Vector3<f64> = run.path.at(middle).point;
+            if run.contour.is_lit() {
+                draft.bound.add(LimitId(part.limit), part.duration, line, position.into());
+            }
+            let Some((demand, limit)) = run.lit_at(middle) else { continue };
+            // What the machine's largest marking speed takes of it has a note of its own.
+            let is_named = self.task.speeds.named(demand.speed).is_some();
+            let asked = self.task.speeds.of(demand.speed) * self.faster(demand);
+            let asked = if is_named { asked } else { limit };
+            let mean = (part.places.end - part.places.start) / part.duration;
+            let speed = run.even.unwrap_or(mean.min(limit));
+            draft.speed = draft.speed.max(speed);
+            let slowed = Slowed { line, asked, speed, place: position };
+            let worse = slowest.is_none_or(|worst| speed / asked < worst.speed / worst.asked);
+            if !run.follows && speed < SLOW * asked && worse {
+                slowest = Some(slowed);
+            }
+        }
+        draft.slowed.extend(slowest);
     }
 }

@@ -5,8 +5,10 @@ use std::collections::VecDeque;
 
 use machine::Mechanism;
 
-use super::run::Outlet;
-use super::{Checkpoint, Failure, Planning, Trials, Window};
+use super::front::Checkpoint;
+use super::outlet::Outlet;
+use super::trials::{Failure, Trials};
+use super::{Planning, Window};
 use crate::error::PlanError;
 use messages::plan::PlanFacts;
 

@@ -6,7 +6,7 @@ use machine::Mechanism;
 use machine::kinematics::ToolMotion;
 
 use super::Planning;
-use super::paths::PathRun;
+use super::path_run::PathRun;
 use super::run_in_out::{FAR_BEYOND, FOLLOW_TRIALS, Unfit, state};
 use crate::drawing::Turns;
 use crate::geometry::jet::Jet;

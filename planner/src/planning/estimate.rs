@@ -3,7 +3,8 @@
 use machine::Mechanism;
 use nalgebra::Vector3;
 
-use super::{Front, Planning};
+use super::Planning;
+use super::front::Front;
 use crate::geometry::contour::{Contour, Demand};
 
 /// The share of a job that counts as done as estimated when its time is told.

@@ -4,11 +4,10 @@
 use machine::Mechanism;
 
 use super::Planning;
-use super::parts::limit_at;
-use super::paths::PathRun;
-use super::windows::Timed;
+use super::path_run::PathRun;
+use super::speeds::asked;
+use super::timing::Timed;
 use crate::law::End;
-use crate::law::row::{Limits, Side};
 use crate::law::time_law::TimeLaw;
 use crate::law::windows::{between, keeps_even};
 use crate::limits::along::AlongPath;
@@ -65,16 +64,6 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let law = between(along, run.at, to, [run.begin, next], run.fallback.as_ref()).ok()?;
         Some(Timed { law, next: Some(next), fallback: Some(fallback) })
     }
-}
-
-/// The speed asked for just after `place` [m/s], and the limit that it is.
-fn asked<const N: usize, M: Mechanism<N>>(
-    run: &PathRun<N>,
-    along: &mut AlongPath<'_, '_, N, M>,
-    place: f64,
-) -> (f64, u16) {
-    let limit = limit_at(&run.speeds, place).source.0;
-    (along.site(place, Side::After, &mut Vec::new()).speed, limit)
 }
 
 /// How far a plateau at `place` may go [m]: as far as the same speed is asked for, and the way to rest

@@ -3,7 +3,10 @@
 use machine::Mechanism;
 
 use super::Planning;
+use crate::drawing::{Action, Step};
 use crate::error::{Place, PlanError};
+use crate::geometry::track::Track;
+use crate::job::Job;
 use crate::joint_space::configuration::Refused;
 use crate::light::exposure::TooShort;
 use crate::sampling::sampler::Unreachable;
@@ -50,4 +53,42 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             }
         }
     }
+}
+
+/// `error` with the line of the very step that leaves the area, of all that are followed in one go, how far
+/// that leads, and where the program has its zero.
+pub(super) fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
+    /// How far a chord may lie from the curve [m].
+    const CHORD: f64 = 1e-5;
+    let PlanError::Limit { line, violation, zero, .. } = &mut error else { return error };
+    let LimitViolation { quantity: Quantity::ToolPosition(row), value, limit, .. } = *violation
+    else {
+        return error;
+    };
+    if job.surface.is_some() {
+        return error;
+    }
+    *zero = job.survey.as_ref().and_then(|survey| survey.zero).map(Box::new);
+    let beyond = |point: &[f64; 3]| (point[row] - limit) * (value - limit).signum();
+    // How far a step goes beyond: by less than a fitted curve strays it does not.
+    let leaves = |step: Step| {
+        let points = match &step.action {
+            Action::Mark { curve, .. } | Action::Feed { curve, .. } => {
+                let mut points = vec![curve.from().into()];
+                Track::new(curve).sample(CHORD, &mut points);
+                points
+            }
+            Action::Rapid { to } => vec![(*to).into()],
+            _ => return None,
+        };
+        let farthest = points.iter().map(beyond).fold(0.0, f64::max);
+        (farthest > (value - limit).abs() / 2.0).then_some((step.line, farthest))
+    };
+    let steps = job.steps().into_iter().flatten().map_while(Result::ok);
+    let mut near = steps.skip_while(|step| step.line < *line);
+    if let Some((step, farthest)) = near.find_map(leaves) {
+        *line = step;
+        violation.value = limit + farthest * (value - limit).signum();
+    }
+    error
 }

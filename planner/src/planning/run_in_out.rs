@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use machine::Mechanism;
 
-use super::paths::PathRun;
+use super::path_run::PathRun;
 use super::{Draft, Planning};
 use crate::error::PlanError;
 use crate::geometry::jet::Jet;

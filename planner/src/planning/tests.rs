@@ -6,7 +6,8 @@ use machine::{Machine, Override};
 use messages::Setpoint;
 use messages::math::hypot;
 
-use super::run::{Outlet, plan_windows};
+use super::outlet::Outlet;
+use super::run::plan_windows;
 use super::{MOST_SETPOINTS, Window};
 use crate::drawing::Action;
 use crate::limits::motion_limits::Scope;
@@ -155,7 +156,7 @@ fn a_long_straight_line_is_faster_soon_after_the_override() {
 fn the_rate_may_change_before_any_window_of_a_path_at_one_speed() {
     let machine = machine(&[]);
     for (feed, rest) in [(3000.0, 0.01), (3000.0, 0.03), (3000.0, 0.3), (6000.0, 0.02)] {
-        let length = feed / 60.0 * (3.0 * super::windows::WINDOW + rest);
+        let length = feed / 60.0 * (3.0 * super::timing::WINDOW + rest);
         let job = job(
             &format!("G0 X20 Y20\nM3 S400\nG1 X{:.4} F{feed}\nG1 Y120\n", 20.0 + length.min(170.0)),
             &[],

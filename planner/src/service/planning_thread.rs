@@ -5,7 +5,8 @@
 use super::departure::approach;
 use super::plan_files::PlanFiles;
 use crate::planning::Window;
-use crate::planning::run::{Outlet, plan_windows};
+use crate::planning::outlet::Outlet;
+use crate::planning::run::plan_windows;
 use crate::request::{JobRequest, Refusal};
 use crate::{Job, PlanError, PlanFacts};
 use crossbeam::atomic::AtomicCell;

@@ -1,0 +1,38 @@
+//! Speeds that a job leaves to the planner.
+
+use super::operations::{OperationQueue, Steps};
+use crate::drawing::{Action, Step};
+use crate::error::PlanError;
+use crate::geometry::operation::Operation;
+use crate::job::{Job, MarkingSpeed};
+use crate::light::Policy;
+
+/// Whether the speed of some line is for the planner to choose, so that it must know the job before
+/// it begins.
+pub(super) fn leaves_speeds_open(job: &Job) -> bool {
+    let is_open = |step: &Step| {
+        let Action::Mark { speed, power, .. } = &step.action else { return false };
+        speed.is_none() && job.marking.policy(power) == Policy::Constant
+    };
+    match job.marking.speed {
+        Some(MarkingSpeed::Constant(_)) => false,
+        Some(MarkingSpeed::Optimum) => true,
+        None => job.drawing.steps.iter().any(is_open),
+    }
+}
+
+/// The steps by which speeds are chosen: of a program that is too long to be held, its beginning.
+pub(super) fn held(job: &Job) -> Steps<'_> {
+    match job.steps() {
+        Ok(steps) => Box::new(steps.take(Job::HELD as usize)),
+        Err(_) => Box::new(core::iter::empty()),
+    }
+}
+
+pub(super) fn all(mut source: OperationQueue<'_>) -> Result<Vec<Operation>, PlanError> {
+    let mut operations = Vec::new();
+    while let Some(operation) = source.get(operations.len())? {
+        operations.push(operation.clone());
+    }
+    Ok(operations)
+}
