@@ -7,6 +7,7 @@ pub(crate) mod contour;
 pub(crate) mod fit;
 pub mod jet;
 pub(crate) mod operation;
+pub(crate) mod operations;
 pub(crate) mod path;
 pub(crate) mod polyline;
 pub(crate) mod projected;

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use crate::drawing::{Note, Step};
 use crate::error::{Place, PlanError};
 use crate::geometry::contour::Contour;
-use crate::geometry::operation::{OffSurface, Operation, OperationKind, Operations};
+use crate::geometry::operation::{OffSurface, Operation, OperationKind};
+use crate::geometry::operations::Operations;
 use crate::job::JobError;
 
 /// Steps of a job in order; the last may be an error.

@@ -14,7 +14,7 @@ use super::{Planning, Task};
 use crate::drawing::Note;
 use crate::error::PlanError;
 use crate::geometry::attitude::AttitudeLaw;
-use crate::geometry::operation::Operations;
+use crate::geometry::operations::Operations;
 use crate::job::Job;
 use crate::joint_space::directions::directions_near;
 use crate::law::optimum::Speeds;
