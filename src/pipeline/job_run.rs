@@ -1,45 +1,29 @@
 //! One job in a pipeline, from the start of the machine to the summary.
 
+mod conclude;
+mod progress;
+mod watch;
+
+use watch::WORD_PATIENCE;
+
 use super::control::JobControl;
-use super::operators::{self, JobEvent, Submission};
+use super::operators::{JobEvent, Submission};
 use super::power_up::{NotReady, PowerUp};
-use super::services::{Ended, Recovery};
-use super::{POLL_INTERVAL, Pipeline, ServiceOwner, is_dark_and_at_rest};
-use crate::exit::{Failure, error_summary};
+use super::{POLL_INTERVAL, Pipeline};
+use crate::exit::Failure;
 use crate::output::ProgressLine;
-use messages::{Cycle, DrivesReport, Fault, FaultCode, OperatorVerb, PlannerPhase, run_folder};
-use monitor::conclusion::{self, RecordingState, RunOutcome};
+use messages::{Cycle, Fault, OperatorVerb, PlannerPhase, run_folder};
+use monitor::conclusion::RunOutcome;
 use monitor::run_folder::RunFolder;
-use monitor::summary::text::duration;
 use monitor::summary::{ErrorSummary, Outcome, Summary};
-use planner::request::{JobRequest, Refusal};
+use planner::request::JobRequest;
 use runtime::domain::Role;
-use runtime::{message, signal};
+use runtime::signal;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How long the controller may take to bring the axes to rest and say so.
-const REST_PATIENCE: Duration = Duration::from_secs(10);
-
-/// How long the controller's last word may follow when the axes rest: it comes with the next cycle,
-/// unless the controller hangs or is dead.
-const WORD_PATIENCE: Duration = Duration::from_millis(250);
-
-/// How long the axes may take to stand of a job that was never played: they only held.
-const UNPLAYED_PATIENCE: Duration = Duration::from_millis(500);
-
-/// How long drives may say nothing while a job is played; its clock may slip by some tenths of a
-/// second.
-const DRIVES_PATIENCE: Duration = Duration::from_secs(5);
-
 /// How long the monitor may take to open its recording: without it the job runs unrecorded.
 const OPENING_PATIENCE: Duration = Duration::from_secs(2);
-
-/// How long the monitor may take to complete its recording, on a loaded computer or a slow disk.
-const WRITING_PATIENCE: Duration = Duration::from_secs(5);
-
-/// How long a monitor that somebody has stopped is waited for.
-const STOPPED_PATIENCE: Duration = Duration::from_millis(250);
 
 /// How far a job has come.
 #[derive(Debug, Clone, Copy)]
@@ -257,83 +241,10 @@ impl<'a> JobRun<'a> {
         }
     }
 
-    /// Whether the controller has said how the job ended, or nothing more can be expected of it.
-    fn is_over(&mut self) -> bool {
-        let report = self.pipeline.latest.controller;
-        if Some(report.stream) == self.stream && report.is_final == 1 {
-            self.run_outcome.controller = Some(report);
-            return true;
-        }
-        self.hear_drives();
-        let since = match self.stage {
-            // What was never played only holds, or is being stopped.
-            Stage::Resting(since) if !self.played => {
-                let holds =
-                    self.pipeline.has(Role::Controller) && !self.run_outcome.latched.is_some();
-                let gone = !self.pipeline.has(Role::Drives);
-                let at_rest = is_dark_and_at_rest(&self.pipeline.latest);
-                return holds || gone || at_rest || since.elapsed() > UNPLAYED_PATIENCE;
-            }
-            Stage::Resting(since) => Some(since),
-            _ => None,
-        };
-        let latest = &self.pipeline.latest;
-        // Without drives nothing moves, and axes that drives has stopped rest by themselves.
-        let gone = !self.pipeline.has(Role::Drives);
-        let at_rest =
-            is_dark_and_at_rest(latest) && (since.is_some() || latest.drives.fault.is_some());
-        self.quiet =
-            if gone || at_rest { self.quiet.or_else(|| Some(Instant::now())) } else { None };
-        let silent = self.quiet.is_some_and(|quiet| quiet.elapsed() > WORD_PATIENCE);
-        if silent && since.is_none() {
-            self.fail(latest.drives.fault);
-        }
-        silent || since.is_some_and(|since| since.elapsed() > REST_PATIENCE)
-    }
-
-    /// Gives a job up that is being played while drives says nothing: it reports ten times a second.
-    fn hear_drives(&mut self) {
-        let cycle = self.pipeline.latest.drives.cycle;
-        if cycle != self.drives_heard.0 {
-            self.drives_heard = (cycle, Instant::now());
-        } else if self.drives_heard.1.elapsed() > DRIVES_PATIENCE {
-            self.end_with(format!(
-                "drives said nothing for {} s: it is stopped or hangs",
-                DRIVES_PATIENCE.as_secs()
-            ));
-        }
-    }
-
     /// The fault that the controller or drives holds.
     fn latched(&self) -> Fault {
         let latest = &self.pipeline.latest;
         if latest.progress.fault.is_some() { latest.progress.fault } else { latest.drives.fault }
-    }
-
-    fn progress(&self) -> (f64, String) {
-        let latest = &self.pipeline.latest;
-        let what = match self.stage {
-            Stage::Starting(_) => "starting".to_owned(),
-            Stage::Planning => "planning".to_owned(),
-            Stage::Ready(_) if self.control.is_held() => "held".to_owned(),
-            Stage::Ready(_) => "starting".to_owned(),
-            Stage::Playing => {
-                let strokes = match latest.planner.is_complete {
-                    0 => String::new(),
-                    _ => format!(" of {}", latest.planner.strokes),
-                };
-                let left = match latest.time_left() {
-                    Some(left) => format!(", {} left", duration(left)),
-                    None => String::new(),
-                };
-                let rate = latest.progress.rate * 100.0;
-                format!("stroke {}{strokes}, rate {rate:.0} %{left}", latest.progress.stroke)
-            }
-            Stage::Resting(_) => "coming to rest".to_owned(),
-        };
-        let is_ours = Some(latest.progress.stream) == self.stream;
-        let share = if is_ours { latest.share() } else { 0.0 };
-        (share, format!("{}: {what}", self.name))
     }
 
     /// A signal or a person's `stop`: laser, then axes; a job that is not played yet is withdrawn.
@@ -350,51 +261,6 @@ impl<'a> JobRun<'a> {
             }
         }
         self.in_a_hurry()
-    }
-
-    /// A service has ended by itself: says so at once, and what is done about it.
-    fn note_ended(&mut self, ended: &Ended) {
-        let consequence = match (ended.role, self.stage) {
-            (Role::Monitor, _) => "; the job goes on without harm",
-            (_, Stage::Starting(_)) => " while starting",
-            (Role::Planner, _) => {
-                ": laser off, the controller brings the axes to rest along the path"
-            }
-            (Role::Controller, _) => ": laser off, drives stops the axes",
-            (Role::Drives, _) => ": the simulated plant is gone with it",
-            (Role::Domain | Role::Observer, _) => "",
-        };
-        let message = format!("{ended}{consequence}");
-        message::tell(&message);
-        match ended.recovery {
-            Recovery::Stop => {
-                if !self.run_outcome.latched.is_some() {
-                    self.run_outcome.latched = Fault::new(death_of(ended.role));
-                }
-                self.end_with(message);
-            }
-            _ => self.run_outcome.warnings.push(message),
-        }
-    }
-
-    /// What ails a job whose services somebody else starts, when one that it cannot end without is
-    /// gone. Of the others' deaths the controller tells.
-    fn missing(&self) -> Option<&'static str> {
-        if self.pipeline.owner() == ServiceOwner::Own {
-            return None;
-        }
-        match self.stage {
-            Stage::Planning if !self.pipeline.has(Role::Planner) => {
-                Some("the planner is not running: start it and submit again")
-            }
-            Stage::Ready(_) | Stage::Playing if !self.pipeline.has(Role::Controller) => {
-                Some("the controller has ended: laser off, drives stops the axes")
-            }
-            Stage::Ready(_) | Stage::Playing if !self.pipeline.has(Role::Drives) => {
-                Some("drives has ended: start it, reset the fault and submit again")
-            }
-            _ => None,
-        }
     }
 
     fn end_with(&mut self, message: String) {
@@ -417,103 +283,6 @@ impl<'a> JobRun<'a> {
         if !matches!(self.stage, Stage::Resting(_)) {
             self.stage = Stage::Resting(Instant::now());
         }
-    }
-
-    /// Takes over why the planner refused. Where the run folder could not be written, the planner
-    /// has left its reasons in the domain's directory.
-    fn refuse(&mut self) {
-        let places =
-            [self.folder.file(run_folder::REFUSAL), self.pipeline.root().join(run_folder::REFUSAL)];
-        let read = |path: &std::path::PathBuf| {
-            serde_json::from_slice::<Refusal>(&std::fs::read(path).ok()?).ok()
-        };
-        let refusal = places.iter().find_map(read).unwrap_or_else(|| {
-            Refusal::internal(format!(
-                "the planner refused the job, and {} cannot be read",
-                places[0].display()
-            ))
-        });
-        message::tell(refusal.text.trim());
-        self.run_outcome.outcome = Some(Outcome::Refused);
-        self.run_outcome.error = Some(error_summary(&refusal));
-    }
-
-    fn conclude(mut self) -> Summary {
-        if self.stream.is_some() {
-            if self.run_outcome.controller.is_none() {
-                // The planner rests, and the monitor ends its recording. Without channels neither
-                // can be told; they end with the domain.
-                let _ = self.pipeline.close();
-            }
-            self.await_recording();
-        }
-        self.run_outcome.drives = Some(self.drives_with_cause());
-        let is_completed = self.run_outcome.controller.is_some_and(|it| it.completed == 1);
-        if !is_completed && self.played {
-            self.run_outcome.time_left = self.time_left;
-        }
-        if !self.run_outcome.latched.is_some() {
-            self.run_outcome.latched = self.pipeline.latest.progress.fault;
-        }
-        let machine = &self.pipeline.machine;
-        self.run_outcome.warnings.splice(0..0, machine.job_warnings());
-        let summary = conclusion::conclude(&self.folder, machine, &self.run_outcome, self.started);
-        self.pipeline.board.name_job(None);
-        self.control.end();
-        if let Some(submission) = self.submission.take() {
-            operators::tell_end(&submission.events, &summary);
-        }
-        summary
-    }
-
-    /// Waits until the monitor has written all of it, as long as it can be expected to.
-    fn await_recording(&mut self) {
-        let stream = self.stream.unwrap_or_default();
-        let since = Instant::now();
-        while RecordingState::of(&self.folder, stream) == RecordingState::Open && !self.in_a_hurry()
-        {
-            let patience = match self.pipeline.peer(Role::Monitor) {
-                Some(monitor) if monitor.is_stopped() => STOPPED_PATIENCE,
-                Some(_) => WRITING_PATIENCE,
-                None => return,
-            };
-            if since.elapsed() > patience || self.pipeline.poll().is_err() {
-                return;
-            }
-            std::thread::sleep(POLL_INTERVAL);
-        }
-    }
-
-    /// Whether a person has asked twice for the end.
-    fn in_a_hurry(&self) -> bool {
-        signal::termination().is_some_and(|termination| termination.count > 1)
-    }
-
-    /// What drives reported, with the cause of a death that the dead cannot tell: a controller
-    /// without feedback says nothing, and drives without commands may name those first.
-    fn drives_with_cause(&self) -> DrivesReport {
-        let mut drives = self.pipeline.latest.drives;
-        if self.run_outcome.controller.is_some() || self.run_outcome.error.is_none() {
-            return drives;
-        }
-        let vague = matches!(drives.fault.code(), FaultCode::None | FaultCode::StaleCommand);
-        if vague && !self.pipeline.has(Role::Drives) {
-            drives.fault = Fault::new(FaultCode::DrivesLost).at(drives.fault.at);
-        } else if vague && !self.pipeline.has(Role::Controller) {
-            drives.fault = Fault::new(FaultCode::ControllerLost).at(drives.fault.at);
-        }
-        drives
-    }
-}
-
-/// The fault that the death of a service is.
-fn death_of(role: Role) -> FaultCode {
-    match role {
-        Role::Planner => FaultCode::PlannerLost,
-        Role::Controller => FaultCode::ControllerLost,
-        Role::Drives => FaultCode::DrivesLost,
-        Role::Domain => FaultCode::SupervisorLost,
-        Role::Monitor | Role::Observer => FaultCode::None,
     }
 }
 
