@@ -16,7 +16,7 @@ use messages::plan::PlanFacts;
 type FactsOf<'f, const N: usize, M> = dyn Fn(&Planning<'_, N, M>) -> PlanFacts + 'f;
 
 /// How often windows are planned again before one of them can be handed on.
-const MOST_AGAIN: usize = 200;
+const MOST_AGAIN: usize = 50;
 
 /// A window that has been planned.
 struct Planned<const N: usize, M: Mechanism<N>> {

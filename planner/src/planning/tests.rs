@@ -256,11 +256,14 @@ fn light_that_changes_often_is_slowed_at_any_override_and_keeps_its_exposure() {
 #[test]
 fn a_later_window_at_one_speed_is_slowed_where_it_must_be() {
     let program = "G0 X120 Y100\nM3 S500 F12000\nG2 I-20\nG2 I-20\nG2 I-20\n";
-    let free = machine(&["axis.a.motor.dc.continuous_current=\"5 A\""]);
+    // Friction warms a motor at any speed.
+    let with = |current: f64| {
+        let limit = format!("axis.a.motor.dc.continuous_current=\"{current} A\"");
+        machine(&["axis.a.friction.coulomb=\"0 N m\"", &limit])
+    };
+    let free = with(5.0);
     let planned_free = planned(&free, &job(program, &[], &free));
-    let used = planned_free.facts.uses.heat[0];
-    let limit = format!("axis.a.motor.dc.continuous_current=\"{} A\"", 5.0 * used * 0.95);
-    let machine = machine(&[&limit]);
+    let machine = with(5.0 * 0.95 * planned_free.facts.uses.heat[0]);
     let planned = planned(&machine, &job(program, &[], &machine));
     assert!(planned.facts.uses.heat[0] <= 1.0);
     assert!(planned.facts.duration > planned_free.facts.duration);

@@ -11,6 +11,10 @@ use crate::verify::checker::{LimitViolation, Quantity};
 const TIGHTER: usize = 24;
 const SLOWER: usize = 40;
 
+/// A trial counts as so many where a motor gets too warm: what stays of that at a tenth of the speed is
+/// friction.
+const HEAT: usize = 4;
+
 /// How much slower each of the latter is.
 const SHARE: f64 = 0.85;
 
@@ -43,11 +47,12 @@ impl Trials {
 
     /// Leaves less of what was broken. Says whether that is worth another trial.
     pub(super) fn tighten(&mut self, violation: &LimitViolation, axes: &[Axis]) -> bool {
-        self.count += 1;
+        let is_heat = violation.quantity == Quantity::HeatingCurrent;
+        self.count += if is_heat { HEAT } else { 1 };
         if self.count > TIGHTER + SLOWER || violation.quantity.is_place() {
             return false;
         }
-        if self.count > TIGHTER || violation.quantity == Quantity::HeatingCurrent {
+        if self.count > TIGHTER || is_heat {
             self.slow();
         } else {
             let index = violation
