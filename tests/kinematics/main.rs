@@ -9,7 +9,11 @@ mod support;
 use std::fs::File;
 use std::path::Path;
 
+use machine::kinematics::Joints;
+use machine::mechanisms::tri_planar::{Fold, Legs, TriPlanarBranch};
+use machine::{Machine, Mechanism, MechanismKind, Pose};
 use messages::random::SplitMix64;
+use nalgebra::{Rotation3, Vector3};
 use serde_json::{Value, json};
 use support::{Ended, Place, assert_valid, golden, number};
 
@@ -587,4 +591,48 @@ fn extreme_numbers_get_finite_answers_or_an_error_with_value_and_limit() {
         }
     }
     assert!(too_large > 1000, "only {too_large} lines were refused for their size");
+}
+
+/// A pose of the shipped platform with all legs inward that shares its feet with another one, which
+/// is rare, and its number.
+fn ambiguous_pose() -> (Pose, u8) {
+    let path = support::source("machines/tri_planar.toml");
+    let MechanismKind::TriPlanar(mechanism) = Machine::load(&path, &[]).unwrap().mechanism else {
+        panic!("another mechanism");
+    };
+    let inward = TriPlanarBranch::from(Legs([Fold::Inward; 3]));
+    let mut random = SplitMix64::new(3);
+    loop {
+        let [x, y, z] = [0.25, 0.15, 0.06].map(|most| random.between(-most, most));
+        let [roll, pitch, yaw] = [0.9, 0.9, 3.0].map(|most| random.between(-most, most));
+        let rotation = Rotation3::from_euler_angles(roll, pitch, yaw).into_inner();
+        let pose = Pose { position: Vector3::new(x, y, 0.1 + z), rotation };
+        let Ok(q) = mechanism.inverse(&pose, inward, &Joints::zeros()) else { continue };
+        let chain = mechanism.solve_at(&pose, &q, inward, None).unwrap();
+        if let Some(number) = mechanism.branch_of(&chain).assembly {
+            return (pose, number);
+        }
+    }
+}
+
+#[test]
+fn forward_asks_for_the_assembly_that_inverse_names_where_there_are_several() {
+    let (pose, assembly) = ambiguous_pose();
+    let machine = Golden::new("tri_planar", &[]);
+    let rows: Vec<Vec<f64>> =
+        (0..3).map(|row| (0..3).map(|column| pose.rotation[(row, column)]).collect()).collect();
+    let position: [f64; 3] = pose.position.into();
+    let wanted = json!({ "position": position, "rotation": rows });
+    let legs = json!({ "legs": [-1, -1, -1] });
+    // Each on its own: a line before would be a start near by.
+    let ask = |verb: &str, request: Value| machine.ask(verb, &[request], Value::clone).remove(0);
+    let solved = ask("inverse", json!({ "pose": wanted, "branch": legs }));
+    assert_eq!(solved["branch"]["assembly"], assembly, "{solved}");
+    let refused = ask("forward", json!({ "q": solved["q"], "branch": legs }));
+    assert_eq!(refused["error"]["code"], "ambiguous_assembly", "{refused}");
+    assert!(number(&refused, "/error/value") >= 2.0, "{refused}");
+    let back = ask("forward", json!({ "q": solved["q"], "branch": solved["branch"] }));
+    assert_close(&back["pose"]["position"], &json!(position), "position");
+    assert_close(&back["pose"]["rotation"], &json!(rows), "rotation");
+    assert_eq!(back["branch"], solved["branch"]);
 }
