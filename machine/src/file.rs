@@ -5,7 +5,7 @@
 mod axes;
 pub mod bounds;
 pub mod mechanism;
-mod motors;
+pub mod motors;
 mod relations;
 pub mod tables;
 mod validate;

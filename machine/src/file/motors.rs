@@ -44,7 +44,9 @@ pub(super) fn motor(
     }
 }
 
-fn dc(data: &DcMotorTable, stiff_inertia: f64, diagnostics: &mut Diagnostics) -> DcMotor {
+/// The DC motor of `data`, with which `stiff_inertia` [kg·m² at its shaft] turns stiffly; what contradicts
+/// itself in it is noted.
+pub fn dc(data: &DcMotorTable, stiff_inertia: f64, diagnostics: &mut Diagnostics) -> DcMotor {
     if let Some(continuous) = data.continuous_current
         && continuous.value > data.current.value
     {
@@ -75,7 +77,9 @@ fn dc(data: &DcMotorTable, stiff_inertia: f64, diagnostics: &mut Diagnostics) ->
     }
 }
 
-fn stepper(
+/// The stepper of `data`, with which `stiff_inertia` [kg·m² at its shaft] turns stiffly; what contradicts
+/// itself in it is noted.
+pub fn stepper(
     data: &StepperMotorTable,
     stiff_inertia: f64,
     diagnostics: &mut Diagnostics,
