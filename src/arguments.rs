@@ -50,6 +50,16 @@ Examples:
 
 SI units and radians, one line a millisecond; a field that was not known is empty.";
 
+const SIZE_EXAMPLES: &str = "\
+Examples:
+  graver size --machine machines/cartesian.toml     what its sample job needs
+  graver size job.ngc --machine mine.toml --motors mine-motors.toml --out new.toml
+  graver size --machine mine.toml --motors dc --gears keep --axis x
+  graver size --machine mine.toml --motors dc --motors gears --by power --margin 1.5
+
+A catalogue is a TOML file, or one of thesis, dc, bldc, steppers and gears, which are built in.
+--out writes the machine file with the motors; its comments stay.";
+
 const SERVICES: &str = "\
 The services are graver drives, controller, planner and monitor with the same --instance;
 machine and drives are the domain's. deploy/ has systemd units. SIGTERM or Ctrl-C ends it with
@@ -85,6 +95,9 @@ pub enum Command {
     /// Write the recording of a run as comma-separated values.
     #[command(after_help = EXPORT_EXAMPLES)]
     Export(ExportArguments),
+    /// Say what motor and gear each axis needs for a job, and choose them from catalogues.
+    #[command(after_help = SIZE_EXAMPLES)]
+    Size(SizeArguments),
     /// Measure this PC: latencies, planning speed, simulation speed.
     #[command(subcommand)]
     Bench(BenchCommand),
@@ -149,6 +162,8 @@ pub enum SchemaFile {
     Machine,
     /// The job file.
     Job,
+    /// A catalogue of motors and gears.
+    Catalogue,
 }
 
 /// The machine and the changes to it.
@@ -318,6 +333,61 @@ pub struct ExportArguments {
     pub out: Option<PathBuf>,
 }
 
+/// Arguments of `size`.
+#[derive(Debug, Clone, Args)]
+pub struct SizeArguments {
+    /// Job: .ngc .nc .gcode .tap (G-code) or .toml; without it the machine's sample job.
+    pub job: Option<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub machine: MachineArguments,
+    /// Catalogue of motors and gears: a .toml file, or thesis, dc, bldc, steppers or gears, which are built in.
+    /// Can be repeated; without it all that are built in.
+    #[arg(long, value_name = "CATALOGUE")]
+    pub motors: Vec<String>,
+    /// By what every need is multiplied before it is compared with what a motor gives.
+    #[arg(long, value_name = "X", default_value_t = 1.25, value_parser = margin)]
+    pub margin: f64,
+    /// Temperature of the air around the motors [°C].
+    #[arg(long, value_name = "T", default_value_t = 25.0, allow_negative_numbers = true, value_parser = temperature)]
+    pub ambient: f64,
+    /// Look for a motor for this axis only. Can be repeated.
+    #[arg(long, value_name = "NAME")]
+    pub axis: Vec<String>,
+    /// What makes one motor smaller than another.
+    #[arg(long, value_enum, default_value = "mass")]
+    pub by: SizeOrder,
+    /// Which gears to try: without it those of the catalogues, or the machine's where they have none.
+    #[arg(long, value_enum)]
+    pub gears: Option<SizeGears>,
+    /// Write the machine file with the motors and gears that were chosen.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What makes one motor smaller than another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SizeOrder {
+    /// Mass of motor and gear; power where one has none.
+    Mass,
+    /// Rated power.
+    Power,
+}
+
+/// Which gears `size` tries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SizeGears {
+    /// The ratio that the machine has.
+    Keep,
+    /// Those of the catalogues, and none.
+    Catalogue,
+    /// Any ratio.
+    Any,
+}
+
 /// What `bench` measures.
 #[derive(Debug, Clone, Subcommand)]
 pub enum BenchCommand {
@@ -427,6 +497,26 @@ pub struct ServiceArguments {
     /// Name of the pipeline.
     #[arg(long, value_name = "NAME", default_value = "default")]
     pub instance: String,
+}
+
+/// Reads by what needs are multiplied.
+fn margin(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "this must be a number, such as 1.25".to_owned())?;
+    if (1.0..=100.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not from 1, nothing in hand, to 100"))
+    }
+}
+
+/// Reads a temperature of the air [°C].
+fn temperature(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "this must be a number, such as 25".to_owned())?;
+    if (-100.0..=200.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{value} °C is not from -100 °C to 200 °C"))
+    }
 }
 
 /// Reads a length of time [s] that can be waited for.

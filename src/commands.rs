@@ -11,4 +11,5 @@ pub mod pulses;
 pub mod run;
 pub mod service;
 pub mod simulate;
+pub mod size;
 pub mod verify;

@@ -4,6 +4,7 @@ use crate::arguments::MachineArguments;
 use crate::exit::Failure;
 use machine::Machine;
 use machine::document::{Document, Override};
+use machine::machine::{BUILTIN, BUILTIN_NAME};
 use planner::request::JobRequest;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -52,6 +53,14 @@ impl MachineSource {
     pub fn plant(&self) -> Result<Machine, Failure> {
         let sorted = Overrides::sort(&self.set)?;
         self.build(&sorted.machine, &sorted.plant)
+    }
+
+    /// The name and the text of the machine file, the built-in one where none was named.
+    pub fn file(&self) -> (String, &str) {
+        match &self.file {
+            Some(file) => (file.path.display().to_string(), &file.text),
+            None => (BUILTIN_NAME.to_owned(), BUILTIN),
+        }
     }
 
     fn build(&self, machine: &[Override], plant: &[Override]) -> Result<Machine, Failure> {

@@ -15,7 +15,7 @@ pub mod pipeline;
 use arguments::{Arguments, BenchCommand, Command};
 use clap::Parser;
 use commands::{
-    bench, check, export, kinematics, manual, operator, plan, run, service, simulate, verify,
+    bench, check, export, kinematics, manual, operator, plan, run, service, simulate, size, verify,
 };
 use exit::{Exit, Failure};
 use pipeline::operators::Verb;
@@ -43,6 +43,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Check(arguments) => check::run(arguments),
         Command::Kinematics(arguments) => kinematics::run(arguments),
         Command::Export(arguments) => export::run(arguments),
+        Command::Size(arguments) => size::run(arguments),
         Command::Bench(BenchCommand::Latency(arguments)) => bench::latency(arguments),
         Command::Bench(BenchCommand::Plan(arguments)) => bench::planning::run(arguments),
         Command::Bench(BenchCommand::Simulate(arguments)) => bench::simulate(arguments),
@@ -74,6 +75,7 @@ fn wants_json(command: &Command) -> bool {
         Command::Simulate(arguments) => arguments.json,
         Command::Plan(arguments) => arguments.json,
         Command::Check(arguments) => arguments.json,
+        Command::Size(arguments) => arguments.json,
         Command::Submit(arguments) => arguments.instance.json,
         _ => false,
     }

@@ -17,10 +17,11 @@ use graver::pipeline::status::Status;
 use monitor::summary::Summary;
 use schemars::{Schema, schema_for};
 use support::{Place, assert_valid, lines};
+use workbench::size::report::SizeReport;
 
 /// The schemas by the name of their file.
-fn schemas() -> [(&'static str, Schema); 9] {
-    [
+fn schemas() -> Vec<(&'static str, Schema)> {
+    vec![
         ("check", schema_for!(CheckReport)),
         ("kinematics", schema_for!(Reply)),
         ("latency", schema_for!(LatencyReport)),
@@ -30,6 +31,7 @@ fn schemas() -> [(&'static str, Schema); 9] {
         ("planning", schema_for!(PlanBenchReport)),
         ("status", schema_for!(Status)),
         ("summary", schema_for!(Summary)),
+        ("size", schema_for!(SizeReport)),
     ]
 }
 
@@ -49,7 +51,11 @@ fn the_committed_schemas_are_the_generated_ones() {
 #[test]
 fn the_schemas_of_files_are_printed_as_they_are_committed() {
     let place = Place::new();
-    for (file, committed) in [("machine", "machines/schema.json"), ("job", "jobs/schema.json")] {
+    for (file, committed) in [
+        ("machine", "machines/schema.json"),
+        ("job", "jobs/schema.json"),
+        ("catalogue", "catalogues/schema.json"),
+    ] {
         let ended = place.graver(&["schema", file]);
         ended.accepted();
         assert_eq!(ended.output, std::fs::read_to_string(support::source(committed)).unwrap());

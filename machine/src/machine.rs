@@ -10,10 +10,10 @@ use crate::limits::{CornerMode, PathLimits, StallTolerance, WorkArea};
 use crate::mechanisms::MechanismKind;
 
 /// The built-in machine's file.
-pub(crate) const BUILTIN: &str = include_str!("../../machines/corexy.toml");
+pub const BUILTIN: &str = include_str!("../../machines/corexy.toml");
 
 /// Its name in errors.
-pub(crate) const BUILTIN_NAME: &str = "machines/corexy.toml";
+pub const BUILTIN_NAME: &str = "machines/corexy.toml";
 
 /// Everything that a machine file says, in SI units and free of contradictions.
 #[derive(Debug, Clone, PartialEq)]

@@ -27,6 +27,7 @@ pub fn schema(file: SchemaFile) -> Result<Exit, Failure> {
     let schema = match file {
         SchemaFile::Machine => machine::file::schema(),
         SchemaFile::Job => planner::job::file::schema(),
+        SchemaFile::Catalogue => workbench::catalogue::schema(),
     };
     output::printed(std::io::stdout().lock().write_all(schema.as_bytes()))?;
     Ok(Exit::Done)

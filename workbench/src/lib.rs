@@ -7,3 +7,4 @@ pub mod catalogue;
 pub mod operating;
 pub mod reach;
 pub mod simulation;
+pub mod size;

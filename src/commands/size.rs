@@ -1,0 +1,155 @@
+//! `graver size`: what motor and gear each axis needs, and which of a catalogue do it.
+
+mod text;
+
+use crate::arguments::{SizeArguments, SizeGears, SizeOrder};
+use crate::exit::{Exit, Failure};
+use crate::files::Sources;
+use crate::inputs::{MachineInput, Overrides};
+use crate::{inputs, output};
+use std::io::Write;
+use std::path::{Component, Path, PathBuf};
+use workbench::catalogue::{self, Catalogue};
+use workbench::size::report::SizeReport;
+use workbench::size::{self, Gears, MachineFile, Options, Order, SizeError, write};
+
+/// Runs the command.
+///
+/// # Errors
+/// A machine, job or catalogue that does not hold, or a machine file that cannot be written.
+pub fn run(arguments: &SizeArguments) -> Result<Exit, Failure> {
+    let input = inputs::machine(&arguments.machine)?;
+    let overrides = Overrides::sort(&arguments.machine.set)?.machine;
+    if arguments.out.is_some() && !overrides.is_empty() {
+        return Err(Failure::bad_input(
+            "--out writes the machine file, and what --set changes of the machine is not in it: \
+             change the file instead",
+        ));
+    }
+    let request = inputs::job_request(
+        arguments.job.as_deref(),
+        &input.machine,
+        input.folder.as_deref(),
+        &input.job_overrides,
+    );
+    let job = request.read(&input.machine)?;
+    let (catalogue, files) = catalogue(&arguments.motors)?;
+    let (name, text) = input.source.file();
+    let file = MachineFile { name: &name, text, overrides: &overrides };
+    let options = options(arguments, &catalogue);
+    let sized = size::size(file, &input.machine, &job, &catalogue, &options);
+    let (mut report, machine) = sized.map_err(|error| match error {
+        SizeError::Plan(error) => request.refuse(&error).into(),
+        SizeError::Machine(error) => error.into(),
+        error => Failure::bad_input(error),
+    })?;
+    let machine = machine.filter(|_| is_right(&report));
+    if let (Some(out), Some(machine)) = (&arguments.out, machine) {
+        let sources: Vec<PathBuf> = job.files.iter().cloned().chain(files).collect();
+        let file = arguments.machine.machine.as_deref();
+        let mut sources = Sources::new(file, &sources);
+        write_machine(&input, &machine, out, &mut sources)?;
+        report.written = Some(out.display().to_string());
+    }
+    if arguments.json {
+        output::json(&report)?;
+    } else {
+        text::print(&report, arguments.out.is_some());
+    }
+    Ok(if is_right(&report) { Exit::Done } else { Exit::Stopped })
+}
+
+/// Whether every axis has a motor that was confirmed.
+fn is_right(report: &SizeReport) -> bool {
+    report.is_complete()
+        && report.confirmation.as_ref().is_none_or(|confirmation| confirmation.is_right)
+}
+
+fn options(arguments: &SizeArguments, catalogue: &Catalogue) -> Options {
+    let gears = match arguments.gears {
+        Some(SizeGears::Keep) => Gears::Keep,
+        Some(SizeGears::Catalogue) => Gears::Catalogue,
+        Some(SizeGears::Any) => Gears::Any,
+        None if catalogue.gears.is_empty() => Gears::Keep,
+        None => Gears::Catalogue,
+    };
+    Options {
+        margin: arguments.margin,
+        ambient: arguments.ambient,
+        axes: arguments.axis.clone(),
+        order: match arguments.by {
+            SizeOrder::Mass => Order::Mass,
+            SizeOrder::Power => Order::Power,
+        },
+        gears,
+    }
+}
+
+/// The catalogues that are named, or all that are built in, and the files that were read.
+fn catalogue(names: &[String]) -> Result<(Catalogue, Vec<PathBuf>), Failure> {
+    let builtin = |name: &str| catalogue::BUILTIN.iter().find(|(known, _)| *known == name);
+    let mut all = Catalogue::default();
+    let mut files = Vec::new();
+    if names.is_empty() {
+        for (name, text) in catalogue::BUILTIN {
+            all = all.and(Catalogue::parse(&format!("catalogues/{name}.toml"), text)?);
+        }
+    }
+    for name in names {
+        let path = Path::new(name);
+        // A file of that name goes first.
+        let read = match builtin(name).filter(|_| !path.is_file()) {
+            Some((name, text)) => Catalogue::parse(&format!("catalogues/{name}.toml"), text)?,
+            None => {
+                files.push(path.to_owned());
+                Catalogue::load(path)?
+            }
+        };
+        all = all.and(read);
+    }
+    Ok((all, files))
+}
+
+/// Writes the machine file with what was chosen to `out`; its sample job is named from there.
+fn write_machine(
+    input: &MachineInput,
+    machine: &str,
+    out: &Path,
+    sources: &mut Sources,
+) -> Result<(), Failure> {
+    let sample = sample_from(input, out);
+    let text = write::with_sample(machine, sample.as_deref()).map_err(Failure::bad_input)?;
+    let mut file = sources.create("--out", out)?;
+    file.write_all(text.as_bytes())
+        .map_err(|error| Failure::output(format!("{}: {error}", out.display())))
+}
+
+/// The sample job of the machine, by its path from the folder of `out`.
+fn sample_from(input: &MachineInput, out: &Path) -> Option<String> {
+    let sample = input.folder.as_ref()?.join(input.machine.sample_job.as_ref()?);
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+    let sample = sample.canonicalize().ok()?;
+    Some(relative(&folder, &sample).display().to_string())
+}
+
+/// `path` as it is called from `folder`, both absolute.
+fn relative(folder: &Path, path: &Path) -> PathBuf {
+    let common =
+        folder.components().zip(path.components()).take_while(|(one, other)| one == other).count();
+    let up = folder.components().skip(common).map(|_| Component::ParentDir);
+    up.chain(path.components().skip(common)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_called_from_where_the_file_is() {
+        let from = |folder: &str, path: &str| relative(Path::new(folder), Path::new(path));
+        assert_eq!(from("/a/b", "/a/c/d.toml"), Path::new("../c/d.toml"));
+        assert_eq!(from("/a", "/a/d.toml"), Path::new("d.toml"));
+        assert_eq!(from("/x/y", "/a/d.toml"), Path::new("../../a/d.toml"));
+    }
+}

@@ -1,0 +1,214 @@
+//! What a job asks of each joint, whatever drives it.
+
+use super::{MachineFile, SizeError};
+use core::f64::consts::TAU;
+use machine::document::Document;
+use machine::file::bounds::BOUNDS;
+use machine::file::tables::{AxisTable, MachineTable};
+use machine::kinematics::Joints;
+use machine::transmission::gear::Efficiency;
+use machine::{Axis, DcMotor, Friction, JointUnit, Machine, Mechanism, MechanismVisitor, Motor};
+use messages::time::CYCLE_TIME;
+use planner::{Job, Plan};
+
+/// What a joint does at one instant, on the motor's side of its spring.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NeedPoint {
+    /// Stream time [s].
+    pub time: f64,
+    /// Whether the laser is lit in the cycle that begins then.
+    pub is_lit: bool,
+    /// The stroke that it marks, from 1; 0 for none.
+    pub stroke: u64,
+    /// [m/s or rad/s].
+    pub speed: f64,
+    /// [m/s² or rad/s²].
+    pub acceleration: f64,
+    /// What the load takes, without losses and without any rotor [N or N·m].
+    pub effort: f64,
+}
+
+/// What a job asks of one joint, and what stands between it and its motor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisNeed {
+    /// Name of the axis.
+    pub name: String,
+    /// What the joint is measured in.
+    pub unit: JointUnit,
+    /// What it does, one point a cycle.
+    pub points: Vec<NeedPoint>,
+    /// Joint travel per radian of the gear's output [m/rad or rad/rad].
+    pub travel: f64,
+    /// Inertia that turns stiffly with the gear's output, such as a screw [kg·m²].
+    pub stiff_inertia: f64,
+    /// Load that the joint moves at home, the other joints at rest [kg or kg·m²].
+    pub load: f64,
+    /// Pitch diameter of the pulley on the gear's output; `None` where a coupling stands there [m].
+    pub pulley: Option<f64>,
+    /// The ratio of the gear that the machine has.
+    pub gear: f64,
+    /// The axis as the machine has it.
+    pub axis: Axis,
+    /// Its motor's own inertia [kg·m²].
+    pub rotor_inertia: f64,
+    /// The path's tolerance at the joint, by how far the joint moves the tool at home [m or rad].
+    pub tolerance: f64,
+    /// The largest speed that the machine file sets for the joint [m/s or rad/s].
+    pub velocity: Option<f64>,
+}
+
+impl AxisNeed {
+    /// What gear and screw or belt lose, and friction at a shaft that turns the joint by `ratio`
+    /// [joint unit/rad]: the joint's friction is the same, whatever drives it.
+    pub fn friction_at(&self, ratio: f64) -> Friction {
+        let share = ratio / self.axis.ratio;
+        Friction {
+            coulomb: self.axis.friction.coulomb * share,
+            viscous: self.axis.friction.viscous * share * share,
+        }
+    }
+
+    /// The efficiency behind a gear that passes on `gear`: what the machine file says of gear and screw
+    /// together, but no more than the gear alone.
+    pub fn efficiency_with(&self, gear: Option<Efficiency>) -> Efficiency {
+        let Efficiency { dynamic, at_start } = self.axis.efficiency;
+        gear.map_or(self.axis.efficiency, |gear| Efficiency {
+            dynamic: dynamic.min(gear.dynamic),
+            at_start: at_start.min(gear.at_start),
+        })
+    }
+}
+
+/// The tables of a machine file.
+///
+/// # Errors
+/// A file that is not sound.
+pub fn table(file: MachineFile<'_>) -> Result<MachineTable, SizeError> {
+    let document = Document::parse(file.name, file.text)?;
+    let document = document.override_with(file.overrides, "machine.")?;
+    Ok(document.decode_within::<MachineTable>(BOUNDS)?.0)
+}
+
+/// What `job` asks of each joint of `machine`, whose file has `table`, and the plan without limits of the
+/// motors from which that follows.
+///
+/// # Errors
+/// A job that no motor could do.
+pub fn needs(
+    machine: &Machine,
+    table: &MachineTable,
+    job: &Job,
+) -> Result<(Plan, Vec<AxisNeed>), SizeError> {
+    let plan = planner::plan(&unbounded(machine, table), job)?;
+    let mut needs: Vec<AxisNeed> = machine
+        .axes
+        .iter()
+        .enumerate()
+        .filter_map(|(index, axis)| {
+            Some(axis_need(machine, table, index, axis_table(table, &axis.name)?))
+        })
+        .collect();
+    let setpoints: Vec<_> = plan.setpoints(1).collect();
+    for (index, need) in needs.iter_mut().enumerate() {
+        let motor_side = |at: usize| setpoints[at].position[index] + setpoints[at].lead[index];
+        let last = setpoints.len().saturating_sub(1);
+        need.points = (0..setpoints.len())
+            .map(|at| {
+                let setpoint = &setpoints[at];
+                let (before, after) = (at.saturating_sub(1), (at + 1).min(last));
+                let lead = |at: usize| setpoints[at].lead[index];
+                let bending = lead(after) - 2.0 * lead(at) + lead(before);
+                NeedPoint {
+                    time: setpoint.sequence as f64 * CYCLE_TIME,
+                    is_lit: setpoint.laser.is_lit(),
+                    stroke: setpoint.stroke,
+                    speed: (motor_side(at) - motor_side(before)) / CYCLE_TIME,
+                    acceleration: setpoint.acceleration[index]
+                        + bending / (CYCLE_TIME * CYCLE_TIME),
+                    effort: setpoint.effort[index] / machine.axes[index].ratio,
+                }
+            })
+            .collect();
+    }
+    Ok((plan, needs))
+}
+
+fn axis_table<'a>(table: &'a MachineTable, name: &str) -> Option<&'a AxisTable> {
+    table.axis.entries.iter().find(|(key, _)| key.value == name).map(|(_, axis)| axis)
+}
+
+fn axis_need(
+    machine: &Machine,
+    table: &MachineTable,
+    index: usize,
+    axis_table: &AxisTable,
+) -> AxisNeed {
+    let axis = &machine.axes[index];
+    let gear = axis_table.gear.value;
+    let own = match (&axis_table.motor.dc, &axis_table.motor.stepper) {
+        (Some(dc), _) => dc.rotor_inertia.value,
+        (_, Some(stepper)) => stepper.rotor_inertia.value,
+        _ => axis.motor.rotor_inertia(),
+    };
+    let corexy = table.mechanism.corexy.as_ref().map(|corexy| corexy.pulley_radius.value);
+    let belt = axis_table.transmission.belt.as_ref().map(|belt| belt.pulley_radius.value);
+    AxisNeed {
+        name: axis.name.clone(),
+        unit: axis.unit,
+        points: Vec::new(),
+        travel: axis.ratio * gear,
+        stiff_inertia: (axis.motor.rotor_inertia() - own).max(0.0) * gear * gear,
+        load: (axis.gains.inertia - axis.motor.rotor_inertia()) / (axis.ratio * axis.ratio),
+        pulley: corexy.or(belt).map(|radius| 2.0 * radius),
+        gear,
+        axis: axis.clone(),
+        rotor_inertia: own,
+        tolerance: machine.path.tolerance / lever(machine, index),
+        velocity: axis_table.limits.velocity.map(|velocity| velocity.value),
+    }
+}
+
+/// How far the joint of this number moves the tool at home [m per joint unit]; 1 where it does not.
+fn lever(machine: &Machine, index: usize) -> f64 {
+    struct Levers<'a>(&'a [f64]);
+    impl MechanismVisitor for Levers<'_> {
+        type Output = Vec<f64>;
+        fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Vec<f64> {
+            let home = Joints::<N>::from_fn(|row, _| self.0.get(row).copied().unwrap_or(0.0));
+            let Ok(chain) = mechanism.solve(&home, mechanism.branch(), None) else {
+                return Vec::new();
+            };
+            let jacobian = mechanism.jacobian(&chain);
+            jacobian.column_iter().map(|column| column.fixed_rows::<3>(0).norm()).collect()
+        }
+    }
+    /// A joint that moves the tool by less only turns it [m per joint unit].
+    const LEAST: f64 = 1e-6;
+    let levers = machine.mechanism.visit(Levers(&machine.home_joints));
+    levers.get(index).copied().filter(|lever| *lever > LEAST).unwrap_or(1.0)
+}
+
+/// `machine` with motors that give anything and weigh nothing, so that only path and joints limit it.
+fn unbounded(machine: &Machine, table: &MachineTable) -> Machine {
+    let mut unbounded = machine.clone();
+    for axis in &mut unbounded.axes {
+        axis.motor = Motor::Dc(DcMotor {
+            resistance: 1e-6,
+            inductance: 1e-9,
+            torque_constant: 1.0,
+            rotor_inertia: 1e-15,
+            voltage: 1e9,
+            current: 1e9,
+            continuous_current: None,
+        });
+        axis.backlash = 0.0;
+        let limits = axis_table(table, &axis.name).map(|table| &table.limits);
+        if limits.is_none_or(|limits| limits.velocity.is_none()) {
+            axis.limits.velocity = FASTEST * axis.ratio.max(1.0);
+        }
+    }
+    unbounded
+}
+
+/// A speed that no joint is asked for [m/s or rad/s].
+const FASTEST: f64 = 1e4 * TAU;
