@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn a_job_that_may_be_too_long_is_not_surely_within_reach() {
-        assert!(!is_within("G4 P100000\n", &[]));
+        assert!(!is_within("G4 P80000\nG4 P80000\n", &[]));
         assert!(is_within("G4 P1000\n", &[]));
     }
 }
