@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
 
+use crate::analysis::Bodies;
 use crate::taylor::Taylor;
 
 /// Joint coordinates of a mechanism with `N` axes [m or rad].
@@ -402,6 +403,11 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
     /// Whether straight lines of the tool are straight lines of the joints.
     fn is_linear(&self) -> bool {
         false
+    }
+
+    /// What moves, and where it is: for a builder's figures, not for motion.
+    fn bodies(&self, _chain: &Self::ChainState) -> Bodies {
+        Bodies::default()
     }
 
     /// Stiffness of the transmission [N/m or N·m/rad], symmetric; `None` when it is rigid.

@@ -8,6 +8,7 @@
 #![allow(rustdoc::broken_intra_doc_links)]
 
 pub mod actuator;
+pub mod analysis;
 pub mod document;
 pub mod equation_of_motion;
 pub mod file;

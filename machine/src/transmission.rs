@@ -3,10 +3,11 @@
 //! A screw, a belt, a gear, an arm that bends and a planar stepper differ in how stiff they are and
 //! in what their data sheets print; seen from the joint each is a spring and a damper
 //! ([`Elasticity`]) behind some [`backlash`]. Here stand the formulas that lead there:
-//! [`screw`], [`belt`], [`gear`] and [`link`]. A planar stepper has none: its field pulls the rotor
+//! [`screw`], [`belt`], [`gear`], [`link`] and, with the mass of its own, [`beam`]. A planar stepper has none: its field pulls the rotor
 //! across the gap, with the stiffness of [`crate::StepperMotor`].
 
 pub mod backlash;
+pub mod beam;
 pub mod belt;
 pub mod equilibrium;
 pub mod gear;

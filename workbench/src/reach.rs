@@ -1,18 +1,16 @@
 //! Which part of its area a machine can reach: a grid over x and y, at the height and with the
 //! attitude of home, on the branch in which the machine is built.
 
-use machine::kinematics::{Branch, Joints, KinematicsError, Margin};
+use machine::analysis::{Area, Reached, Refusal, grid_position, to_and_fro};
+use machine::kinematics::{KinematicsError, Margin};
 use machine::pulses::quantisation_bound;
-use machine::{Machine, Mechanism, MechanismVisitor, Pose};
+use machine::{Machine, Mechanism, MechanismVisitor};
 use monitor::report::workspace::Ground;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use serde::Serialize;
 
 /// Places of the grid along x, and along y; odd, so that one lies in the middle.
 pub const GRID: usize = 41;
-
-/// Rounding allowed at a soft limit [m or rad].
-const ROUNDING: f64 = 1e-9;
 
 /// What the survey of the area found.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
@@ -95,126 +93,31 @@ impl MechanismVisitor for Survey<'_> {
     type Output = Result<Surveyed, KinematicsError>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let home = Joints::<N>::from_fn(|axis, _| {
-            self.machine.home_joints.get(axis).copied().unwrap_or_default()
+        let Self { machine } = self;
+        // Counts or pulses of each joint [1/m or 1/rad].
+        let counts: [f64; N] = core::array::from_fn(|axis| {
+            let axis = machine.axes.get(axis);
+            axis.map_or(f64::INFINITY, |axis| 1.0 / (axis.encoder.resolution() * axis.ratio))
         });
-        // Whichever turn a table is in.
-        let branch = mechanism.branch().in_any_turn();
-        let rotation = mechanism.forward(&home, branch)?.rotation;
-        let mut grid = Grid {
-            machine: self.machine,
-            mechanism,
-            branch,
-            rotation,
-            home,
-            counts: core::array::from_fn(|axis| {
-                let axis = self.machine.axes.get(axis);
-                axis.map_or(f64::INFINITY, |axis| 1.0 / (axis.encoder.resolution() * axis.ratio))
-            }),
-            previous: home,
-            tally: Tally::default(),
-        };
-        let ground = grid.walk();
-        Ok(Surveyed { report: grid.tally.report(self.machine.home[2]), ground })
-    }
-}
-
-/// Why the tool does not come to a place.
-struct Refused {
-    code: &'static str,
-    axis: Option<usize>,
-    singular: bool,
-}
-
-impl From<KinematicsError> for Refused {
-    fn from(error: KinematicsError) -> Self {
-        let singular = error.code.starts_with("singular") || error.code.contains("collision");
-        Self { code: error.code, axis: error.axis, singular }
-    }
-}
-
-/// How the tool comes to a place.
-struct Reached<const N: usize> {
-    /// [m or rad].
-    joints: Joints<N>,
-    margins: Vec<Margin>,
-    /// What half a count on each axis comes to at the tool [m].
-    count_error: f64,
-}
-
-struct Grid<'a, const N: usize, M: Mechanism<N>> {
-    machine: &'a Machine,
-    mechanism: M,
-    branch: M::Branch,
-    rotation: Matrix3<f64>,
-    home: Joints<N>,
-    /// Counts or pulses of each joint [1/m or 1/rad].
-    counts: [f64; N],
-    /// The joints at the last place that was reached [m or rad].
-    previous: Joints<N>,
-    tally: Tally,
-}
-
-impl<const N: usize, M: Mechanism<N>> Grid<'_, N, M> {
-    /// Row by row, to and fro, so that each place is beside the one before.
-    fn walk(&mut self) -> Vec<Ground> {
+        let mut area = Area::new(machine, &mechanism)?;
+        let mut tally = Tally::default();
         let mut ground = vec![Ground::Outside; GRID * GRID];
-        for row in 0..GRID {
-            for step in 0..GRID {
-                let column = if row % 2 == 0 { step } else { GRID - 1 - step };
-                ground[row * GRID + column] = self.sample(column, row);
-            }
+        for [column, row] in to_and_fro([GRID, GRID]) {
+            let position = grid_position(machine, [GRID, GRID], [column, row]);
+            ground[row * GRID + column] = match area.reach(&position) {
+                Ok(Reached { chain, margins, .. }) => {
+                    let error = quantisation_bound(&mechanism.jacobian(&chain), &counts);
+                    tally.reach(&position, &margins, error);
+                    Ground::Reached
+                }
+                Err(refusal) => {
+                    let axis = refusal.axis.and_then(|axis| machine.axes.get(axis));
+                    tally.refuse(&refusal, axis.map(|axis| axis.name.as_str()));
+                    if refusal.is_singular { Ground::Singular } else { Ground::Outside }
+                }
+            };
         }
-        ground
-    }
-
-    fn sample(&mut self, column: usize, row: usize) -> Ground {
-        let along = |axis: usize, index: usize| {
-            let area = &self.machine.area;
-            let share = index as f64 / (GRID - 1) as f64;
-            // Exact at both edges.
-            area.lower[axis] * (1.0 - share) + area.upper[axis] * share
-        };
-        let position = Vector3::new(along(0, column), along(1, row), self.machine.home[2]);
-        match self.reach(&position) {
-            Ok(reached) => {
-                self.tally.reach(&position, &reached);
-                self.previous = reached.joints;
-                Ground::Reached
-            }
-            Err(refused) => {
-                let axis = refused.axis.and_then(|axis| self.machine.axes.get(axis));
-                self.tally.refuse(&refused, axis.map(|axis| axis.name.as_str()));
-                if refused.singular { Ground::Singular } else { Ground::Outside }
-            }
-        }
-    }
-
-    /// The tool at `position`, reached on from the place before or else from home.
-    fn reach(&self, position: &Vector3<f64>) -> Result<Reached<N>, Refused> {
-        let pose = Pose { position: *position, rotation: self.rotation };
-        self.solve(&pose, &self.previous).or_else(|_| self.solve(&pose, &self.home))
-    }
-
-    fn solve(&self, pose: &Pose, previous: &Joints<N>) -> Result<Reached<N>, Refused> {
-        let joints = self.mechanism.inverse(pose, self.branch, previous)?;
-        for (axis, (settings, joint)) in self.machine.axes.iter().zip(joints.iter()).enumerate() {
-            let [lower, upper] = settings.limits.position;
-            // Put this way a joint that is no number is beyond.
-            if !(*joint >= lower - ROUNDING && *joint <= upper + ROUNDING) {
-                return Err(Refused { code: "limit", axis: Some(axis), singular: false });
-            }
-        }
-        let chain = self.mechanism.solve(&joints, self.branch, None)?;
-        let margins = self.mechanism.margins(&chain);
-        match margins.iter().find(|margin| margin.value < margin.limit) {
-            Some(margin) => Err(Refused { code: margin.name, axis: None, singular: true }),
-            None => {
-                let jacobian = self.mechanism.jacobian(&chain);
-                let count_error = quantisation_bound(&jacobian, &self.counts);
-                Ok(Reached { joints, margins, count_error })
-            }
-        }
+        Ok(Surveyed { report: tally.report(machine.home[2]), ground })
     }
 }
 
@@ -230,14 +133,15 @@ struct Tally {
 }
 
 impl Tally {
-    fn reach<const N: usize>(&mut self, position: &Vector3<f64>, reached: &Reached<N>) {
+    /// A place with its margins, and what half a count on each axis comes to at the tool [m].
+    fn reach(&mut self, position: &Vector3<f64>, margins: &[Margin], count_error: f64) {
         self.reached += 1;
-        self.count_error = self.count_error.max(reached.count_error);
+        self.count_error = self.count_error.max(count_error);
         let [x, y] = [position.x, position.y];
         let bounds = self.bounds.get_or_insert(Bounds { x: [x, x], y: [y, y] });
         bounds.x = [bounds.x[0].min(x), bounds.x[1].max(x)];
         bounds.y = [bounds.y[0].min(y), bounds.y[1].max(y)];
-        for margin in &reached.margins {
+        for margin in margins {
             let found = PlaceMargin {
                 name: margin.name.to_owned(),
                 value: margin.value,
@@ -252,14 +156,14 @@ impl Tally {
         }
     }
 
-    fn refuse(&mut self, refused: &Refused, axis: Option<&str>) {
-        self.singular += usize::from(refused.singular);
+    fn refuse(&mut self, refusal: &Refusal, axis: Option<&str>) {
+        self.singular += usize::from(refusal.is_singular);
         let same = |(code, of, _): &&mut (String, Option<String>, usize)| {
-            code == refused.code && of.as_deref() == axis
+            code == refusal.code && of.as_deref() == axis
         };
         match self.refusals.iter_mut().find(same) {
             Some((.., count)) => *count += 1,
-            None => self.refusals.push((refused.code.to_owned(), axis.map(str::to_owned), 1)),
+            None => self.refusals.push((refusal.code.to_owned(), axis.map(str::to_owned), 1)),
         }
     }
 

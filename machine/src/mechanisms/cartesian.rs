@@ -5,6 +5,7 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
+use crate::analysis::Bodies;
 use crate::kinematics::{
     Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, STANDARD_GRAVITY,
     TaskSpace, ToolMotion, finite, in_plane,
@@ -110,6 +111,12 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
 
     fn gravity(&self, _q: &Joints<N>) -> Joints<N> {
         SVector::from_fn(|row, _| if row == 2 { self.mass[row] * STANDARD_GRAVITY } else { 0.0 })
+    }
+
+    fn bodies(&self, q: &Joints<N>) -> Bodies {
+        // One carriage bears the other.
+        let moving_mass = self.mass.into_iter().fold(0.0, f64::max);
+        Bodies { moving_mass, points: vec![self.pose(q).position] }
     }
 
     fn stiffness(&self) -> Option<SMatrix<f64, N, N>> {

@@ -5,6 +5,7 @@
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
+use crate::analysis::Bodies;
 use crate::kinematics::{
     Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, TaskSpace, ToolMotion,
     in_plane,
@@ -121,6 +122,10 @@ impl Mechanism<2> for CoreXy {
 
     fn gravity(&self, _q: &Joints<2>) -> Joints<2> {
         Joints::zeros()
+    }
+
+    fn bodies(&self, q: &Joints<2>) -> Bodies {
+        Bodies { moving_mass: self.mass[1], points: vec![self.pose(q).position] }
     }
 
     fn stiffness(&self) -> Option<Matrix2<f64>> {

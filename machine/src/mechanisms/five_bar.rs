@@ -14,6 +14,7 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
+use crate::analysis::Bodies;
 use crate::kinematics::{
     Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
     TaskSpace, ToolMotion, in_plane,
@@ -474,6 +475,18 @@ impl Mechanism<2> for FiveBar {
 
     fn gravity(&self, _chain: &FiveBarChainState) -> Joints<2> {
         Joints::zeros()
+    }
+
+    fn bodies(&self, chain: &FiveBarChainState) -> Bodies {
+        let motors = [0, 1].map(|arm| Vector2::new(self.base(arm), 0.0));
+        let elbows = [0, 1].map(|arm| motors[arm] + chain.proximal[arm]);
+        let points = [motors[0], motors[1], elbows[0], elbows[1], chain.tool];
+        Bodies {
+            moving_mass: 2.0 * (self.proximal_mass + self.distal_mass)
+                + self.tool_mass
+                + self.bar_mass,
+            points: points.map(plane::level).into(),
+        }
     }
 
     fn stiffness(&self) -> Option<Matrix2<f64>> {

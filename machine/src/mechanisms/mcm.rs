@@ -18,6 +18,7 @@ use messages::math;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::polar::center;
+use crate::analysis::Bodies;
 use crate::kinematics::{
     Attitude, Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind,
     Mechanism, Pose, TaskSpace, ToolMotion, finite,
@@ -413,6 +414,17 @@ impl Mechanism<5> for Mcm {
         previous: &Joints<5>,
     ) -> Option<Result<Joints<5>, KinematicsError>> {
         Some(Self::inverse_machine_angles(self, position, tilt, turn, branch.side, previous))
+    }
+
+    fn bodies(&self, q: &Joints<5>) -> Bodies {
+        let (tilt_sine, tilt_cosine) = math::sin_cos(q[3]);
+        let (turn_sine, turn_cosine) = math::sin_cos(q[4]);
+        let head = Vector3::new(self.offset, q[0], self.height - q[1]);
+        let tool = Vector3::new(tilt_sine * turn_sine, tilt_sine * turn_cosine, -tilt_cosine);
+        Bodies {
+            moving_mass: self.load.carriage_mass + self.load.slide_mass + self.load.head_mass,
+            points: vec![Vector3::zeros(), head, head + tool * self.tool],
+        }
     }
 
     fn stiffness(&self) -> Option<SMatrix<f64, 5, 5>> {

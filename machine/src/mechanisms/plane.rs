@@ -1,12 +1,17 @@
 //! What the planar linkages share: vectors turned by a right angle, and rigid bodies in the plane.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 use crate::kinematics::Jacobian;
 
 /// `vector` turned by a right angle, counter-clockwise.
 pub(super) fn turned(vector: Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-vector.y, vector.x)
+}
+
+/// `point` in space, at height 0.
+pub(super) fn level(point: Vector2<f64>) -> Vector3<f64> {
+    Vector3::new(point.x, point.y, 0.0)
 }
 
 /// The part of `a × b` that stands on the plane.

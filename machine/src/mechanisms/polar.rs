@@ -16,6 +16,7 @@ use core::f64::consts::FRAC_PI_2;
 use messages::math;
 use nalgebra::{Matrix3, Vector3};
 
+use crate::analysis::Bodies;
 use crate::kinematics::{
     Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
     TaskSpace, ToolMotion, finite,
@@ -350,6 +351,19 @@ impl Mechanism<3> for Polar {
 
     fn has_constant_mass(&self) -> bool {
         true
+    }
+
+    fn bodies(&self, q: &Joints<3>) -> Bodies {
+        let (sine, cosine) = math::sin_cos(q[0]);
+        let height = self.height + q[2];
+        Bodies {
+            moving_mass: self.load.arm_mass + self.load.head_mass + self.load.workpiece_mass,
+            points: vec![
+                Vector3::zeros(),
+                Vector3::new(self.center_distance, 0.0, 0.0),
+                Vector3::new(self.arm * cosine, self.arm * sine, height),
+            ],
+        }
     }
 
     fn stiffness(&self) -> Option<Matrix3<f64>> {

@@ -14,6 +14,7 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross};
+use crate::analysis::Bodies;
 use crate::kinematics::{
     Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
     TaskSpace, ToolMotion, in_plane,
@@ -297,6 +298,14 @@ impl Mechanism<2> for Prrrp {
 
     fn gravity(&self, _chain: &PrrrpChainState) -> Joints<2> {
         Joints::zeros()
+    }
+
+    fn bodies(&self, chain: &PrrrpChainState) -> Bodies {
+        let carts = [0, 1].map(|cart| chain.tool - chain.links[cart]);
+        Bodies {
+            moving_mass: 2.0 * (self.cart_mass + self.link_mass) + self.tool_mass + self.bar_mass,
+            points: [carts[0], carts[1], chain.tool].map(plane::level).into(),
+        }
     }
 
     fn stiffness(&self) -> Option<Matrix2<f64>> {

@@ -13,6 +13,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 pub use dynamics::SerialChainState;
 
+use crate::analysis::Bodies;
 use crate::kinematics::{
     Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose, TaskSpace,
     ToolMotion,
@@ -149,6 +150,14 @@ impl<const N: usize> Mechanism<N> for Serial<N> {
 
     fn gravity(&self, state: &SerialChainState<N>) -> Joints<N> {
         self.efforts(&state.links, &Joints::zeros())
+    }
+
+    fn bodies(&self, state: &SerialChainState<N>) -> Bodies {
+        let origins = state.links.iter().map(|link| link.origin);
+        Bodies {
+            moving_mass: self.links.iter().map(|link| link.mass).sum(),
+            points: origins.chain([state.tool.position]).collect(),
+        }
     }
 
     fn stiffness(&self) -> Option<SMatrix<f64, N, N>> {

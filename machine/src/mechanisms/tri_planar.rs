@@ -15,10 +15,11 @@ mod inverse;
 mod limits;
 mod struts;
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{SMatrix, SVector, Vector3};
 
 pub use chain_state::TriPlanarChainState;
 
+use crate::analysis::Bodies;
 use crate::kinematics::{
     Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, TaskSpace,
     ToolMotion,
@@ -252,6 +253,16 @@ impl Mechanism<6> for TriPlanar {
 
     fn gravity(&self, chain: &TriPlanarChainState) -> Joints<6> {
         dynamics::bias(self, chain, &Joints::zeros())
+    }
+
+    fn bodies(&self, chain: &TriPlanarChainState) -> Bodies {
+        let feet = (0..3).map(|foot| chain.foot(foot));
+        let corners = CORNERS
+            .map(|[x, y]| chain.position + chain.rotation * Vector3::new(x, y, 0.0) * self.side);
+        Bodies {
+            moving_mass: self.platform_mass + 3.0 * (self.leg_mass + self.inductor_mass),
+            points: feet.chain(corners).collect(),
+        }
     }
 
     fn stiffness(&self) -> Option<SMatrix<f64, 6, 6>> {

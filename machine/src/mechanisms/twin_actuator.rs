@@ -16,6 +16,7 @@
 use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
+use crate::analysis::Bodies;
 use crate::kinematics::{
     Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
     TaskSpace, ToolMotion, in_plane,
@@ -363,6 +364,15 @@ impl Mechanism<2> for TwinActuator {
 
     fn gravity(&self, _chain: &TwinAssembly) -> Joints<2> {
         Joints::zeros()
+    }
+
+    fn bodies(&self, chain: &TwinAssembly) -> Bodies {
+        let [a, b] = self.bases;
+        let rods: f64 = self.bodies.iter().map(|body| body.rod_mass).sum();
+        Bodies {
+            moving_mass: rods + self.tool_mass,
+            points: [a, b, chain.joint, chain.tool].map(plane::level).into(),
+        }
     }
 
     fn stiffness(&self) -> Option<Matrix2<f64>> {
