@@ -43,6 +43,12 @@ Examples, one object a line in and out, SI units and radians:
 A line that asks for an impossible pose or motion gets {\"error\": {\"code\", \"detail\", ..}}, and the next line is
 answered; a line that is not such an object ends the command with exit code 2.";
 
+const FIGURES_EXAMPLES: &str = "\
+Examples:
+  graver figures                                    all figures of source 003, into figures/
+  graver figures ellipses modes --machine machines/five_bar.toml
+  graver figures torque jobs/letters.toml --machine machines/corexy.toml --out pictures";
+
 const EXPORT_EXAMPLES: &str = "\
 Examples:
   graver export runs/20261127-134500-NASO > samples.csv
@@ -98,6 +104,9 @@ pub enum Command {
     /// Say what motor and gear each axis needs for a job, and choose them from catalogues.
     #[command(after_help = SIZE_EXAMPLES)]
     Size(SizeArguments),
+    /// Draw figures of machines, motors and jobs: SVG, the numbers as CSV, and a page of them all.
+    #[command(after_help = FIGURES_EXAMPLES)]
+    Figures(FiguresArguments),
     /// Measure this PC: latencies, planning speed, simulation speed.
     #[command(subcommand)]
     Bench(BenchCommand),
@@ -386,6 +395,29 @@ pub enum SizeGears {
     Catalogue,
     /// Any ratio.
     Any,
+}
+
+/// Arguments of `figures`.
+#[derive(Debug, Clone, Args)]
+pub struct FiguresArguments {
+    /// Names of figures (torque, motor, acceleration, stiffness, ellipses, singular, speed, chords,
+    /// modes; without any all of them), and a job that the machines mark instead of the source's
+    /// letters or their own sample jobs.
+    #[arg(value_name = "NAME|JOB")]
+    pub what: Vec<String>,
+    /// Machine file (.toml), can be repeated; without it the four machines of source 003.
+    #[arg(long, value_name = "FILE")]
+    pub machine: Vec<PathBuf>,
+    /// Change a value of all machines (machine.path.jerk="5000 m/s^3") or of the job, as in `plan`. Can
+    /// be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Folder that the files go to.
+    #[arg(long, value_name = "DIR", default_value = "figures")]
+    pub out: PathBuf,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What `bench` measures.

@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod check;
 pub mod export;
+pub mod figures;
 pub mod kinematics;
 pub mod manual;
 pub mod operator;

@@ -20,6 +20,13 @@ impl Sources {
         Self { files: machine.into_iter().chain(job).collect() }
     }
 
+    /// These and the machine file at `path`.
+    #[must_use]
+    pub fn and_machine(mut self, path: &Path) -> Self {
+        self.files.push((path.to_owned(), "a machine file"));
+        self
+    }
+
     /// The file that is exported.
     pub fn recording(path: &Path) -> Self {
         Self { files: vec![(path.to_owned(), "the recording itself")] }

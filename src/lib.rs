@@ -15,7 +15,8 @@ pub mod pipeline;
 use arguments::{Arguments, BenchCommand, Command};
 use clap::Parser;
 use commands::{
-    bench, check, export, kinematics, manual, operator, plan, run, service, simulate, size, verify,
+    bench, check, export, figures, kinematics, manual, operator, plan, run, service, simulate,
+    size, verify,
 };
 use exit::{Exit, Failure};
 use pipeline::operators::Verb;
@@ -44,6 +45,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Kinematics(arguments) => kinematics::run(arguments),
         Command::Export(arguments) => export::run(arguments),
         Command::Size(arguments) => size::run(arguments),
+        Command::Figures(arguments) => figures::run(arguments),
         Command::Bench(BenchCommand::Latency(arguments)) => bench::latency(arguments),
         Command::Bench(BenchCommand::Plan(arguments)) => bench::planning::run(arguments),
         Command::Bench(BenchCommand::Simulate(arguments)) => bench::simulate(arguments),
@@ -76,6 +78,7 @@ fn wants_json(command: &Command) -> bool {
         Command::Plan(arguments) => arguments.json,
         Command::Check(arguments) => arguments.json,
         Command::Size(arguments) => arguments.json,
+        Command::Figures(arguments) => arguments.json,
         Command::Submit(arguments) => arguments.instance.json,
         _ => false,
     }

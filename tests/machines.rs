@@ -19,7 +19,7 @@ fn sample(name: &str) -> Vec<String> {
     let machine = support::source("machines").join(format!("{name}.toml"));
     let mut arguments = vec!["--machine".to_owned(), machine.to_str().unwrap().to_owned()];
     let part = match name {
-        "polar" => Some("cloud.sphere.count=20"),
+        "polar" | "polar_beam" => Some("cloud.sphere.count=20"),
         "tri_planar" | "twin_actuator" => None,
         _ => Some("letters.text=S"),
     };
@@ -67,6 +67,7 @@ fn every_machine_marks_its_sample_job() {
         "five_bar",
         "mcm",
         "polar",
+        "polar_beam",
         "prrrp",
         "serial",
         "tri_planar",

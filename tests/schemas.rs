@@ -10,6 +10,7 @@ mod support;
 use graver::commands::bench::planning::PlanBenchReport;
 use graver::commands::bench::{LatencyReport, SpeedReport};
 use graver::commands::check::CheckReport;
+use graver::commands::figures::FiguresReport;
 use graver::commands::kinematics::lines::Reply;
 use graver::commands::plan::PlanReport;
 use graver::pipeline::operators::VerbReply;
@@ -23,6 +24,7 @@ use workbench::size::report::SizeReport;
 fn schemas() -> Vec<(&'static str, Schema)> {
     vec![
         ("check", schema_for!(CheckReport)),
+        ("figures", schema_for!(FiguresReport)),
         ("kinematics", schema_for!(Reply)),
         ("latency", schema_for!(LatencyReport)),
         ("plan", schema_for!(PlanReport)),

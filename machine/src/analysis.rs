@@ -16,7 +16,7 @@ mod stiffness;
 
 pub use area::{Area, Reached, Refusal, grid_position, places, to_and_fro};
 pub use bodies::{Bodies, footprint};
-pub use envelope::Reach;
+pub use envelope::Capability;
 pub use manipulability::Manipulability;
 pub use modes::{Mode, Rotors};
 pub use place::Place;

@@ -4,6 +4,7 @@
 //! on the real-time path.
 
 pub mod catalogue;
+pub mod figures;
 pub mod operating;
 pub mod reach;
 pub mod simulation;

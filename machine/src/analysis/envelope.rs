@@ -7,7 +7,7 @@ use super::{Place, Principal};
 
 /// What the tool can do in one direction, and the axis that allows no more.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reach {
+pub struct Capability {
     /// [m/s² or N]; 0 where the tool cannot move that way, or the motors cannot hold its weight.
     pub value: f64,
     /// The axis that sets the limit, from 0; `None` where no axis does.
@@ -37,15 +37,15 @@ impl Place {
 
     /// The largest acceleration of the tool [m/s²] from rest along `along`, of length 1, its attitude
     /// kept, with motors of `torques` [N·m] that turn their rotors or, with `rotors` false, need not.
-    pub fn acceleration(&self, along: &Vector3<f64>, torques: &[f64], rotors: bool) -> Reach {
-        let Some(joints) = self.rates(along) else { return Reach { value: 0.0, axis: None } };
+    pub fn acceleration(&self, along: &Vector3<f64>, torques: &[f64], rotors: bool) -> Capability {
+        let Some(joints) = self.rates(along) else { return Capability { value: 0.0, axis: None } };
         let inertia = if rotors { self.inertia_with_rotors() } else { self.mass.clone() };
         self.within(torques, &(inertia * joints))
     }
 
     /// The largest force that the tool exerts at rest along `along`, of length 1 [N], with motors of
     /// `torques` [N·m].
-    pub fn force(&self, along: &Vector3<f64>, torques: &[f64]) -> Reach {
+    pub fn force(&self, along: &Vector3<f64>, torques: &[f64]) -> Capability {
         let rows = self.linear.nrows();
         let along = DVector::from_fn(rows, |row, _| along[row]);
         self.within(torques, &(self.linear.transpose() * along))
@@ -68,8 +68,8 @@ impl Place {
     }
 
     /// How many times `efforts` [N or N·m] the motors give over what they hold at rest.
-    fn within(&self, torques: &[f64], efforts: &DVector<f64>) -> Reach {
-        let mut reach = Reach { value: f64::INFINITY, axis: None };
+    fn within(&self, torques: &[f64], efforts: &DVector<f64>) -> Capability {
+        let mut found = Capability { value: f64::INFINITY, axis: None };
         for (axis, ((motor, torque), effort)) in
             self.motors.iter().zip(torques).zip(efforts.iter()).enumerate()
         {
@@ -79,10 +79,10 @@ impl Place {
             // An axis that has nothing to do sets no limit, unless it cannot even hold its weight.
             let times = if *effort == 0.0 { f64::INFINITY } else { times };
             let times = if self.gravity[axis].abs() > given { 0.0 } else { times };
-            if times < reach.value {
-                reach = Reach { value: times, axis: Some(axis) };
+            if times < found.value {
+                found = Capability { value: times, axis: Some(axis) };
             }
         }
-        if reach.axis.is_none() { Reach { value: 0.0, axis: None } } else { reach }
+        if found.axis.is_none() { Capability { value: 0.0, axis: None } } else { found }
     }
 }

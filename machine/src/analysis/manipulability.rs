@@ -1,6 +1,6 @@
 //! How velocities and forces of the joints come to the tool: the Jacobian's singular values.
 
-use nalgebra::SVD;
+use nalgebra::{DMatrix, SVD};
 
 use super::principal::{MOST_TURNS, direction};
 use super::{Place, Principal};
@@ -39,22 +39,15 @@ impl Manipulability {
 }
 
 impl Place {
-    /// How velocities of the joints come to the tool; `None` where they have no numbers.
+    /// How velocities of the joints come to the tool, in all directions that it moves in; `None` where they
+    /// have no numbers.
     pub fn manipulability(&self) -> Option<Manipulability> {
-        let svd = SVD::try_new_unordered(
-            self.linear.clone(),
-            true,
-            false,
-            5.0 * f64::EPSILON,
-            MOST_TURNS,
-        )?;
-        let along = svd.u?;
-        let mut velocity: Vec<Principal> = (svd.singular_values.iter())
-            .zip(along.column_iter())
-            .map(|(value, along)| Principal { value: *value, direction: direction(along.iter()) })
-            .collect();
-        velocity.sort_by(|one, other| other.value.total_cmp(&one.value));
-        velocity.iter().all(|axis| axis.value.is_finite()).then_some(Manipulability { velocity })
+        manipulability(self.linear.clone())
+    }
+
+    /// The same in x and y alone, whatever the tool does in z meanwhile.
+    pub fn manipulability_in_plane(&self) -> Option<Manipulability> {
+        manipulability(self.linear.rows(0, 2).into_owned())
     }
 
     /// The determinant of the Jacobian over the tool's directions, with its sign; `None` where there are
@@ -62,4 +55,15 @@ impl Place {
     pub fn determinant(&self) -> Option<f64> {
         self.linear.is_square().then(|| self.linear.clone().lu().determinant())
     }
+}
+
+fn manipulability(jacobian: DMatrix<f64>) -> Option<Manipulability> {
+    let svd = SVD::try_new_unordered(jacobian, true, false, 5.0 * f64::EPSILON, MOST_TURNS)?;
+    let along = svd.u?;
+    let mut velocity: Vec<Principal> = (svd.singular_values.iter())
+        .zip(along.column_iter())
+        .map(|(value, along)| Principal { value: *value, direction: direction(along.iter()) })
+        .collect();
+    velocity.sort_by(|one, other| other.value.total_cmp(&one.value));
+    velocity.iter().all(|axis| axis.value.is_finite()).then_some(Manipulability { velocity })
 }

@@ -33,6 +33,8 @@ pub const FINE: u32 = 3;
 pub const WIDTH: u32 = 960;
 /// Size of text, in page units.
 const TEXT: u32 = 13;
+/// Radius of a dot, in page units.
+const DOT: u32 = 3;
 
 /// The colour of curve `index`.
 pub fn colour(index: usize) -> RGBColor {
@@ -56,7 +58,7 @@ pub struct Curve {
     pub name: String,
     /// Its colour.
     pub colour: RGBColor,
-    /// `(x, y)` in the units of the axes.
+    /// `(x, y)` in the units of the axes; a line of one point is a dot.
     pub lines: Vec<Vec<(f64, f64)>>,
 }
 
@@ -83,11 +85,14 @@ impl Chart<'_> {
     /// # Errors
     /// [`PictureError`] when the numbers cannot be drawn.
     pub fn draw(&self) -> Result<String, PictureError> {
+        draw(self.title, self.height, |area| self.paint(area))
+    }
+
+    /// Paints the chart with linear axes into `area`.
+    fn paint<'b>(&self, area: &DrawingArea<Canvas<'b>, Shift>) -> Result<(), Failure<'b>> {
         let (x, y) = self.ranges();
-        draw(self.title, self.height, |area| {
-            let mut chart = frame(area).build_cartesian_2d(x.0..x.1, y.0..y.1)?;
-            self.fill(area, &mut chart, &short, &short)
-        })
+        let mut chart = frame(area).build_cartesian_2d(x.0..x.1, y.0..y.1)?;
+        self.fill(area, &mut chart, &short, &short)
     }
 
     /// The chart of a distribution: across the nines of the share (1 is 90 %, 2 is 99 %), upwards
@@ -159,7 +164,11 @@ impl Chart<'_> {
         for curve in &self.curves {
             let style = curve.colour.stroke_width(FINE + 1);
             for line in &curve.lines {
-                chart.draw_series(LineSeries::new(line.iter().copied(), style))?;
+                if let [dot] = line.as_slice() {
+                    chart.draw_series([Circle::new(*dot, DOT * FINE, curve.colour.filled())])?;
+                } else {
+                    chart.draw_series(LineSeries::new(line.iter().copied(), style))?;
+                }
             }
         }
         let entries: Vec<_> = (self.curves.iter())
@@ -167,6 +176,23 @@ impl Chart<'_> {
             .collect();
         legend(area, &entries)
     }
+}
+
+/// One picture of charts one below the other, each with axes of its own.
+///
+/// # Errors
+/// [`PictureError`] when the numbers cannot be drawn.
+pub fn stack(title: &str, charts: &[Chart<'_>]) -> Result<String, PictureError> {
+    let height = charts.iter().map(|chart| chart.height).sum();
+    draw(title, height, |area| {
+        let mut rest = area.clone();
+        for chart in charts {
+            let (upper, below) = rest.split_vertically(chart.height * FINE);
+            chart.paint(&upper)?;
+            rest = below;
+        }
+        Ok(())
+    })
 }
 
 /// Where pictures are drawn.
@@ -266,6 +292,25 @@ mod tests {
         ] {
             assert_eq!(short(&value), expect);
         }
+    }
+
+    #[test]
+    fn charts_in_a_stack_keep_their_heights_and_names() {
+        let chart = |up: &'static str, lines: Vec<Vec<(f64, f64)>>| Chart {
+            title: up,
+            across: "time [s]",
+            up,
+            height: 200,
+            at_least: None,
+            curves: vec![Curve { name: up.to_owned(), colour: CURVES[0], lines }],
+        };
+        let line = vec![vec![(0.0, 1.0), (1.0, 2.0)]];
+        let charts = [chart("speed [rpm]", line), chart("torque [mN·m]", vec![vec![(0.5, 1.0)]])];
+        let svg = stack("two", &charts).unwrap();
+        assert!(svg.contains(&format!("height=\"{}\"", 400 * FINE)), "{svg}");
+        assert!(svg.contains("speed [rpm]") && svg.contains("torque [mN·m]"));
+        // One line, and one dot.
+        assert_eq!(svg.matches("<circle").count(), 1);
     }
 
     #[test]

@@ -79,7 +79,7 @@ impl Report<'_> {
                 x[0] * MILLIMETRES..x[1] * MILLIMETRES,
                 y[0] * MILLIMETRES..y[1] * MILLIMETRES,
             )?;
-            sheet.axes(&mut chart)?;
+            sheet.axes(&mut chart, PLACE)?;
             // Magnified, the way in the dark would only be in the way.
             let dark = CURVES[7].mix(0.7).stroke_width(FINE);
             if gain.is_none() {
@@ -109,22 +109,25 @@ impl Report<'_> {
     }
 }
 
+/// The names of axes that are places.
+pub const PLACE: [&str; 2] = ["x [mm]", "y [mm]"];
+
 /// A piece of the plane as a picture shows it: equal scales, air around what matters.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sheet {
-    /// From and to [m].
-    pub(super) x: [f64; 2],
-    /// From and to [m].
-    pub(super) y: [f64; 2],
+pub struct Sheet {
+    /// From and to, in one unit with y.
+    pub x: [f64; 2],
+    /// From and to.
+    pub y: [f64; 2],
     /// Height of the picture, in page units.
-    pub(super) height: u32,
+    pub height: u32,
     /// Height without the margins, in page units.
     inner: f64,
 }
 
 impl Sheet {
-    /// Around these ranges [m].
-    pub(super) fn around(x: [f64; 2], y: [f64; 2]) -> Self {
+    /// Around these ranges.
+    pub fn around(x: [f64; 2], y: [f64; 2]) -> Self {
         let size = (x[1] - x[0]).max(y[1] - y[0]);
         let air = 0.08 * size;
         let (x, y) = ([x[0] - air, x[1] + air], [y[0] - air, y[1] + air]);
@@ -137,15 +140,19 @@ impl Sheet {
         Self { x, y, height: (inner + margin_up).round() as u32, inner }
     }
 
-    /// Draws grid, numbers and names of the axes.
-    pub(super) fn axes<'b>(
+    /// Draws grid, numbers and names of the axes, each with its unit.
+    ///
+    /// # Errors
+    /// Whatever the drawing library reports.
+    pub fn axes<'b>(
         &self,
         chart: &mut ChartContext<'b, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
+        [across, up]: [&str; 2],
     ) -> Result<(), Failure<'b>> {
         chart
             .configure_mesh()
-            .x_desc("x [mm]")
-            .y_desc("y [mm]")
+            .x_desc(across)
+            .y_desc(up)
             .x_labels(11)
             .y_labels(((self.inner / 60.0) as usize).max(3))
             .x_label_formatter(&|value| short(value))

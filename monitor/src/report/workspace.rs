@@ -2,7 +2,7 @@
 
 use super::PictureError;
 use super::chart::{CURVES, Canvas, FINE, Failure, INK, draw, frame, legend};
-use super::path::{MILLIMETRES, Sheet, curve, thinned};
+use super::path::{MILLIMETRES, PLACE, Sheet, curve, thinned};
 use messages::artwork::Artwork;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -52,7 +52,7 @@ impl Workspace<'_> {
             let mut chart = frame(area).build_cartesian_2d(x, y)?;
             self.fill(&mut chart, Ground::Reached, reached)?;
             self.fill(&mut chart, Ground::Singular, singular)?;
-            sheet.axes(&mut chart)?;
+            sheet.axes(&mut chart, PLACE)?;
             curve(&mut chart, outline, self.outline())?;
             for line in self.artwork.map(thinned).unwrap_or_default() {
                 curve(&mut chart, strokes, line)?;
