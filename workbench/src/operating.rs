@@ -78,7 +78,24 @@ pub fn courses(machine: &Machine, plan: &Plan) -> Vec<AxisCourse> {
             course.points.push(point);
         }
     }
+    for (axis, course) in machine.axes.iter().zip(&mut courses) {
+        lead(axis, &mut course.points);
+    }
     courses
+}
+
+/// Gives each point the acceleration of the shaft itself, from its speeds before and after: springs let it
+/// lead the joint, and what the rotor takes for that is not the load's.
+fn lead(axis: &Axis, points: &mut [OperatingPoint]) {
+    for index in 1..points.len().saturating_sub(1) {
+        let next = points[index + 1].speed;
+        let point = &mut points[index];
+        let torque = point.load + point.rotor;
+        point.acceleration = (next - point.speed) / CYCLE_TIME;
+        point.rotor = axis.motor.rotor_inertia() * point.acceleration;
+        point.load = torque - point.rotor;
+        point.by_efficiency = point.rotor + with_losses(&axis.efficiency, point.load, point.speed);
+    }
 }
 
 /// A motor at a setpoint.
