@@ -66,6 +66,14 @@ Examples:
 A catalogue is a TOML file, or one of thesis, dc, bldc, steppers and gears, which are built in.
 --out writes the machine file with the motors; its comments stay.";
 
+const TABLES_EXAMPLES: &str = "\
+Examples:
+  graver tables                                     all ten, on the terminal
+  graver tables 5-2 7-1 --format csv                for a spreadsheet
+  graver tables --out tables                        a page, and a CSV file for each table
+
+Each value as printed, as the source's own numbers give it, with the errata applied, and as planned.";
+
 const SERVICES: &str = "\
 The services are graver drives, controller, planner and monitor with the same --instance;
 machine and drives are the domain's. deploy/ has systemd units. SIGTERM or Ctrl-C ends it with
@@ -128,6 +136,9 @@ pub enum Command {
     Disable(InstanceArguments),
     /// Say what a running pipeline is doing, with the process ids of its services.
     Status(InstanceArguments),
+    /// The tables of the sources: as printed, with the errata applied, and as modelled.
+    #[command(after_help = TABLES_EXAMPLES)]
+    Tables(TablesArguments),
     /// Create and hold an instance's channels, for services that somebody else starts, and run
     /// the jobs that are submitted.
     #[command(after_help = SERVICES)]
@@ -549,6 +560,37 @@ fn temperature(text: &str) -> Result<f64, String> {
     } else {
         Err(format!("{value} °C is not from -100 °C to 200 °C"))
     }
+}
+
+/// How tables are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TableFormat {
+    /// For people, in the source's units.
+    Text,
+    /// Comma-separated values, in the source's units and in SI units.
+    Csv,
+    /// One JSON object.
+    Json,
+    /// A page that opens offline.
+    Html,
+}
+
+/// Arguments of `tables`.
+#[derive(Debug, Clone, Args)]
+pub struct TablesArguments {
+    /// Numbers of tables: 3-1, 3-2, 4-1, 5-1, 5-2, 5-3, 6-1, 6-2, 6-3, 7-1; without one all.
+    #[arg(value_name = "NAME")]
+    pub names: Vec<String>,
+    /// Write a page, tables.json and a CSV file for each table into this folder; with `--format` that
+    /// alone.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// How to print or write them.
+    #[arg(long, value_enum)]
+    pub format: Option<TableFormat>,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Reads a length of time [s] that can be waited for.

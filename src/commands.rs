@@ -13,4 +13,5 @@ pub mod run;
 pub mod service;
 pub mod simulate;
 pub mod size;
+pub mod tables;
 pub mod verify;

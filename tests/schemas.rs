@@ -19,6 +19,7 @@ use monitor::summary::Summary;
 use schemars::{Schema, schema_for};
 use support::{Place, assert_valid, lines};
 use workbench::size::report::SizeReport;
+use workbench::thesis::TablesReport;
 
 /// The schemas by the name of their file.
 fn schemas() -> Vec<(&'static str, Schema)> {
@@ -34,6 +35,7 @@ fn schemas() -> Vec<(&'static str, Schema)> {
         ("status", schema_for!(Status)),
         ("summary", schema_for!(Summary)),
         ("size", schema_for!(SizeReport)),
+        ("tables", schema_for!(TablesReport)),
     ]
 }
 

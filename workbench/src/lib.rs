@@ -5,7 +5,10 @@
 
 pub mod catalogue;
 pub mod figures;
+pub mod mechanics;
 pub mod operating;
 pub mod reach;
 pub mod simulation;
 pub mod size;
+pub mod spread;
+pub mod thesis;

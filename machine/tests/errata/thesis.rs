@@ -176,3 +176,91 @@ fn a_diagonal_takes_half_of_what_is_printed() {
     only_corrected("4.5", torque, efforts[0] * r, 0.0173, 1e-9);
     assert!((torque - 0.00869).abs() < 5e-6);
 }
+
+/// Tables 3-5 and 7-1: what moves, part by part, on paper.
+#[test]
+fn masses_are_the_sums_of_their_parts() {
+    let [mirror, motor, carriage, screw, pulley] = [0.03, 0.5, 0.3, 0.264, 0.1];
+    let head = mirror + carriage;
+    // The y axis rides on x: head, carriage, screw, motor, and two bearings of 0.2 kg.
+    let first: f64 = [head, carriage, screw, motor, 0.2, 0.2].iter().sum();
+    only_corrected("m1", first, 1.794, 1.93, 1e-9);
+    let corexy: f64 = [head, carriage, 4.0 * pulley, mirror].iter().sum();
+    assert!((corexy - 1.06).abs() < 1e-9);
+    // Arms, forearms, tool and guide; carts, links, tool and guide.
+    let five_bar = 2.0 * 0.156 + 2.0 * 0.195 + head + 0.186;
+    only_corrected("mass of the 5R", five_bar, 1.218, 1.31, 1e-9);
+    let prrrp = 2.0 * 0.2 + 2.0 * 0.234 + head + 0.186;
+    only_corrected("mass of the PRRRP", prrrp, 1.384, 1.22, 1e-9);
+}
+
+/// Table 4-2.
+#[test]
+fn the_belt_breaks_at_half_of_what_is_printed() {
+    let [stress, section] = [6e6, 0.5e-4];
+    only_corrected("4-2", stress * section, 300.0, 600.0, 1e-9);
+}
+
+/// Table 7-1: the row "C·η" is C/η, of the CoreXY with another's η; and P is that times the speed.
+#[test]
+fn the_last_table_divides_by_the_efficiency() {
+    let [torque, printed] = [0.0173, 0.0247];
+    // A gear that loses a fifth takes in a quarter more than it gives.
+    let given = 1.0;
+    let taken = given / (1.0 - 0.2);
+    only_corrected("C·η of the CoreXY", torque * taken / given, torque / 0.8, torque * 0.8, 1e-9);
+    only_corrected("η of the CoreXY", torque * taken / given, 0.0216, printed, 2e-3 / 1.5);
+    assert!((torque / 0.7 - printed).abs() < 5e-5, "with the 5R's efficiency it is as printed");
+    // Largest torque times largest speed; in one instant a motor that accelerates evenly to its largest
+    // speed and goes on has less than half of it on average.
+    for (torque, rpm, power) in [(0.19, 2880.0, 57.3), (0.017, 2053.0, 3.65), (0.06, 2600.0, 16.33)]
+    {
+        let product = torque * rpm * PI / 30.0;
+        assert!((product / power - 1.0_f64).abs() < 0.005, "{product} for {power}");
+    }
+}
+
+/// Table 7-1: 20 cm by 20 cm around (0, 0.33).
+#[test]
+fn the_five_bar_does_not_reach_its_working_area() {
+    let corner = Vector2::new(0.1, 0.33 + 0.1);
+    let motor = Vector2::new(-0.05, 0.0);
+    let distance = (corner - motor).norm();
+    only_corrected("reach of the 5R", distance, 0.4554, 0.45, 1e-4 / 1.5);
+    assert!(distance > 0.2 + 0.25);
+}
+
+/// The text has 7850 kg/m³, and tables 3-5, 5-4 and 6-4 have 7800.
+#[test]
+fn the_bars_are_as_dense_as_the_screw() {
+    for (length, mass) in [(0.2, 0.156), (0.25, 0.195), (0.3, 0.234)] {
+        let density = mass / (0.01 * 0.01 * length);
+        only_corrected("density", density, 7800.0, 7850.0, 6e-5);
+    }
+}
+
+/// "Colpo di frusta" above 1100 rpm: the slowest bending mode of the screw of table 3-5, clamped at one end
+/// and free at the other, by Rayleigh's quotient of a beam that hangs through.
+#[test]
+fn the_screw_whips_far_above_what_is_printed() {
+    let [diameter, length, modulus, density] = [0.014, 0.25, 22e10, 7800.0];
+    let section = PI * diameter * diameter / 4.0;
+    let second = PI * diameter * diameter * diameter * diameter / 64.0;
+    // The shape under even load, x²·(x² − 4·L·x + 6·L²), with its curvature 12·(x − L)².
+    let (mut bent, mut moved) = (0.0, 0.0);
+    let steps = 10_000;
+    for step in 0..steps {
+        let x = (f64::from(step) + 0.5) / f64::from(steps) * length;
+        let shape = x * x * (x * x - 4.0 * length * x + 6.0 * length * length);
+        let curvature = 12.0 * (x - length) * (x - length);
+        bent += modulus * second * curvature * curvature;
+        moved += density * section * shape * shape;
+    }
+    let lowest = (bent / moved).sqrt() / TAU * 60.0;
+    let root: f64 = 1.875_104;
+    let closed = root * root / (TAU * length * length)
+        * (diameter / 4.0)
+        * (modulus / density).sqrt()
+        * 60.0;
+    only_corrected("speed of whipping", lowest, closed, 1100.0, 5e-3);
+}
