@@ -66,6 +66,14 @@ Examples:
 A catalogue is a TOML file, or one of thesis, dc, bldc, steppers and gears, which are built in.
 --out writes the machine file with the motors; its comments stay.";
 
+const COMPARE_EXAMPLES: &str = "\
+Examples:
+  graver compare                                    the four machines of source 003 on its letters
+  graver compare jobs/letters.toml --machine machines/cartesian.toml --machine machines/corexy.toml
+  graver compare --machine a.toml --machine b.toml --weight time=5 --weight mass=0 --out comparison
+
+Each job is planned, simulated, and simulated on --seeds plants that are other than the file says.";
+
 const TABLES_EXAMPLES: &str = "\
 Examples:
   graver tables                                     all ten, on the terminal
@@ -136,6 +144,10 @@ pub enum Command {
     Disable(InstanceArguments),
     /// Say what a running pipeline is doing, with the process ids of its services.
     Status(InstanceArguments),
+    /// Compare machines on the same job: time, error, what their motors must give, stiffness, and who
+    /// comes first.
+    #[command(after_help = COMPARE_EXAMPLES)]
+    Compare(CompareArguments),
     /// The tables of the sources: as printed, with the errata applied, and as modelled.
     #[command(after_help = TABLES_EXAMPLES)]
     Tables(TablesArguments),
@@ -560,6 +572,33 @@ fn temperature(text: &str) -> Result<f64, String> {
     } else {
         Err(format!("{value} °C is not from -100 °C to 200 °C"))
     }
+}
+
+/// Arguments of `compare`.
+#[derive(Debug, Clone, Args)]
+pub struct CompareArguments {
+    /// Job: .ngc .nc .gcode .tap (G-code) or .toml; without it the first machine's sample job.
+    pub job: Option<PathBuf>,
+    /// Machine file (.toml). Can be repeated; without any and without a job, the machines of source
+    /// 003 are compared on its letters.
+    #[arg(long, value_name = "FILE")]
+    pub machine: Vec<PathBuf>,
+    /// Change a value of the job, of all machines or of all plants, as for `simulate`. Can be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// How much a figure counts: time, error, mismatch, power, mass, footprint, stiffness or
+    /// utilisation. Can be repeated.
+    #[arg(long, value_name = "NAME=NUMBER")]
+    pub weight: Vec<String>,
+    /// Plants that are other than the machine file says, of each machine.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(0..=1000))]
+    pub seeds: u64,
+    /// Write a page, the figures and the pictures into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// How tables are written.

@@ -15,8 +15,8 @@ pub mod pipeline;
 use arguments::{Arguments, BenchCommand, Command};
 use clap::Parser;
 use commands::{
-    bench, check, export, figures, kinematics, manual, operator, plan, run, service, simulate,
-    size, tables, verify,
+    bench, check, compare, export, figures, kinematics, manual, operator, plan, run, service,
+    simulate, size, tables, verify,
 };
 use exit::{Exit, Failure};
 use pipeline::operators::Verb;
@@ -58,6 +58,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Disable(arguments) => operator::verb(Verb::Disable, arguments),
         Command::Override(arguments) => operator::override_rate(arguments),
         Command::Status(arguments) => operator::status(arguments),
+        Command::Compare(arguments) => compare::run(arguments),
         Command::Tables(arguments) => tables::run(arguments),
         Command::Domain(arguments) => run::domain(arguments),
         Command::Planner(arguments) => service::run(Role::Planner, arguments),
@@ -81,6 +82,7 @@ fn wants_json(command: &Command) -> bool {
         Command::Size(arguments) => arguments.json,
         Command::Figures(arguments) => arguments.json,
         Command::Submit(arguments) => arguments.instance.json,
+        Command::Compare(arguments) => arguments.json,
         Command::Tables(arguments) => arguments.json,
         _ => false,
     }

@@ -18,6 +18,7 @@ use graver::pipeline::status::Status;
 use monitor::summary::Summary;
 use schemars::{Schema, schema_for};
 use support::{Place, assert_valid, lines};
+use workbench::compare::Comparison;
 use workbench::size::report::SizeReport;
 use workbench::thesis::TablesReport;
 
@@ -25,6 +26,7 @@ use workbench::thesis::TablesReport;
 fn schemas() -> Vec<(&'static str, Schema)> {
     vec![
         ("check", schema_for!(CheckReport)),
+        ("compare", schema_for!(Comparison)),
         ("figures", schema_for!(FiguresReport)),
         ("kinematics", schema_for!(Reply)),
         ("latency", schema_for!(LatencyReport)),
@@ -105,6 +107,21 @@ fn plan_and_check_print_what_their_schemas_say() {
         assert_eq!(refused["outcome"], "refused");
         assert!(refused["error"]["message"].as_str().unwrap().contains("nowhere.ngc"));
     }
+}
+
+#[test]
+fn tables_and_comparisons_print_what_their_schemas_say() {
+    let place = Place::new();
+    let tables = place.graver(&["tables", "3-2", "7-1", "--json"]).json(0);
+    assert_valid("tables", &tables);
+    assert_eq!(tables["tables"][1]["name"], "7-1");
+    let job = place.file("lines.ngc", &lines(1));
+    let machine = support::source("machines").join("cartesian.toml");
+    let arguments = ["compare", job.to_str().unwrap(), "--machine", machine.to_str().unwrap()];
+    let compared = place.graver(&[&arguments[..], &["--seeds", "1", "--json"]].concat()).json(0);
+    assert_valid("compare", &compared);
+    assert_eq!(compared["machines"][0]["rank"], 1);
+    assert_valid("summary", &place.graver(&["tables", "8-1", "--json"]).json(2));
 }
 
 #[test]

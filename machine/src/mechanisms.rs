@@ -7,6 +7,7 @@ pub mod mcm;
 mod plane;
 pub mod polar;
 pub mod prrrp;
+mod scaled;
 pub mod serial;
 pub(crate) mod spectrum;
 pub mod tri_planar;

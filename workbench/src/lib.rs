@@ -4,6 +4,7 @@
 //! on the real-time path.
 
 pub mod catalogue;
+pub mod compare;
 pub mod figures;
 pub mod mechanics;
 pub mod operating;
