@@ -7,8 +7,9 @@
 //! once, the rate up to `after`.
 //!
 //! A hold closes the gate at `next` and brakes. The point where it closed stays the boundary of
-//! the dark. A resume goes back far enough to be at full rate again where light was first left
-//! out, and lights exactly there. Where none was left out, nothing is played again.
+//! the dark. A resume goes back the way that it takes to come up to full rate and a little more, and
+//! lights exactly where light was first left out; where limits hinder the rate, below full rate and with
+//! power in proportion. Where no light was left out, nothing is played again.
 
 use crate::gate::{self, Stretch, TooManyEdges};
 use crate::lookahead::Lookahead;
