@@ -377,8 +377,12 @@ impl Player {
         // There is no more way to wait for room on, ahead or back.
         let too_far = scarce && stops(self.ramp, 1) > end;
         let beginning = lookahead.beginning();
-        let too_far_back =
-            beginning > StreamTime::default() && stops(self.ramp, 1) < beginning + RESERVE;
+        // Whoever goes forwards stops ahead.
+        let goes_back = self.ramp.rate() < Rate::ZERO
+            || matches!(self.activity, Activity::Rewinding(_) | Activity::Turning);
+        let too_far_back = goes_back
+            && beginning > StreamTime::default()
+            && stops(self.ramp, 1) < beginning + RESERVE;
         if too_far || too_far_back {
             self.ramp = before.unhindered(Rate::ZERO, Slew::STOP);
         }
