@@ -133,7 +133,7 @@ fn subjects(
             let text = format!("--set {change}: name the machine that it changes by --machine");
             return Err(Failure::bad_input(text));
         }
-        subjects = source_machines().map_err(Failure::bad_input)?;
+        subjects = source_machines()?;
         if let Some(path) = job {
             for subject in &mut subjects {
                 let request = planner::request::JobRequest {

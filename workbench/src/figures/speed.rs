@@ -8,17 +8,14 @@ use planner::job::letters::{self, Letter, Style};
 use planner::law::profile::{Move, Ramp};
 
 use super::draw::MILLIMETRES;
-use super::subject::{HEIGHTS, LETTERS};
 use super::{Figure, FigureError, Figures, Name, Table};
+use crate::thesis::data::{HEIGHTS, LETTERS, RAPID};
 
 /// Accelerations that are compared [m/s²].
 const ACCELERATIONS: [f64; 3] = [5.0, 10.0, 20.0];
 
 /// Jerk by acceleration [1/s]: the source's 500 m/s³ for 10 m/s².
 const JERKS: f64 = 50.0;
-
-/// The fastest free move [m/s].
-const RAPID: f64 = 0.25;
 
 /// Marking speeds: steps of 5 mm/s up to 0.3 m/s.
 const STEPS: u32 = 60;
@@ -37,16 +34,15 @@ pub(super) struct Strokes {
 }
 
 impl Strokes {
-    /// The letter `name` of `height` [m] in the chords of convention h1; `None` of what is no letter.
-    pub(super) fn of_letter(name: &str, height: f64) -> Option<Self> {
-        let letter = Letter::from_character(name.chars().next()?)?;
+    /// `letter` of `height` [m] in the chords of convention h1.
+    pub(super) fn of_letter(letter: Letter, height: f64) -> Self {
         let power = Power { level: 1.0, follows_speed: false };
         let drawing = letters::draw(&[letter], height, Style::H1, power, Vector3::zeros(), 0);
         let lines = drawing.steps.iter().filter_map(|step| match &step.action {
             Action::Mark { curve, .. } => Some([curve.from(), curve.to()]),
             _ => None,
         });
-        Some(Self { start: drawing.start, lines: lines.collect() })
+        Self { start: drawing.start, lines: lines.collect() }
     }
 
     /// The time of all of it with lines at `speed` [m/s] within `acceleration` [m/s²] and `jerk` [m/s³],
@@ -92,28 +88,29 @@ pub(super) fn add(figures: &mut Figures) -> Result<(), FigureError> {
     let columns = ["letter", "cm", "acceleration", "speed", "time"];
     let mut optimum = Table::new("speed_optimum", columns);
     let mut best: Vec<Curve> = Vec::new();
-    for (index, (name, _)) in LETTERS.into_iter().enumerate() {
+    for (index, letter) in LETTERS.into_iter().enumerate() {
+        let name = format!("{letter:?}");
         let mut line = Vec::new();
-        for cm in HEIGHTS {
-            let Some(strokes) = Strokes::of_letter(name, f64::from(cm) * 1e-2) else { continue };
-            figures.figures.push(letter(name, cm, &strokes)?);
+        for height in HEIGHTS {
+            let (strokes, cm) = (Strokes::of_letter(letter, height), (height * 1e2).round());
+            figures.figures.push(drawn(&name, cm, &strokes)?);
             for acceleration in ACCELERATIONS {
                 let (speed, time) = strokes.optimum(acceleration, JERKS * acceleration);
                 optimum.rows.push(vec![
-                    name.into(),
-                    f64::from(cm).into(),
+                    name.as_str().into(),
+                    cm.into(),
                     acceleration.into(),
                     speed.into(),
                     time.into(),
                 ]);
                 if acceleration == ACCELERATIONS[1] {
-                    line.push((f64::from(cm) * 10.0, speed * MILLIMETRES));
+                    line.push((cm * 10.0, speed * MILLIMETRES));
                 }
             }
         }
         let dots = line.iter().map(|point| vec![*point]);
         let lines = [line.clone()].into_iter().chain(dots).collect();
-        best.push(Curve { name: name.to_owned(), colour: colour(index), lines });
+        best.push(Curve { name, colour: colour(index), lines });
     }
     let axes = ["height of the letter [mm]", "fastest marking speed [mm/s]"];
     figures.figures.push(Figure {
@@ -131,7 +128,7 @@ pub(super) fn add(figures: &mut Figures) -> Result<(), FigureError> {
     Ok(())
 }
 
-fn letter(name: &str, cm: u32, strokes: &Strokes) -> Result<Figure, FigureError> {
+fn drawn(name: &str, cm: f64, strokes: &Strokes) -> Result<Figure, FigureError> {
     let columns = ACCELERATIONS.map(|acceleration| format!("time_A{acceleration}"));
     let columns = ["speed".to_owned()].into_iter().chain(columns);
     let mut table = Table::new(format!("speed_{name}{cm}"), columns);

@@ -12,6 +12,7 @@ use serde_json::Value;
 
 use super::speed::Strokes;
 use super::*;
+use crate::thesis::data::LETTERS;
 
 #[track_caller]
 fn near(found: f64, expected: f64, relative: f64) {
@@ -398,10 +399,11 @@ fn singular_curves_of_the_five_bar_are_arms_and_forearms_in_line() {
 fn times_of_letters_are_the_golden_ones() {
     let text = include_str!("../../../tests/golden/letters.json");
     let golden: Value = serde_json::from_str(text).unwrap();
-    for name in ["N", "A", "S", "O"] {
+    for letter in LETTERS {
+        let name = format!("{letter:?}");
         let results = &golden["H1_literal_J500"]["letters"][name]["results"];
         for result in results.as_array().unwrap() {
-            let strokes = Strokes::of_letter(name, result["scale_m"].as_f64().unwrap()).unwrap();
+            let strokes = Strokes::of_letter(letter, result["scale_m"].as_f64().unwrap());
             let speed = result["thesis"]["V"].as_f64().unwrap();
             let model = &result["model"]["path_limited"];
             let expected = model["T_at_table_V"].as_f64().unwrap();
