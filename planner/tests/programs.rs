@@ -186,3 +186,22 @@ fn a_feed_beyond_the_largest_marking_speed_is_noted() {
         assert!(notes[0].text.starts_with("asks for 1000.0000 m/s, marked at 0.2500"), "{notes:?}");
     }
 }
+
+/// One cell of the law may lie over many dashes, and its middle in a gap between two.
+#[test]
+fn the_speed_of_dashes_is_told_wherever_the_gaps_lie() {
+    for (name, on, off) in [("M3", "M3 S500\n", "M5\n"), ("M4", "S500\n", "S0\n")] {
+        let mut text = String::from("G21 G90 F6000\nG0 X10 Y10\nM4 S0\n");
+        if name == "M3" {
+            text = String::from("G21 G90 F6000\nG0 X10 Y10\n");
+        }
+        for dash in 0..40 {
+            let gate = if dash % 2 == 0 { on } else { off };
+            write!(text, "{gate}G1 X{:.1}\n", 10.5 + f64::from(dash) * 0.5).unwrap();
+        }
+        text.push_str("M5\n");
+        let facts = planned(&text).unwrap().facts;
+        assert_eq!(facts.strokes, 20, "{name}");
+        assert!((facts.speed - 0.1).abs() < 1e-9, "{name}: {} m/s", facts.speed);
+    }
+}

@@ -100,18 +100,19 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             if run.contour.is_lit() {
                 draft.bound.add(LimitId(part.limit), part.duration, line, position.into());
             }
-            let Some((demand, limit)) = run.lit_at(middle) else { continue };
-            // What the machine's largest marking speed takes of it has a note of its own.
-            let is_named = self.task.speeds.named(demand.speed).is_some();
-            let asked = self.task.speeds.of(demand.speed) * self.faster(demand);
-            let asked = if is_named { asked } else { limit };
             let mean = (part.places.end - part.places.start) / part.duration;
-            let speed = run.even.unwrap_or(mean.min(limit));
-            draft.speed = draft.speed.max(speed);
-            let slowed = Slowed { line, asked, speed, place: position };
-            let worse = slowest.is_none_or(|worst| speed / asked < worst.speed / worst.asked);
-            if !run.follows && speed < SLOW * asked && worse {
-                slowest = Some(slowed);
+            for (demand, place, limit) in run.lit_within(part.places) {
+                // What the machine's largest marking speed takes of it has a note of its own.
+                let is_named = self.task.speeds.named(demand.speed).is_some();
+                let asked = self.task.speeds.of(demand.speed) * self.faster(demand);
+                let asked = if is_named { asked } else { limit };
+                let speed = run.even.unwrap_or(mean.min(limit));
+                draft.speed = draft.speed.max(speed);
+                let worse = slowest.is_none_or(|worst| speed / asked < worst.speed / worst.asked);
+                if !run.follows && speed < SLOW * asked && worse {
+                    let place = run.path.at(place).point;
+                    slowest = Some(Slowed { line: demand.line, asked, speed, place });
+                }
             }
         }
         draft.slowed.extend(slowest);

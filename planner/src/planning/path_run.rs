@@ -1,5 +1,6 @@
 //! A path that is under way.
 
+use core::ops::Range;
 use std::sync::Arc;
 
 use machine::Mechanism;
@@ -53,13 +54,21 @@ impl<const N: usize> PathRun<N> {
         10.0 * self.least_reach
     }
 
-    /// What the job asks for at a place that is marked, and the speed limit there [m/s]; `None` in the
-    /// dark.
-    pub(super) fn lit_at(&self, place: f64) -> Option<(&Demand, f64)> {
+    /// What the job asks for where it marks something between two places, each with the middle of what lies
+    /// between them [m] and the speed limit there [m/s].
+    pub(super) fn lit_within(
+        &self,
+        places: Range<f64>,
+    ) -> impl Iterator<Item = (&Demand, f64, f64)> + '_ {
         let demands = self.contour.demands();
-        let after = demands.partition_point(|demand| demand.from <= place);
-        let demand = demands.get(after.max(1) - 1).filter(|demand| demand.power > 0.0)?;
-        Some((demand, limit_at(&self.speeds, place).speed))
+        let first = demands.partition_point(|demand| demand.from <= places.start).max(1) - 1;
+        let after = demands.partition_point(|demand| demand.from < places.end).max(first + 1);
+        let ends = demands.iter().skip(first + 1).map(|demand| demand.from).chain([f64::INFINITY]);
+        let within = demands[first..after.min(demands.len())].iter().zip(ends);
+        within.filter(|(demand, _)| demand.power > 0.0).map(move |(demand, end)| {
+            let middle = (demand.from.max(places.start) + end.min(places.end)) / 2.0;
+            (demand, middle, limit_at(&self.speeds, middle).speed)
+        })
     }
 }
 
