@@ -395,6 +395,10 @@ pub struct SizeArguments {
     /// Write the machine file with the motors and gears that were chosen.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Draw torque over speed of each motor, the machine's and the chosen one, with the points of the job:
+    /// SVG and CSV, and a page of them.
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
     /// Print one JSON object on stdout.
     #[arg(long)]
     pub json: bool,

@@ -82,7 +82,7 @@ pub fn run(arguments: &FiguresArguments) -> Result<Exit, Failure> {
         let why: Vec<String> = why.collect();
         return Err(Failure::bad_input(format!("nothing could be drawn\n{}", why.join("\n"))));
     }
-    write(&figures, &arguments.out, sources)?;
+    write(&figures, "--out", &arguments.out, &mut sources)?;
     if arguments.json {
         output::json(&report(&figures, &arguments.out))?;
     } else {
@@ -96,7 +96,7 @@ pub fn run(arguments: &FiguresArguments) -> Result<Exit, Failure> {
 }
 
 /// The page of all figures.
-const PAGE: &str = "index.html";
+pub(super) const PAGE: &str = "index.html";
 
 /// The names of figures, all where none is given, and the job.
 fn asked(what: &[String]) -> Result<(Vec<Name>, Option<&Path>), Failure> {
@@ -185,13 +185,21 @@ fn stem(path: &Path, others: &[Subject]) -> String {
     [stem.clone()].into_iter().chain(numbered).find(|name| !taken(name)).unwrap_or(stem)
 }
 
-/// Writes pictures, numbers and page.
-fn write(figures: &Figures, folder: &Path, mut sources: Sources) -> Result<(), Failure> {
+/// Writes pictures, numbers and page into `folder`, which `option` names.
+///
+/// # Errors
+/// A folder or file that cannot be written.
+pub(super) fn write(
+    figures: &Figures,
+    option: &str,
+    folder: &Path,
+    sources: &mut Sources,
+) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
-        .map_err(|error| Failure::bad_input(format!("--out {}: {error}", folder.display())))?;
+        .map_err(|error| Failure::bad_input(format!("{option} {}: {error}", folder.display())))?;
     let mut save = |name: String, content: &str| {
         let path = folder.join(name);
-        let mut file = sources.create("--out", &path)?;
+        let mut file = sources.create(option, &path)?;
         file.write_all(content.as_bytes())
             .map_err(|error| Failure::output(format!("{}: {error}", path.display())))
     };

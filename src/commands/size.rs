@@ -6,7 +6,7 @@ use crate::arguments::{SizeArguments, SizeGears, SizeOrder};
 use crate::exit::{Exit, Failure};
 use crate::files::Sources;
 use crate::inputs::{MachineInput, Overrides};
-use crate::{inputs, output};
+use crate::{commands::figures, inputs, output};
 use std::io::Write;
 use std::path::{Component, Path, PathBuf};
 use workbench::catalogue::{self, Catalogue};
@@ -44,10 +44,14 @@ pub fn run(arguments: &SizeArguments) -> Result<Exit, Failure> {
         error => Failure::bad_input(error),
     })?;
     let machine = machine.filter(|_| is_right(&report));
+    let read: Vec<PathBuf> = job.files.iter().cloned().chain(files).collect();
+    let mut sources = Sources::new(arguments.machine.machine.as_deref(), &read);
+    if let Some(folder) = &arguments.figures {
+        let figures = workbench::figures::sized(&report).map_err(Failure::bad_input)?;
+        figures::write(&figures, "--figures", folder, &mut sources)?;
+        report.pictures = Some(folder.join(figures::PAGE).display().to_string());
+    }
     if let (Some(out), Some(machine)) = (&arguments.out, machine) {
-        let sources: Vec<PathBuf> = job.files.iter().cloned().chain(files).collect();
-        let file = arguments.machine.machine.as_deref();
-        let mut sources = Sources::new(file, &sources);
         write_machine(&input, &machine, out, &mut sources)?;
         report.written = Some(out.display().to_string());
     }

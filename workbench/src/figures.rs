@@ -18,6 +18,7 @@ mod subject;
 mod table;
 mod torque;
 
+pub use motor::sized;
 pub use subject::{Chapter, Subject, SubjectJob, source_machines};
 pub use table::{Cell, Table};
 

@@ -11,6 +11,9 @@ pub(super) fn print(report: &SizeReport, is_to_write: bool) {
     report.axes.iter().for_each(axis);
     supply(report);
     confirmation(report);
+    if let Some(page) = &report.pictures {
+        say!("pictures  {page}");
+    }
     match &report.written {
         Some(written) => say!("written   {written}"),
         None if is_to_write => {

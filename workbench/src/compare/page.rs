@@ -57,7 +57,8 @@ impl Comparison {
     }
 
     fn row(&self, name: &str, value: fn(&MachineReport) -> Option<String>) -> Vec<String> {
-        let mut row = vec![name.to_owned()];
+        // A page does not show spaces at the start of a cell.
+        let mut row = vec![name.replace("  ", "\u{2003}")];
         row.extend(self.machines.iter().map(|it| value(it).unwrap_or_else(|| "–".to_owned())));
         row
     }
@@ -81,8 +82,9 @@ impl Comparison {
             rows.push(row);
         }
         let picture = figure(self.shares()?, "What each machine has of each criterion");
-        let how = "<p>The best machine over each, or of the stiffness each over the best. The weights \
-                   are a choice: --weight changes them. How much other plants differ is a choice too.</p>\n";
+        let how = "<p>Of each criterion: the value of the best machine divided by that of the machine, of the stiffness \
+                   the other way round. The weights are a choice, which --weight changes; so is how much \
+                   the other plants differ.</p>\n";
         Ok(picture + &table(&rows) + how)
     }
 }

@@ -38,11 +38,11 @@ pub(super) const ROWS: [Row; 26] = [
         let error = it.mismatch.as_ref()?.error_median?;
         Some(format!("{:.0}", error * MICRO))
     }),
-    ("  largest [µm], faults", |it| {
+    ("  largest [µm] / runs with a fault", |it| {
         let mismatch = it.mismatch.as_ref()?;
         let largest =
             mismatch.error_max.map_or("–".to_owned(), |it| format!("{:.0}", it * MICRO));
-        Some(format!("{largest}, {}", mismatch.faults))
+        Some(format!("{largest} / {}", mismatch.faults))
     }),
     ("motor speed [rpm]", |it| per_axis(it, |axis| format!("{:.0}", axis.demand.speed_peak * RPM))),
     ("motor torque [mN·m]", |it| {

@@ -1,12 +1,14 @@
 //! What a motor gives by its speed, and where a job uses it (source 003 fig. 3-23, 3-24).
 
-use machine::{Axis, DcMotor, Motor, StepperMotor};
+use machine::{DcMotor, Motor, StepperMotor};
 use monitor::report::chart::{Chart, Curve, colour, stack};
 
 use super::draw::RPM;
 use super::torque::MILLI;
 use super::{Figure, FigureError, Figures, Name, Subject, Table};
 use crate::operating::{self, AxisCourse};
+use crate::size::candidate::Candidate;
+use crate::size::report::SizeReport;
 
 /// Speeds from standstill to the fastest, both ends included.
 const SPEEDS: usize = 201;
@@ -17,22 +19,62 @@ pub(super) fn add(subject: &Subject, figures: &mut Figures) -> Result<(), Figure
     let plan = job.and_then(|job| planner::plan(&subject.machine, &job.job).ok());
     let courses = plan.map(|plan| operating::courses(&subject.machine, &plan));
     for (index, axis) in subject.machine.axes.iter().enumerate() {
-        let course = courses.as_ref().map(|courses| &courses[index]);
-        let title = job.map_or("", |job| job.title.as_str());
-        figures.figures.push(figure(subject, index, axis, course, title)?);
+        let used = courses.as_ref().map(|courses| Use {
+            course: &courses[index],
+            job: job.map_or("", |job| job.title.as_str()),
+        });
+        let source = match (subject.chapter.map(|chapter| chapter.number), index) {
+            (Some(3), 0) => "3-23",
+            (Some(3), 1) => "3-24",
+            _ => "",
+        };
+        let stem = format!("motor_{}_{}", subject.stem, axis.name);
+        let title = format!("{}, axis {}: what the motor gives", subject.machine.name, axis.name);
+        figures.figures.push(figure(stem, source, title, &axis.motor, used)?);
     }
     Ok(())
 }
 
+/// The motors that the machine of a sizing has, and those that it gets, with what the job asks of each.
+///
+/// # Errors
+/// Numbers that cannot be drawn.
+pub fn sized(report: &SizeReport) -> Result<Figures, FigureError> {
+    let mut figures = Figures::default();
+    for axis in &report.axes {
+        let pairs = [("now", Some(&axis.present)), ("chosen", axis.judged.as_ref())];
+        for (word, pair) in pairs {
+            let Some(pair) = pair else { continue };
+            let Candidate { name, gear, gear_ratio, motor, .. } = &pair.candidate;
+            let gear = match gear {
+                Some(gear) => format!("gear {gear}"),
+                None => format!("ratio {gear_ratio}"),
+            };
+            let title = format!("Axis {}, {word}: {name}, {gear}", axis.axis);
+            let used = Use { course: &pair.course, job: &report.job };
+            let stem = format!("size_{}_{word}", axis.axis);
+            figures.figures.push(figure(stem, "", title, motor, Some(used))?);
+        }
+    }
+    Ok(figures)
+}
+
+/// What a motor does for a job.
+#[derive(Debug, Clone, Copy)]
+struct Use<'a> {
+    course: &'a AxisCourse,
+    /// The job's name.
+    job: &'a str,
+}
+
 fn figure(
-    subject: &Subject,
-    index: usize,
-    axis: &Axis,
-    course: Option<&AxisCourse>,
-    job: &str,
+    stem: String,
+    source: &str,
+    title: String,
+    motor: &Motor,
+    used: Option<Use<'_>>,
 ) -> Result<Figure, FigureError> {
-    let stem = format!("motor_{}_{}", subject.stem, axis.name);
-    let (table, mut torques, more) = match &axis.motor {
+    let (table, mut torques, more) = match motor {
         Motor::Dc(motor) => {
             let table = dc(&stem, motor);
             let torques = vec![
@@ -52,12 +94,12 @@ fn figure(
         }
     };
     let mut points = Table::new(format!("{stem}_points"), ["t", "speed", "torque", "lit"]);
-    if let Some(course) = course {
+    if let Some(Use { course, .. }) = used {
         for point in &course.points {
             let lit = f64::from(u8::from(point.is_lit));
             points.numbers([point.time, point.speed, point.torque(), lit]);
         }
-        torques.push(Curve { name: "job".to_owned(), colour: colour(1), lines: used(course) });
+        torques.push(Curve { name: "job".to_owned(), colour: colour(1), lines: passed(course) });
     }
     let axes = ["speed [rpm]", "torque [mN·m]"];
     let chart = |up, height, curves| Chart {
@@ -70,16 +112,11 @@ fn figure(
     };
     let mut charts = vec![chart(axes[1], 340, torques)];
     charts.extend(more.into_iter().map(|(up, curves)| chart(up, 170, curves)));
-    let source = match (subject.chapter.map(|chapter| chapter.number), index) {
-        (Some(3), 0) => "3-23",
-        (Some(3), 1) => "3-24",
-        _ => "",
-    };
-    let job = if course.is_some() { format!("; in orange, {job}") } else { String::new() };
+    let job = used.map_or(String::new(), |used| format!("; in orange, {}", used.job));
     Ok(Figure {
         name: Name::Motor,
         source: source.to_owned(),
-        title: format!("{}, axis {}: what the motor gives", subject.machine.name, axis.name),
+        title,
         caption: format!(
             "The torque that the supply's voltage drives in the steady state, the power stage's largest \
              current, and the current that the winding bears for ever where the file says so{job}. Below \
@@ -88,7 +125,7 @@ fn figure(
         axes: axes.map(str::to_owned),
         svg: stack("motor", &charts)?,
         table,
-        more: if course.is_some() { vec![points] } else { Vec::new() },
+        more: if used.is_some() { vec![points] } else { Vec::new() },
     })
 }
 
@@ -150,7 +187,7 @@ fn curve(name: &str, index: usize, table: &Table, column: &str, scale: f64) -> C
 
 /// The way of a job through torque and speed, both turned to positive speed; broken where the motor turns
 /// back.
-fn used(course: &AxisCourse) -> Vec<Vec<(f64, f64)>> {
+fn passed(course: &AxisCourse) -> Vec<Vec<(f64, f64)>> {
     let same = |one: &_, other: &_| {
         let turns = |point: &operating::OperatingPoint| point.speed >= 0.0;
         turns(one) == turns(other)

@@ -21,7 +21,7 @@ pub struct Judged {
     pub candidate: Candidate,
     /// What it uses of every limit, or of the first that it breaks.
     pub uses: Vec<Use>,
-    /// What the motor does; empty but of the pair that is chosen.
+    /// What the motor does; empty but of the pairs that the machine has and gets.
     pub course: AxisCourse,
 }
 
@@ -89,7 +89,7 @@ pub fn axis(need: &AxisNeed, catalogue: &Catalogue, options: &Options, is_asked:
         },
         belt: need.pulley.map(|_| BeltSize::new(need)),
         screw: catalogue.screws.iter().find(|it| it.axis == need.name).map(ScrewSize::new),
-        now: Drive::new(&present, uses),
+        now: Drive::new(&present, uses.clone()),
         is_asked,
         kind: kind(&need.axis.motor),
         candidates: catalogue
@@ -99,6 +99,7 @@ pub fn axis(need: &AxisNeed, catalogue: &Catalogue, options: &Options, is_asked:
             .count(),
         chosen: None,
         rejected: Vec::new(),
+        present: Judged { candidate: present, uses, course },
         judged: None,
     };
     if !is_asked {

@@ -6,7 +6,7 @@ use super::choose::Judged;
 use super::need::AxisNeed;
 use super::{Confirmation, Options, belt, screw};
 use crate::catalogue::{Catalogue, Screw};
-use crate::operating::Demand;
+use crate::operating::{AxisCourse, Demand};
 use machine::transmission::gear::LoadClass;
 use machine::{Machine, Motor};
 use messages::time::CYCLE_TIME;
@@ -33,6 +33,8 @@ pub struct SizeReport {
     pub confirmation: Option<Confirmation>,
     /// Where the machine file with the motors was written.
     pub written: Option<String>,
+    /// The page of the pictures that were drawn; null where none was asked for.
+    pub pictures: Option<String>,
 }
 
 /// What an axis needs, has and gets.
@@ -60,6 +62,9 @@ pub struct AxisSize {
     pub chosen: Option<Drive>,
     /// Of the motors that do not do it with any gear, those that come nearest.
     pub rejected: Vec<Rejected>,
+    /// What it has, and what that does for the job.
+    #[serde(skip)]
+    pub present: Judged,
     /// The chosen pair, for what is done with it.
     #[serde(skip)]
     pub judged: Option<Judged>,
@@ -240,6 +245,7 @@ impl SizeReport {
             supply,
             confirmation: None,
             written: None,
+            pictures: None,
         }
     }
 
@@ -251,14 +257,8 @@ impl SizeReport {
 
 /// What the motors of `axes` give back together.
 pub fn bus(needs: &[AxisNeed], axes: &[AxisSize], catalogue: &Catalogue) -> SupplySize {
-    let courses: Vec<_> = needs
-        .iter()
-        .zip(axes)
-        .map(|(need, axis)| match &axis.judged {
-            Some(judged) => judged.course.clone(),
-            None => Candidate::present(need).course(need),
-        })
-        .collect();
+    let courses: Vec<&AxisCourse> =
+        axes.iter().map(|axis| &axis.judged.as_ref().unwrap_or(&axis.present).course).collect();
     let count = courses.iter().map(|course| course.points.len()).min().unwrap_or(0);
     let (mut surplus, mut most): (f64, f64) = (0.0, 0.0);
     for at in 0..count {

@@ -8,7 +8,7 @@ use workbench::size::report::SizeReport;
 use workbench::size::{Gears, MachineFile, Options, checks, size};
 
 /// Nine motors of one family: mass, torque constant and rotor grow, and one is the smallest that does it.
-fn nine() -> Catalogue {
+pub(crate) fn nine() -> Catalogue {
     let mut text = String::from("source = \"made for this\"\n");
     let motors = [
         (2.0, 0.01),

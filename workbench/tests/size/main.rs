@@ -5,6 +5,7 @@
 mod by_hand;
 mod catalogues;
 mod choice;
+mod pictures;
 
 use machine::Machine;
 use planner::Job;
