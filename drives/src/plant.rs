@@ -21,8 +21,8 @@
 //!
 //! Integration: fourth order at a fixed substep of 50 µs or finer ([`dynamics`], [`winding`]),
 //! with friction's events located inside it ([`friction`]), and third order in what a varying mass
-//! matrix adds ([`coupling`]). A transmission too stiff for the
-//! substep asked for gets a finer one.
+//! matrix adds ([`coupling`]). A transmission too stiff for the substep asked for, or a rotor too light for
+//! its winding, gets a finer one.
 
 pub mod brake;
 mod contacts;
@@ -116,6 +116,16 @@ pub enum PlantError {
     )]
     TooStiff {
         /// Bound of the fastest eigenvalue [1/s].
+        rate: f64,
+    },
+    /// Windings and rotors need a finer substep than can be afforded.
+    #[error(
+        "a winding and its rotor turn each other at a rate of {rate} 1/s, by `torque_constant` against \
+         `inductance`, `resistance` and `rotor_inertia`, which needs more than {MOST_SUBSTEPS} substeps in a \
+         cycle: one of them is not of a motor"
+    )]
+    TooQuick {
+        /// Bound of their rate [1/s].
         rate: f64,
     },
 }
@@ -218,11 +228,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         let field = stepping.as_ref().map(|stepping| stepping.field(angle));
         let dynamics = Dynamics::new(mechanism, motors, chain)?.with_field(field);
 
-        let rate = dynamics.fastest();
-        let substeps = (CYCLE_TIME / substep - 1e-9).max(rate * CYCLE_TIME / STABLE_PRODUCT).ceil();
-        if substeps.is_nan() || substeps > MOST_SUBSTEPS {
-            return Err(PlantError::TooStiff { rate });
-        }
+        let substeps = substeps(&dynamics, substep)?;
         let state = State {
             current: SVector::zeros(),
             angle,
@@ -233,8 +239,8 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         Ok(Self {
             brake: Brake::of(&axes),
             source: Source::new(laser),
-            weights: motors.windings.weights(CYCLE_TIME / substeps),
-            substeps: substeps as u32,
+            weights: motors.windings.weights(CYCLE_TIME / f64::from(substeps)),
+            substeps,
             current_resolution,
             resolution: SVector::from_fn(|row, _| axes[row].encoder.resolution()),
             origin,
@@ -412,6 +418,26 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         if !self.fault.is_some() {
             self.fault = fault;
         }
+    }
+}
+
+/// Substeps in a cycle, none of them longer than `longest` [s], that all of `dynamics` is stable in.
+///
+/// # Errors
+/// More than can be afforded.
+fn substeps<const N: usize, M: Mechanism<N>>(
+    dynamics: &Dynamics<N, M>,
+    longest: f64,
+) -> Result<u32, PlantError> {
+    let (mechanical, electrical) = (dynamics.fastest(), dynamics.electrical());
+    let stable = (mechanical + electrical) * CYCLE_TIME / STABLE_PRODUCT;
+    let substeps = (CYCLE_TIME / longest - 1e-9).max(stable).ceil();
+    if stable <= MOST_SUBSTEPS {
+        Ok(substeps as u32)
+    } else if electrical > mechanical {
+        Err(PlantError::TooQuick { rate: electrical })
+    } else {
+        Err(PlantError::TooStiff { rate: mechanical })
     }
 }
 

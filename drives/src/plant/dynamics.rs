@@ -30,6 +30,10 @@ use super::state::{Phases, State};
 use super::stepping::Field;
 use super::winding::Weights;
 
+/// Times that the decay of a rotor whose winding has settled counts against the stability of a step, which
+/// ends at a product of 1 there: each step begins with the current that its fourth stage led to.
+const SETTLING: f64 = 3.0;
+
 /// What joins motors and load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Transmission<const N: usize> {
@@ -164,35 +168,56 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// For `s² + d·s + w²` with matrix norms `d` and `w²`, `|s| ≤ (d + √(d² + 4w²))/2`.
     pub fn fastest(&self) -> f64 {
         let motors = &self.motors;
-        let row_sum = |matrix: SMatrix<f64, N, N>| {
-            matrix.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
-        };
         let Transmission::Elastic { stiffness, damping, .. } = &self.transmission else {
-            // Motors and load are one inertia: what acts at the shafts acts on all of it.
-            let mobility = self.coupling.mobility();
-            let square = motors.ratio.component_mul(&motors.ratio);
-            let seen = |at_shaft: &SVector<f64, N>| {
-                row_sum(mobility * SMatrix::from_diagonal(&at_shaft.component_div(&square)))
-            };
-            let drag = seen(&motors.viscous);
+            let drag = self.at_shafts(&motors.viscous);
             return match &self.field {
-                Some(field) => bound(drag + seen(&field.damping()), seen(&field.stiffness())),
+                Some(field) => {
+                    let damping = self.at_shafts(&field.damping());
+                    bound(drag + damping, self.at_shafts(&field.stiffness()))
+                }
                 None => drag,
             };
         };
-        let mut drag = motors.viscous.component_div(&motors.inertia).amax();
+        let mut drag = self.at_shafts(&motors.viscous);
         let mut spring = 0.0;
         if let Some(field) = &self.field {
-            drag += field.damping().component_div(&motors.inertia).amax();
-            spring = field.stiffness().component_div(&motors.inertia).amax();
+            drag += self.at_shafts(&field.damping());
+            spring = self.at_shafts(&field.stiffness());
         }
         let admittance = self.coupling.mobility()
             + SMatrix::from_diagonal(
                 &motors.ratio.component_mul(&motors.ratio).component_div(&motors.inertia),
             );
-        let square = row_sum(admittance * stiffness) + spring;
-        let linear = row_sum(admittance * damping) + drag;
+        let square = row_sum(&(admittance * stiffness)) + spring;
+        let linear = row_sum(&(admittance * damping)) + drag;
         bound(linear, square)
+    }
+
+    /// The rate at which windings and rotors turn each other by torque and back-EMF at `home` [1/s], as the
+    /// step feels it: for that it is explicit, however exactly it solves a winding alone.
+    ///
+    /// A slow winding swings with its rotor at `k/√(L·J)`. Where the winding settles within the step, what is
+    /// left is the rotor's decay, `k²/(R·J)`, which counts [`SETTLING`] times. In between, the smaller of
+    /// the two is enough: the product with a step that is just stable is nowhere below 2.8, by the
+    /// eigenvalues of the step for `R·h/L` from 0.001 to 10,000.
+    pub fn electrical(&self) -> f64 {
+        let windings = &self.motors.windings;
+        let square = windings.torque_constant.component_mul(&windings.torque_constant);
+        let swing = self.at_shafts(&square.component_div(&windings.inductance)).sqrt();
+        swing.min(SETTLING * self.at_shafts(&square.component_div(&windings.resistance)))
+    }
+
+    /// What `at_shaft`, torques of the motors by their motion, makes of the acceleration of what they turn
+    /// directly: of the rotors, and behind a rigid transmission of motors and load, which are one inertia.
+    fn at_shafts(&self, at_shaft: &SVector<f64, N>) -> f64 {
+        match self.transmission {
+            Transmission::Elastic { .. } => self.mobility.component_mul(at_shaft).amax(),
+            Transmission::Rigid => {
+                let square = self.motors.ratio.component_mul(&self.motors.ratio);
+                let turned = SMatrix::from_diagonal(&at_shaft.component_div(&square));
+                row_sum(&(self.coupling.mobility() * turned))
+            }
+        }
     }
 
     /// Solves the load side for a substep of `step` [s] that begins in `state`.
@@ -407,6 +432,11 @@ fn across_gaps<const N: usize>(
         (false, true) => effort[joint].min(0.0),
         (false, false) => 0.0,
     })
+}
+
+/// The largest sum of sizes in a row of `matrix`, which bounds its eigenvalues.
+fn row_sum<const N: usize>(matrix: &SMatrix<f64, N, N>) -> f64 {
+    matrix.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
 }
 
 /// `|s|` of `s² + linear·s + square` at most.
