@@ -13,7 +13,7 @@
 //! | state | drives | references | laser |
 //! |---|---|---|---|
 //! | `Disabled`, `Faulted` | off | follow the feedback | off |
-//! | `Enabling` | voltage | follow the feedback until the power is on, then stand | off |
+//! | `Enabling` | voltage, against the weight | follow the feedback until the power is on, then stand | off |
 //! | `Idle` | voltage | stand | off |
 //! | `Running` | voltage | the stream, at a rate | as the stream says |
 //! | `Holding`, `Stopping` | voltage | along the stream to rest | off |
@@ -44,9 +44,10 @@ use crate::alignment::Alignment;
 use crate::cascade::Cascade;
 use crate::catch_up::CatchUp;
 use crate::exchange::{Inputs, Outputs, Peers, Presence};
-use crate::feedforward::Feedforward;
+use crate::feedforward::{Feedforward, Planned};
 use crate::intake::Intake;
 use crate::player::{Event, Player};
+use crate::standing::Standing;
 use crate::state::{AfterRest, State};
 use crate::statistics::Statistics;
 use crate::stream_time::{ONE, StreamTime};
@@ -55,8 +56,8 @@ use answer::PROGRESS_INTERVAL;
 use machine::{Axis, Machine, Motor};
 use messages::feedback::status;
 use messages::{
-    CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity, Feedback, LaserCycle, MAX_AXES,
-    Nanoseconds, RealtimeFacts,
+    AxisArray, CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity, Feedback,
+    LaserCycle, MAX_AXES, Nanoseconds, RealtimeFacts,
 };
 
 /// Cycles between two reports.
@@ -85,6 +86,9 @@ pub struct Controller {
     /// The mode in which the motors follow the plan.
     drive: CommandMode,
     supervision: Supervision,
+    standing: Standing,
+    /// Where the motors stood when they were to be enabled [rad].
+    enabled_at: AxisArray,
     statistics: Statistics,
     /// The stream being played, from its first setpoint until it is over; 0 for none.
     playing: u64,
@@ -119,6 +123,8 @@ impl Controller {
                 Motor::Stepper(_) => CommandMode::Position,
             },
             supervision: Supervision::new(machine),
+            standing: Standing::new(machine),
+            enabled_at: AxisArray::default(),
             statistics: Statistics::new(machine),
             playing: 0,
             completed: false,
@@ -324,9 +330,16 @@ impl Controller {
     /// Goes on by one cycle along the stream, or stands.
     fn advance(&mut self, feedback: &Feedback) {
         if !self.state.follows() {
-            let tool = self.tool_measured(feedback);
             if feedback.position.iter().all(|position| position.is_finite()) {
-                self.feedforward.rest_at(&feedback.position, tool);
+                let (angle, tool) = (feedback.position, self.tool_measured(feedback));
+                // Before the power comes, and with it the load.
+                let torque = match self.state {
+                    State::Enabling { .. } => *self.standing.torque(&angle),
+                    _ => AxisArray::default(),
+                };
+                let resting = Planned { angle, torque, tool, ..Planned::default() };
+                let powered = feedback.has(status::POWERED);
+                self.feedforward.rest_at(resting, powered.then_some(&feedback.current));
             }
             for cascade in self.cascades.iter_mut().flatten() {
                 cascade.reset();

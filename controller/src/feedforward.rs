@@ -103,11 +103,18 @@ impl Feedforward {
         put(&mut self.after, &last.coasted(cycles));
     }
 
-    /// Rests at `angle` [rad] from now on, as if it always had; the tool at `tool`, in metres.
-    pub fn rest_at(&mut self, angle: &AxisArray, tool: [f64; 3]) {
-        let resting = Planned { angle: *angle, tool, ..Planned::default() };
+    /// Rests where `resting` is from now on, as if it always had. The voltage that this takes is given
+    /// as soon as the motors are powered: `current` is what flows then [A], `None` before.
+    pub fn rest_at(&mut self, resting: Planned, current: Option<&AxisArray>) {
         (self.before, self.now, self.next, self.after) = (resting, resting, resting, resting);
-        self.windings.iter_mut().flatten().for_each(Winding::rest);
+        for (index, axis) in self.axes.iter().enumerate() {
+            let voltage = self.voltage(index, axis);
+            let Some(winding) = &mut self.windings[index] else { continue };
+            match current {
+                Some(current) => winding.rest(current[index], Some(voltage)),
+                None => winding.rest(0.0, None),
+            }
+        }
     }
 
     /// Goes on by one cycle, to `planned` at its end.

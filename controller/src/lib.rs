@@ -18,6 +18,7 @@ pub mod motion_limits;
 pub mod player;
 pub mod ramp;
 pub mod service;
+pub mod standing;
 mod state;
 pub mod statistics;
 pub mod stream_time;

@@ -7,10 +7,12 @@ use messages::{CommandMode, ControllerState};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum State {
     Disabled,
-    /// Waiting for the power, then holding for a moment.
+    /// Waiting for the power, then holding until the brakes are open and the axes have stood in their
+    /// places for a moment. All in cycles.
     Enabling {
         waited: u32,
         held: u32,
+        settled: u32,
     },
     Idle,
     Running,

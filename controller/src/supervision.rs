@@ -4,6 +4,7 @@
 //! so they come to rest along the path, else the drives brake them.
 
 use crate::ramp::{LARGEST_CHANGE, LARGEST_TURN};
+use crate::standing::STANDING_COUNTS;
 use machine::trip::Limit;
 use machine::trip::following::{CREEP, DISCONTINUITY, LEAD_STEP};
 use machine::{Axis, DcMotor, Machine, StallTolerance};
@@ -11,9 +12,6 @@ use messages::feedback::status;
 use messages::setpoint::flags;
 use messages::time::CYCLE_TIME;
 use messages::{AxisArray, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, Setpoint};
-
-/// Encoder counts per cycle within which an axis counts as standing.
-const STANDING_COUNTS: f64 = 1.5;
 
 /// Whether the axes can still be trusted to follow the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -313,10 +311,18 @@ impl Supervision {
         }
     }
 
+    /// The first axis that moves by more than an encoder count or so in a cycle, with its speed and what
+    /// counts as standing [joint units/s].
+    pub fn moving(&self, feedback: &Feedback) -> Option<(usize, f64, f64)> {
+        self.axes.iter().zip(&feedback.velocity).enumerate().find_map(|(index, (axis, speed))| {
+            let limit = STANDING_COUNTS * axis.encoder.resolution();
+            let stands = speed.abs() * CYCLE_TIME <= limit;
+            (!stands).then(|| (index, speed.abs() * axis.ratio, limit / CYCLE_TIME * axis.ratio))
+        })
+    }
+
     fn watch_standing(&mut self, feedback: &Feedback) {
-        let stands = self.axes.iter().zip(&feedback.velocity).all(|(axis, velocity)| {
-            velocity.abs() * CYCLE_TIME <= STANDING_COUNTS * axis.encoder.resolution()
-        });
+        let stands = self.moving(feedback).is_none();
         self.standing = if stands { self.standing.saturating_add(1) } else { 0 };
     }
 }

@@ -42,9 +42,10 @@ impl Winding {
         }
     }
 
-    /// Without current from now on.
-    pub(crate) fn rest(&mut self) {
-        (self.now, self.next) = (0.0, 0.0);
+    /// At rest, with `current` at the measurement [A], under an even `voltage` [V] if it is driven.
+    pub(crate) fn rest(&mut self, current: f64, voltage: Option<f64>) {
+        self.now = current;
+        self.next = voltage.map_or(0.0, |volts| self.keep * current + self.per_volt * volts);
     }
 
     /// Current at the measurement [A].

@@ -15,7 +15,8 @@
 //!   [`PlantOptions::current_resolution`].
 //! - The light follows the gate after the delays of the laser source; gate edges fall where they
 //!   are asked, to the nanosecond.
-//! - A brake holds the shaft of an unpowered motor as friction does; it opens and closes at once.
+//! - A brake holds the shaft of an unpowered motor as friction does. It closes at once, and holds on for
+//!   its `brake_release` after the power has come.
 //! - Backlash is a gap without friction between motor and spring: in it the load coasts.
 //! - There is no measurement noise and no thermal model.
 //!
@@ -187,6 +188,8 @@ pub struct Plant<const N: usize, M: Mechanism<N>> {
     light: LaserCycle,
     /// Cycles gone by since the last exchange.
     passed_cycles: u32,
+    /// Cycles for which the motors have been powered before the one at hand; `None` if they are not.
+    powered_cycles: Option<u32>,
     fault: Fault,
 }
 
@@ -252,6 +255,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             in_force: None,
             light: LaserCycle::OFF,
             passed_cycles: 0,
+            powered_cycles: None,
             fault: Fault::default(),
         })
     }
@@ -275,7 +279,11 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
 
     /// Moves one cycle on under `actuation`.
     fn advance(&mut self, actuation: &Actuation) {
-        self.dynamics.power(actuation.mode != CommandMode::Disabled);
+        self.powered_cycles = match actuation.mode {
+            CommandMode::Disabled => None,
+            _ => Some(self.powered_cycles.map_or(0, |cycles| cycles.saturating_add(1))),
+        };
+        self.dynamics.power(self.powered_cycles.map(|cycles| f64::from(cycles) * CYCLE_TIME));
         let motors = *self.dynamics.motors();
         let step = self.weights.step;
         for index in 0..self.substeps {

@@ -31,6 +31,15 @@ impl Friction {
     }
 }
 
+/// A brake that is closed while its motor is unpowered, or magnets that clamp a planar motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HoldingBrake {
+    /// Torque with which it holds the shaft, 0 where there is none [N·m].
+    pub torque: f64,
+    /// From the power to the open brake [s]: until then it holds.
+    pub release: f64,
+}
+
 /// What a motor's position is counted in: the counts of an incremental encoder on its shaft, or the
 /// pulses sent to a stepper.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,8 +109,8 @@ pub struct Axis {
     pub motor: Motor,
     /// Friction at its shaft.
     pub friction: Friction,
-    /// Torque of the brake that holds its shaft while it is unpowered, 0 for none [N·m].
-    pub brake: f64,
+    /// What holds its shaft while it is unpowered.
+    pub brake: HoldingBrake,
     /// Its encoder, or the pulses that take its place.
     pub encoder: Encoder,
     /// Gains of its cascade.

@@ -27,7 +27,7 @@ pub mod taylor;
 pub mod transmission;
 pub mod trip;
 
-pub use actuator::{Axis, Encoder, Friction, JointUnit, LoopGains};
+pub use actuator::{Axis, Encoder, Friction, HoldingBrake, JointUnit, LoopGains};
 pub use document::{DocumentError, Override};
 pub use equation_of_motion::EquationOfMotion;
 pub use gcode_settings::{GcodeSettings, ZMeaning};

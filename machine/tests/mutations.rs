@@ -38,10 +38,11 @@ const SIGNED: [&str; 10] = [
 const SIDES: [&str; 5] = ["working_mode", "assembly_mode", "side", "elbow", "legs"];
 
 /// Keys that may be 0.
-const MAY_BE_ZERO: [&str; 17] = [
+const MAY_BE_ZERO: [&str; 18] = [
     "coulomb",
     "viscous",
     "brake",
+    "brake_release",
     "inertia",
     "on_delay",
     "off_delay",

@@ -17,7 +17,7 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::PathBuf;
 use std::time::Instant;
-use workbench::simulation::simulate;
+use workbench::simulation::{SimulationError, simulate};
 
 /// Runs the command.
 ///
@@ -47,8 +47,21 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
         if let Some(recording) = &mut recording {
             recording.write(records);
         }
-    })
-    .map_err(Failure::bad_input)?;
+    });
+    let simulated = match simulated {
+        Ok(simulated) => simulated,
+        Err(SimulationError::Faulted { fault, .. }) => {
+            let warnings = input.machine.job_warnings();
+            let run_outcome =
+                RunOutcome { latched: fault, plan_time, warnings, ..RunOutcome::default() };
+            let (machine, facts) = (&input.machine, &plan.facts);
+            let mut summary =
+                conclusion::summarise(machine, facts, &run_outcome, None, Clock::Virtual);
+            summary.wall = started.elapsed().as_secs_f64();
+            return Ok(output::summary(&summary, arguments.json));
+        }
+        Err(error) => return Err(Failure::bad_input(error)),
+    };
     let mut warnings = input.machine.job_warnings();
     warnings.extend(recording.and_then(Recording::finish));
 

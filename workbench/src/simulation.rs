@@ -6,13 +6,14 @@
 use controller::{Controller, Inputs, Outputs, Peers};
 use drives::bridge::BridgeOptions;
 use drives::{Bridge, Deadlines, PlantOptions, SimulatedPlant};
-use machine::Machine;
+use machine::{Axis, Machine};
 use messages::time::CYCLE_PERIOD;
 use messages::{
-    ControllerReport, ControllerState, DrivesReport, Nanoseconds, OperatorRequest, OperatorVerb,
-    RealtimeFacts, Setpoint,
+    ControllerReport, ControllerState, DrivesReport, Fault, Nanoseconds, OperatorRequest,
+    OperatorVerb, RealtimeFacts, Setpoint,
 };
 use monitor::recording::CycleRecord;
+use monitor::summary::FaultSummary;
 use planner::Plan;
 use std::time::{Duration, Instant};
 
@@ -29,8 +30,8 @@ const CHUNK: usize = 256;
 /// Cycles after the stream's end in which its last light is still told.
 const LIGHT_LAG: usize = monitor::conclusion::LIGHT_LAG as usize + 1;
 
-/// Cycles that enabling may take.
-const ENABLE_PATIENCE: u64 = 2000;
+/// Cycles that enabling may take: the controller gives up before, with a fault that says why.
+const ENABLE_PATIENCE: u64 = 3000;
 
 /// What a simulation gives besides its records.
 #[derive(Debug, Clone)]
@@ -50,12 +51,18 @@ pub enum SimulationError {
     #[error(transparent)]
     Plant(#[from] drives::plant::PlantError),
     /// The controller did not get ready.
-    #[error("the controller did not become ready: it is {state}, fault {fault}")]
+    #[error("the controller did not become ready: it is {state}")]
     NotReady {
         /// Its state.
         state: &'static str,
-        /// Its fault.
-        fault: &'static str,
+    },
+    /// The axes could not be enabled.
+    #[error("the controller did not become ready: {words}")]
+    Faulted {
+        /// The fault that was found.
+        fault: Fault,
+        /// The same, with the axis by its name.
+        words: String,
     },
 }
 
@@ -99,19 +106,22 @@ impl Pipeline {
         CycleRecord { feedback: *self.bridge.feedback(), command: self.outputs.command }
     }
 
-    fn enable(&mut self) -> Result<(), SimulationError> {
+    fn enable(&mut self, axes: &[Axis]) -> Result<(), SimulationError> {
         // Drives powers nothing before it has been greeted by an unpowered command.
         self.cycle(&[], None);
         self.cycle(&[], Some(request(OperatorVerb::Enable, 0.0)));
         for _ in 0..ENABLE_PATIENCE {
-            if self.outputs.command.state() == ControllerState::Idle {
-                return Ok(());
+            match self.outputs.command.state() {
+                ControllerState::Idle => return Ok(()),
+                ControllerState::Faulted => break,
+                _ => self.cycle(&[], None),
             }
-            self.cycle(&[], None);
         }
-        Err(SimulationError::NotReady {
-            state: self.outputs.command.state().name(),
-            fault: self.outputs.command.fault.code().name(),
+        let command = &self.outputs.command;
+        let fault = command.fault;
+        Err(match FaultSummary::of(&fault, axes) {
+            Some(told) => SimulationError::Faulted { fault, words: told.to_string() },
+            None => SimulationError::NotReady { state: command.state().name() },
         })
     }
 }
@@ -133,7 +143,7 @@ pub fn simulate(
     mut examine: impl FnMut(&[CycleRecord]),
 ) -> Result<Simulated, SimulationError> {
     let mut pipeline = Pipeline::new(machine, plant, plant_options)?;
-    pipeline.enable()?;
+    pipeline.enable(&machine.axes)?;
     let mut setpoints = plan.setpoints(STREAM);
     let mut waiting: Vec<Setpoint> = Vec::with_capacity(DRAIN);
     // Written once, so that its pages are there before the clock runs.

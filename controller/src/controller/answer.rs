@@ -85,6 +85,8 @@ impl Controller {
             command.velocity[index] = target.velocity;
             command.effort[index] = target.effort;
             if !follows {
+                // What holds the weight, in the cycle in which the power comes.
+                command.voltage[index] = reference.voltage;
                 continue;
             }
             command.following_error[index] = error;

@@ -22,7 +22,7 @@ impl Controller {
     fn obey(&mut self, verb: OperatorVerb, request: &OperatorRequest, cycle: Cycle) -> bool {
         match (verb, self.state) {
             (OperatorVerb::Enable, State::Disabled) => {
-                self.state = State::Enabling { waited: 0, held: 0 };
+                self.state = State::Enabling { waited: 0, held: 0, settled: 0 };
             }
             (OperatorVerb::Disable, State::Idle | State::Enabling { .. }) => {
                 self.state = State::Disabled;

@@ -2,16 +2,16 @@
 
 use super::Controller;
 use crate::alignment::Alignment;
+use crate::standing::Strayed;
 use crate::state::{AfterRest, State};
 use crate::supervision::{Finding, Tracking};
 use messages::feedback::status;
 use messages::{Cycle, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds};
 
-/// Cycles of standing still before an axis counts as at rest without a plan, and of holding
-/// before it counts as enabled.
+/// Cycles of standing still before an axis counts as at rest without a plan, and as enabled.
 const STANDING: u32 = 20;
 
-/// Cycles that enabling, or a quick stop, may take.
+/// Cycles that enabling, brakes left out, or a quick stop may take.
 const PATIENCE: u32 = 1000;
 
 /// Cycles for which a planner that lives may send nothing: a minute, longer than any computer is
@@ -22,7 +22,9 @@ impl Controller {
     /// Changes the state where time or the feedback asks for it.
     pub(super) fn transition(&mut self, now: Nanoseconds, feedback: &Feedback) {
         match self.state {
-            State::Enabling { waited, held } => self.enable(now, feedback, waited, held),
+            State::Enabling { waited, held, settled } => {
+                self.enable(now, feedback, [waited, held, settled]);
+            }
             // Drives may not have found all peers yet.
             State::Idle if feedback.has(status::GATE_INHIBITED) => {}
             State::Idle if self.intake.is_ready() => self.begin(now, feedback.cycle),
@@ -59,23 +61,48 @@ impl Controller {
         }
     }
 
-    /// Waits for the power and for standstill, then holds for a moment where the axes stand.
-    fn enable(&mut self, now: Nanoseconds, feedback: &Feedback, waited: u32, held: u32) {
+    /// Waits for the power and for standstill, then holds the axes where they stand, against their weight,
+    /// until the brakes are open and all have stood there for a moment.
+    fn enable(&mut self, now: Nanoseconds, feedback: &Feedback, cycles: [u32; 3]) {
+        let [waited, held, settled] = cycles;
+        if waited == 0 {
+            self.enabled_at = feedback.position;
+        }
+        let place = if held > 0 { &self.feedforward.now().angle } else { &self.enabled_at };
+        let strayed = self.standing.strayed(place, &feedback.position, held > 0);
+        let sinks = held == 0 && strayed.is_some();
+        let stands = self.supervision.standing() > 0;
         let ready = held > 0
             || feedback.has(status::POWERED)
                 && !feedback.has(status::WATCHDOG_TRIPPED)
                 && !feedback.fault.is_some()
-                && self.supervision.standing() > 0;
-        self.state = if held >= STANDING {
+                && stands;
+        let rests = held > self.standing.release() && stands && strayed.is_none();
+        let settled = if rests { settled + 1 } else { 0 };
+        self.state = if settled >= STANDING {
             State::Idle
         } else {
-            State::Enabling { waited: waited + 1, held: if ready { held + 1 } else { 0 } }
+            State::Enabling { waited: waited + 1, held: if ready { held + 1 } else { 0 }, settled }
         };
-        if waited >= PATIENCE {
-            let (value, limit) = (f64::from(waited), f64::from(PATIENCE));
-            let fault = Fault::new(FaultCode::DriveFault);
-            self.fail(Finding::lost(fault.beyond(FaultQuantity::Cycles, value, limit)), now);
+        if sinks || waited >= PATIENCE + self.standing.release() {
+            self.fail(Finding::lost(self.restless(feedback, strayed, waited)), now);
         }
+    }
+
+    /// Why the axes cannot be enabled after `waited` cycles: one has `strayed` from its place by so much,
+    /// or still moves, or the power does not come.
+    fn restless(&self, feedback: &Feedback, strayed: Option<Strayed>, waited: u32) -> Fault {
+        let fault = Fault::new(FaultCode::DriveFault);
+        if let Some(Strayed { index, distance, limit }) = strayed {
+            let ratio = self.machine.axes[index].ratio;
+            let quantity = FaultQuantity::HoldDistance;
+            return fault.on(index).beyond(quantity, distance * ratio, limit * ratio);
+        }
+        if let Some((index, speed, limit)) = self.supervision.moving(feedback) {
+            return fault.on(index).beyond(FaultQuantity::Velocity, speed, limit);
+        }
+        let (value, limit) = (f64::from(waited), f64::from(PATIENCE));
+        fault.beyond(FaultQuantity::Cycles, value, limit)
     }
 
     /// Goes on as soon as there is enough to play, or gives up waiting.

@@ -145,9 +145,10 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
         self.field.as_mut()
     }
 
-    /// Closes the brakes of motors that are not powered, and opens those of motors that are.
-    pub(super) fn power(&mut self, powered: bool) {
-        self.motors.power(powered);
+    /// Closes the brakes of motors that have been powered for `time` [s], `None` if they are not, and
+    /// opens those that have had the time to.
+    pub(super) fn power(&mut self, time: Option<f64>) {
+        self.motors.power(time);
     }
 
     /// The motors.

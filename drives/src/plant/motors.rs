@@ -5,6 +5,9 @@ use nalgebra::SVector;
 
 use super::winding::Windings;
 
+/// Times that are no more apart than this are the same, rounding left out [s].
+const SAME_TIME: f64 = 1e-9;
+
 /// What the motors are made of, one entry each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motors<const N: usize> {
@@ -16,8 +19,9 @@ pub struct Motors<const N: usize> {
     pub coulomb: SVector<f64, N>,
     /// Coulomb friction torque of the shaft [N·m].
     sliding: SVector<f64, N>,
-    /// Torque of the brake [N·m].
+    /// Torque of the brake [N·m], and how long it takes to open [s].
     brake: SVector<f64, N>,
+    release: SVector<f64, N>,
     /// Viscous friction [N·m·s/rad].
     pub viscous: SVector<f64, N>,
     /// Joint units per radian.
@@ -39,7 +43,8 @@ impl<const N: usize> Motors<N> {
             inertia: each(|axis| axis.motor.rotor_inertia()),
             coulomb: each(|axis| axis.friction.coulomb),
             sliding: each(|axis| axis.friction.coulomb),
-            brake: each(|axis| axis.brake),
+            brake: each(|axis| axis.brake.torque),
+            release: each(|axis| axis.brake.release),
             viscous: each(|axis| axis.friction.viscous),
             ratio: each(|axis| axis.ratio),
             gap: each(|axis| axis.backlash / 2.0),
@@ -48,9 +53,13 @@ impl<const N: usize> Motors<N> {
         }
     }
 
-    /// Closes the brakes of motors that are not powered, and opens those of motors that are.
-    pub(super) fn power(&mut self, powered: bool) {
-        self.coulomb = if powered { self.sliding } else { self.sliding + self.brake };
+    /// Closes the brakes of motors that have been powered for `time` [s], `None` if they are not, and
+    /// opens those that have had the time to.
+    pub(super) fn power(&mut self, time: Option<f64>) {
+        self.coulomb = SVector::from_fn(|row, _| {
+            let opened = time.is_some_and(|time| time + SAME_TIME >= self.release[row]);
+            self.sliding[row] + if opened { 0.0 } else { self.brake[row] }
+        });
     }
 }
 

@@ -5,7 +5,7 @@ use machine::kinematics::{
     Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, TaskSpace, ToolMotion,
 };
 use machine::transmission::gear::Efficiency;
-use machine::{AxisLimits, DcMotor, Encoder, Friction, LoopGains, Motor};
+use machine::{AxisLimits, DcMotor, Encoder, Friction, HoldingBrake, LoopGains, Motor};
 use nalgebra::{SMatrix, Vector1, Vector3};
 
 /// A rigid joint of 1 rad per radian.
@@ -114,7 +114,7 @@ pub(crate) fn axis(inertia: f64, friction: Friction) -> machine::Axis {
             continuous_current: None,
         }),
         friction,
-        brake: 0.0,
+        brake: HoldingBrake { torque: 0.0, release: 0.0 },
         encoder: Encoder { counts: 4096.0 },
         gains: LoopGains { position: 40.0, velocity: 160.0, current: 349.0, inertia },
         limits: AxisLimits {

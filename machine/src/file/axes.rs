@@ -2,7 +2,7 @@
 
 use super::motors::{counts, motor};
 use super::tables::{AxisTable, LimitsTable, LoopsTable};
-use crate::actuator::{Axis, Friction, LoopGains};
+use crate::actuator::{Axis, Friction, HoldingBrake, LoopGains};
 use crate::document::{Decode, Diagnostics, Either, ProblemKind, Quantity, Range};
 use crate::limits::AxisLimits;
 use crate::motor::Motor;
@@ -99,7 +99,10 @@ pub(super) fn axis(
             coulomb: table.friction.coulomb.value,
             viscous: table.friction.viscous.value,
         },
-        brake: table.friction.brake.value,
+        brake: HoldingBrake {
+            torque: table.friction.brake.value,
+            release: table.friction.brake_release.value,
+        },
         encoder: counts(table, &motor, diagnostics)?,
         gains: match motor {
             Motor::Dc(_) => gains(table, inertia, diagnostics)?,

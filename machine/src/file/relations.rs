@@ -26,10 +26,6 @@ const FASTEST_LOOP: f64 = 350.0;
 /// depends on oil and warmth, would else have to be right to half a per cent.
 const FRICTION_TOLERANCES: f64 = 200.0;
 
-/// Tolerances of the path by which a weight may push the tool off it when a motor takes it over from
-/// its brake: the loops need some tenths of a second to hold it, and a job may mark as soon.
-const WEIGHT_TOLERANCES: f64 = 25.0;
-
 /// Load inertia per rotor inertia that a velocity loop of the rotor still rules: behind a spring, and
 /// rigid.
 const LARGEST_LOAD: [f64; 2] = [10.0, 30.0];
@@ -141,6 +137,8 @@ struct Subject<'a> {
     worst_speed: f64,
     /// What gravity takes at the joint [N or N·m].
     gravity: f64,
+    /// Whether a spring is between motor and load.
+    is_elastic: bool,
 }
 
 /// Warns of values of a machine that do not fit each other, and refuses contradictions.
@@ -168,13 +166,14 @@ pub(super) fn check(
             lever: standing.lever[index],
             worst_speed,
             gravity: standing.gravity[index],
+            is_elastic: standing.resonance.is_some(),
         };
         subject.following_error(&table.path, standing.resonance, diagnostics);
         subject.resolution(&table.path, diagnostics);
         subject.speeds(&table.path, diagnostics);
         subject.lead(table, diagnostics);
-        subject.load(standing.resonance.is_some(), diagnostics);
-        subject.weight(&table.path, diagnostics);
+        subject.load(diagnostics);
+        subject.weight(diagnostics);
         match &axis.motor {
             Motor::Dc(motor) => subject.dc(motor, &table.path, diagnostics),
             Motor::Stepper(motor) => subject.stepper(motor, diagnostics),
@@ -366,14 +365,14 @@ impl Subject<'_> {
     }
 
     /// The load's inertia against the rotor's.
-    fn load(&self, is_elastic: bool, diagnostics: &mut Diagnostics) {
+    fn load(&self, diagnostics: &mut Diagnostics) {
         let Self { table, axis, joint, .. } = self;
         let rotor = axis.motor.rotor_inertia();
         if axis.motor.stepper().is_some_and(StepperMotor::is_planar) {
             return;
         }
         let load = axis.ratio * axis.ratio * joint.load;
-        let most = LARGEST_LOAD[usize::from(!is_elastic)];
+        let most = LARGEST_LOAD[usize::from(!self.is_elastic)];
         let ratio = load / rotor;
         if ratio > most {
             let text = format!(
@@ -386,35 +385,16 @@ impl Subject<'_> {
         }
     }
 
-    /// What gravity takes against what holds an axis whose motor is unpowered, and against the loops
-    /// that take it over.
-    fn weight(&self, path: &PathTable, diagnostics: &mut Diagnostics) {
-        let Self { table, axis, gravity, lever, .. } = self;
+    /// What gravity takes against what holds an axis whose motor is unpowered.
+    fn weight(&self, diagnostics: &mut Diagnostics) {
+        let Self { table, axis, gravity, .. } = self;
         let torque = (gravity * axis.ratio).abs();
         let teeth = axis.motor.stepper().map_or(0.0, |motor| motor.detent_torque);
-        let held = axis.friction.coulomb + axis.brake + teeth;
+        let held = axis.friction.coulomb + axis.brake.torque + teeth;
         if torque > held {
             let text = format!(
                 "at home gravity turns the motor with {torque:.3e} N·m, and friction and brake hold \
                  {held:.3e} N·m: it sinks while the motor is unpowered; give it a `brake`, or balance it"
-            );
-            self.warn(table.friction.span, &text, diagnostics);
-        }
-        if axis.motor.dc().is_none() {
-            return;
-        }
-        let push = (torque - axis.friction.coulomb) / self.stiffness() * axis.ratio * lever;
-        if push > WEIGHT_TOLERANCES * path.tolerance.value {
-            let text = format!(
-                "at home gravity turns the motor with {torque:.3e} N·m, friction holds {:.3e} N·m{}, \
-                 and the loops give way by {:.1} µm until they bear the rest: {:.0} times the path's \
-                 tolerance of {:.3} µm{}, which marks soon after enabling show; balance it",
-                axis.friction.coulomb,
-                at_line(table.friction.coulomb.span, diagnostics),
-                push * 1e6,
-                push / path.tolerance.value,
-                path.tolerance.value * 1e6,
-                at_line(path.tolerance.span, diagnostics)
             );
             self.warn(table.friction.span, &text, diagnostics);
         }
@@ -437,12 +417,18 @@ impl Subject<'_> {
             self.warn(data.inductance.span, &text, diagnostics);
         }
         let inertia = axis.gains.inertia;
-        let mechanical = inertia * resistance / (torque_constant * torque_constant);
-        if !(MECHANICAL[0]..=MECHANICAL[1]).contains(&mechanical) {
+        // Behind a spring the rotor swings by itself, and only with the load on the whole.
+        let alone = if self.is_elastic { motor.rotor_inertia } else { inertia };
+        let unusual = [alone, inertia].into_iter().find(|inertia| {
+            let time = inertia * resistance / (torque_constant * torque_constant);
+            !(MECHANICAL[0]..=MECHANICAL[1]).contains(&time)
+        });
+        if let Some(turned) = unusual {
             let text = format!(
-                "{torque_constant:.3e} N·m/A and {resistance:.3e} Ω{} turn {inertia:.3e} kg·m² with a \
-                 time constant of {mechanical:.3e} s; motors have {:.0e} to {} s",
+                "{torque_constant:.3e} N·m/A and {resistance:.3e} Ω{} turn {turned:.3e} kg·m² with a \
+                 time constant of {:.3e} s; motors have {:.0e} to {} s",
                 at_line(data.resistance.span, diagnostics),
+                turned * resistance / (torque_constant * torque_constant),
                 MECHANICAL[0],
                 MECHANICAL[1]
             );

@@ -301,6 +301,8 @@ table! {
         /// Torque of a brake that holds the shaft while the motor is unpowered, or of a planar motor's
         /// magnets that clamp it while its air is off.
         pub brake: AtLeastZero<unit::Torque> = "0 N m",
+        /// How long the brake goes on holding after the motor is powered; the motor bears the load by then.
+        pub brake_release: AtLeastZero<unit::Duration> = "20 ms",
     }
 }
 

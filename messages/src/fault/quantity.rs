@@ -55,6 +55,8 @@ pub enum FaultQuantity {
     Mechanism = 23,
     /// Gate edges of a cycle whose order, times or power cannot be carried out.
     ImpossibleEdges = 24,
+    /// How far an axis is from where it is to be held as it is enabled [joint unit].
+    HoldDistance = 25,
 }
 
 /// The unit of a quantity.
@@ -67,7 +69,7 @@ pub enum FaultUnit {
 }
 
 impl FaultQuantity {
-    const ALL: [Self; 25] = [
+    const ALL: [Self; 26] = [
         Self::None,
         Self::FollowingError,
         Self::Position,
@@ -93,6 +95,7 @@ impl FaultQuantity {
         Self::Mode,
         Self::Mechanism,
         Self::ImpossibleEdges,
+        Self::HoldDistance,
     ];
 
     /// The quantity with this number in a sample; an unknown number reads as [`Self::None`].
@@ -129,6 +132,7 @@ impl FaultQuantity {
             Self::Mode => ("command mode", Plain("")),
             Self::Mechanism => ("distance that the mechanism must keep", Plain("")),
             Self::ImpossibleEdges => ("gate edges of an impossible laser cycle", Plain("")),
+            Self::HoldDistance => ("distance from where it is to be held", Joint("")),
         }
     }
 }

@@ -60,9 +60,9 @@ fn write_axis(axis: &mut dyn TableLike, candidate: &Candidate, need: &AxisNeed) 
         let friction = axis.get_mut("friction")?.as_table_like_mut()?;
         set(friction, "coulomb", quantity(candidate.friction.coulomb, "N m"));
         set(friction, "viscous", quantity(candidate.friction.viscous, "N m s/rad"));
-        if need.axis.brake > 0.0 {
+        if need.axis.brake.torque > 0.0 {
             // As strong at the joint as before.
-            let brake = need.axis.brake * candidate.ratio / need.axis.ratio;
+            let brake = need.axis.brake.torque * candidate.ratio / need.axis.ratio;
             set(friction, "brake", quantity(brake, "N m"));
         }
     }
