@@ -12,7 +12,13 @@ pub fn paraxial_travel(depth: f64, index: f64) -> f64 {
     depth / index
 }
 
-/// The same for the rays of `half_angle` [rad, 0 to π/2] in air: `t·tan u′/tan u`, with
+/// Depth [m] of a point below the face of a glass with refractive `index` that from straight above
+/// seems to be `apparent` deep [m].
+pub fn true_depth(apparent: f64, index: f64) -> f64 {
+    apparent * index
+}
+
+/// The lens's travel as [`paraxial_travel`] for the rays of `half_angle` [rad, 0 to π/2] in air: `t·tan u′/tan u`, with
 /// `sin u′ = sin u/n`. It becomes the paraxial travel as the angle goes to 0.
 pub fn marginal_travel(depth: f64, index: f64, half_angle: f64) -> f64 {
     // tan u′/tan u = cos u/(n·cos u′), which has no 0/0.

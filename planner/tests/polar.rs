@@ -93,7 +93,6 @@ fn ten_thousand_points_are_marked_once_each_in_their_order() {
         radius: f64::INFINITY,
         heights: [f64::NEG_INFINITY, f64::INFINITY],
         glass: None,
-        half_angle: 0.0,
         dwell: 1e-3,
         from: 0,
     };

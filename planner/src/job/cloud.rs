@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use machine::focus::{marginal_travel, paraxial_travel};
+use machine::focus::{marginal_travel, paraxial_travel, true_depth};
 use messages::math;
 use nalgebra::Vector3;
 
@@ -27,14 +27,60 @@ pub struct Cloud {
     pub radius: f64,
     /// The lowest and the highest z [m].
     pub heights: [f64; 2],
-    /// Height of the glass's face [m] and its refractive index; `None` without glass.
-    pub glass: Option<(f64, f64)>,
-    /// Half of the angle of the beam's cone in air [rad], 0 for rays near its axis.
-    pub half_angle: f64,
+    /// What the points lie in; `None` without glass.
+    pub glass: Option<Glass>,
     /// How long each point is lit [s], unless it has a time of its own.
     pub dwell: f64,
     /// The first point to mark, in the order of marking, from 0.
     pub from: usize,
+}
+
+/// A block of glass below a level face, and the beam that comes through it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Glass {
+    /// Height of its upper face [m].
+    pub face: f64,
+    /// Its refractive index.
+    pub index: f64,
+    /// Half of the angle of the beam's cone in air [rad], 0 for rays near its axis.
+    pub half_angle: f64,
+}
+
+/// Which of the two places of a point in glass its z says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Height {
+    /// Where it is.
+    True,
+    /// Where it seems to be, seen from straight above.
+    Apparent,
+}
+
+machine::keyword! {
+    Height, "a word",
+    "true" => Self::True,
+    "apparent" => Self::Apparent,
+}
+
+impl Glass {
+    /// Where a point is that seems to be at the height `z` [m]; above the face, at `z`.
+    pub fn true_height(&self, z: f64) -> f64 {
+        if z < self.face { self.face - true_depth(self.face - z, self.index) } else { z }
+    }
+
+    /// The height of the lens's focus in air that brings the focus in the glass to `z` [m], a true
+    /// height.
+    pub fn focus(&self, z: f64) -> f64 {
+        if z >= self.face {
+            return z;
+        }
+        let depth = self.face - z;
+        self.face
+            - if self.half_angle > 0.0 {
+                marginal_travel(depth, self.index, self.half_angle)
+            } else {
+                paraxial_travel(depth, self.index)
+            }
+    }
 }
 
 /// What became of the points.
@@ -128,22 +174,7 @@ impl Cloud {
         kept
     }
 
-    /// The height of the lens's focus in air that brings the focus in the glass to `z` [m].
-    pub fn focus(&self, z: f64) -> f64 {
-        match self.glass {
-            Some((face, index)) if z < face => {
-                let depth = face - z;
-                face - if self.half_angle > 0.0 {
-                    marginal_travel(depth, index, self.half_angle)
-                } else {
-                    paraxial_travel(depth, index)
-                }
-            }
-            _ => z,
-        }
-    }
-
-    /// The drawing of `points` at `power`, reached from `home`.
+    /// The drawing of `points`, all at their true places, at `power`, reached from `home`.
     pub fn draw(
         &self,
         name: &str,
@@ -156,7 +187,8 @@ impl Cloud {
         let first = self.from.min(ordered.points.len());
         let mut steps = Vec::with_capacity(2 * (ordered.points.len() - first));
         for point in &ordered.points[first..] {
-            let to = Vector3::new(point.x, point.y, self.focus(point.z));
+            let focus = self.glass.map_or(point.z, |glass| glass.focus(point.z));
+            let to = Vector3::new(point.x, point.y, focus);
             steps.push(Step { action: Action::Rapid { to }, line });
             let dwell = Action::Dwell { time: self.dwell, lit: Some(power) };
             steps.push(Step { action: dwell, line });

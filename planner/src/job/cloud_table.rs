@@ -11,7 +11,7 @@ use machine::{DocumentError, Machine, table};
 use messages::math;
 use nalgebra::Vector3;
 
-use super::cloud::{self, Cloud};
+use super::cloud::{self, Cloud, Glass, Height};
 use crate::drawing::Drawing;
 
 table! {
@@ -22,7 +22,7 @@ table! {
         pub file: Option<Spanned<String>>,
         /// A sample: points at random inside a sphere.
         pub sphere: Option<SphereTable>,
-        /// Where the file's origin lies.
+        /// Where the file's origin lies; its z as `z` says.
         pub at: Option<Point>,
         /// Thickness of a layer.
         pub layer: Quantity<Length, Positive> = "0.2 mm",
@@ -36,8 +36,11 @@ table! {
         pub radius: Option<Quantity<Length, Positive>>,
         /// The lowest and the highest z that a point may have.
         pub heights: Option<[Quantity<Length>; 2]>,
-        /// Height of the glass's face; with it z is the depth as seen from outside of the glass.
+        /// Height of the glass's upper face, through which the beam comes.
         pub face: Option<Quantity<Length>>,
+        /// true: z of the points is where they shall be in the glass; apparent: where they shall seem to
+        /// be from straight above. All other heights and lengths of this table are true ones.
+        pub z: Spanned<Height> = "true",
         /// Refractive index of the glass.
         pub index: Number<Positive> = 1.52,
         /// Half of the angle of the beam's cone in air; near-axis rays when left out.
@@ -76,7 +79,11 @@ pub(super) fn draw(
     machine: &Machine,
 ) -> Result<Drawing, DocumentError> {
     let line = diagnostics.position(table.span).map_or(0, |(line, _)| line as u64);
-    let points = points(table, folder, diagnostics);
+    let mut points = points(table, folder, diagnostics);
+    let glass = glass(table, diagnostics);
+    if let (Some(glass), Height::Apparent) = (&glass, table.z.value) {
+        points.iter_mut().for_each(|point| point.z = glass.true_height(point.z));
+    }
     let dwell = dwell(table, diagnostics);
     let from = whole(&table.from, 0..=MOST_POINTS, "from", diagnostics);
     let from = from.unwrap_or(0) as usize;
@@ -89,8 +96,7 @@ pub(super) fn draw(
             .heights
             .as_ref()
             .map_or([f64::NEG_INFINITY, f64::INFINITY], |[low, high]| [low.value, high.value]),
-        glass: table.face.as_ref().map(|face| (face.value, table.index.value)),
-        half_angle: table.half_angle.as_ref().map_or(0.0, |angle| angle.value),
+        glass,
         dwell,
         from,
     };
@@ -165,6 +171,19 @@ fn points(table: &CloudTable, folder: &Path, diagnostics: &mut Diagnostics) -> V
             Vec::new()
         }
     }
+}
+
+/// The glass, where the table has its face.
+fn glass(table: &CloudTable, diagnostics: &mut Diagnostics) -> Option<Glass> {
+    if table.face.is_none() && table.z.value == Height::Apparent {
+        let text = "`z` is apparent, and there is no glass to see the points through".to_owned();
+        diagnostics.contradict(table.z.span, text, "add `face`, or write z = \"true\"");
+    }
+    Some(Glass {
+        face: table.face.as_ref()?.value,
+        index: table.index.value,
+        half_angle: table.half_angle.as_ref().map_or(0.0, |angle| angle.value),
+    })
 }
 
 /// How long a point is lit [s].
