@@ -299,12 +299,37 @@ pub struct PlanArguments {
     /// Write the step pulses of all steppers, each with its time and count, to a CSV file.
     #[arg(long, value_name = "FILE")]
     pub pulses: Option<PathBuf>,
+    /// Write the path that the counted pulses alone make, one row a pulse, to a CSV file.
+    #[arg(long, value_name = "FILE")]
+    pub pulse_path: Option<PathBuf>,
     /// Check the path limits only, as if motors were ideal.
     #[arg(long)]
     pub ideal: bool,
+    /// Put the job on paper beside it, by a speed profile of the sources; needs --ideal. The files that
+    /// are written are then of that profile.
+    #[arg(long, value_enum)]
+    pub profile: Option<ProfileName>,
     /// Print one JSON object on stdout.
     #[arg(long)]
     pub json: bool,
+}
+
+/// How the speed of a stroke goes on paper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ProfileName {
+    /// Trapezoid of acceleration, run-in and run-out at every stroke (source 003).
+    Trapezoid,
+    /// Trapezoid of velocity, from rest to rest along every stroke (source 004).
+    Velocity,
+}
+
+impl From<ProfileName> for planner::paper::Profile {
+    fn from(name: ProfileName) -> Self {
+        match name {
+            ProfileName::Trapezoid => Self::Trapezoid,
+            ProfileName::Velocity => Self::Velocity,
+        }
+    }
 }
 
 /// Arguments of `check`.

@@ -10,6 +10,12 @@ pub enum PlanError {
     /// The job is a comparison on paper.
     #[error("this job can be planned, not run: {0}")]
     IdealOnly(&'static str),
+    /// The sources' speed profiles know no such job.
+    #[error(
+        "the profiles of the sources are for drawings without a surface and for a level tool: leave out \
+         [surface] and [attitude]"
+    )]
+    NotOnPaper,
     /// Whoever asked for the plan does not want it any more.
     #[error("planning was given up: the job was withdrawn")]
     Abandoned,
@@ -131,7 +137,7 @@ impl PlanError {
     /// Line of the job file that it concerns, from 1; 0 for none.
     pub fn line(&self) -> u64 {
         match self {
-            Self::IdealOnly(_) | Self::Abandoned | Self::TooLong { .. } => 0,
+            Self::IdealOnly(_) | Self::NotOnPaper | Self::Abandoned | Self::TooLong { .. } => 0,
             Self::TooShort { line, .. }
             | Self::Unreadable { line, .. }
             | Self::Unreachable { line, .. }

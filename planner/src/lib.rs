@@ -8,6 +8,7 @@
 //! - [`light`]: gate and power along a path.
 //! - `planning`: puts these together, window by window. [`trajectory`]: the result, as functions of time.
 //! - [`sampling`]: one setpoint each millisecond, with deflection and backlash. [`verify`]: their checker.
+//! - [`paper`]: a drawing by the speed profiles of the sources, for comparison.
 //! - [`service`]: the planner process. It alone waits, locks or reads a clock.
 //!
 //! [`plan()`] keeps the whole plan, [`plan_through`] hands it on window by window and keeps nothing.
@@ -20,6 +21,7 @@ pub mod joint_space;
 pub mod law;
 pub mod light;
 pub mod limits;
+pub mod paper;
 pub mod plan;
 pub(crate) mod planning;
 #[cfg(test)]

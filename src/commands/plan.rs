@@ -1,7 +1,7 @@
 //! `graver plan`: plans a job without running it.
 
 use crate::arguments::PlanArguments;
-use crate::commands::pulses;
+use crate::commands::pulses::{self, Motion, PulseFacts, PulseFiles};
 use crate::exit::{Exit, Failure};
 use crate::files::Sources;
 use crate::output::say;
@@ -9,12 +9,13 @@ use crate::{inputs, output};
 use machine::Machine;
 use messages::Setpoint;
 use messages::time::CYCLE_TIME;
+use planner::paper::{PaperFacts, Profile, SpeedTime};
 use planner::{Plan, PlanError, PlanFacts};
 use runtime::message;
 use serde::Serialize;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// What `plan --json` prints.
@@ -31,6 +32,10 @@ pub struct PlanReport {
     pub plan_time: f64,
     /// What a G-code program asks for; null for other jobs.
     pub program: Option<planner::job::gcode::ProgramFacts>,
+    /// With `--profile`, the same job on paper; else null.
+    pub paper: Option<PaperFacts>,
+    /// With `--pulses` or `--pulse-path`, what the pulses of all steppers come to; else null.
+    pub pulses: Option<PulseFacts>,
 }
 
 /// A plan, or what it comes to where nothing else of it is asked for.
@@ -51,10 +56,22 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         input.folder.as_deref(),
         &input.job_overrides,
     );
+    if arguments.profile.is_some() && !arguments.ideal {
+        let message = "--profile is a comparison on paper, against the limits of the path only: give \
+                       --ideal with it";
+        return Err(Failure::bad_input(message));
+    }
+    let counts = arguments.pulses.is_some() || arguments.pulse_path.is_some();
+    if counts && !pulses::has_steppers(&input.machine) {
+        let option = if arguments.pulses.is_some() { "--pulses" } else { "--pulse-path" };
+        let name = &input.machine.name;
+        let message = format!("{option}: {name} has no steppers, and DC motors take no pulses");
+        return Err(Failure::bad_input(message));
+    }
     let started = Instant::now();
     let job = request.open(&input.machine)?;
     let refuse = |error: PlanError| request.refuse(&error);
-    let is_listed = arguments.samples.is_some() || arguments.pulses.is_some();
+    let is_listed = arguments.samples.is_some() || counts;
     let planned = if arguments.ideal {
         Planned::Whole(Box::new(planner::plan_ideal(&input.machine, &job).map_err(refuse)?))
     } else if is_listed {
@@ -63,47 +80,68 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         let facts = planner::plan_through(&input.machine, &job, |_| ()).map_err(refuse)?;
         Planned::Facts(Box::new(facts))
     };
+    let paper = arguments.profile.map(|profile| {
+        planner::paper::on_paper(&input.machine, &job, profile.into()).map_err(refuse)
+    });
+    let paper = paper.transpose()?;
     let plan_time = started.elapsed().as_secs_f64();
     let mut sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
     let written = |path: &Path, result: io::Result<()>| {
         result.map_err(|error| Failure::output(format!("{}: {error}", path.display())))
     };
-    if let (Some(path), Planned::Whole(plan)) = (&arguments.samples, &planned) {
-        let file = sources.create("--samples", path)?;
-        written(path, write_samples(file, &input.machine, plan))?;
-    }
-    if let (Some(path), Planned::Whole(plan)) = (&arguments.pulses, &planned) {
-        if !pulses::has_steppers(&input.machine) {
-            let name = &input.machine.name;
-            let message = format!("--pulses: {name} has no steppers, and DC motors take no pulses");
-            return Err(Failure::bad_input(message));
+    let motion = || -> Result<Option<Motion<'_>>, PlanError> {
+        match (&paper, &planned) {
+            (Some(paper), _) => {
+                let setpoints = paper.setpoints(&input.machine, 1)?;
+                Ok(Some(Motion { setpoints, planned: Box::new(|time| paper.reference(time)) }))
+            }
+            (None, Planned::Whole(plan)) => Ok(Some(Motion::of(plan))),
+            (None, Planned::Facts(_)) => Ok(None),
         }
-        let file = sources.create("--pulses", path)?;
-        written(path, pulses::write(file, &input.machine, plan))?;
+    };
+    if let (Some(path), Some(motion)) = (&arguments.samples, motion().map_err(refuse)?) {
+        let file = sources.create("--samples", path)?;
+        written(path, write_samples(file, &input.machine, motion.setpoints))?;
+    }
+    let mut pulses = None;
+    if let (true, Some(motion)) = (counts, motion().map_err(refuse)?) {
+        let mut create = |argument, path: &Option<PathBuf>| match path {
+            Some(path) => Ok::<_, Failure>(Some((sources.create(argument, path)?, path.clone()))),
+            None => Ok(None),
+        };
+        let list = create("--pulses", &arguments.pulses)?;
+        let path = create("--pulse-path", &arguments.pulse_path)?;
+        pulses = Some(pulses::follow(&input.machine, motion, PulseFiles { list, path })?);
     }
     for warning in input.machine.job_warnings() {
         message::tell(&format!("warning: {warning}"));
     }
-    let facts = match planned {
+    let mut facts = match planned {
         Planned::Whole(plan) => plan.facts,
         Planned::Facts(facts) => *facts,
     };
+    let paper = paper.map(|paper| {
+        facts.notes.extend(paper.notes);
+        paper.facts
+    });
     let report = PlanReport {
         machine: input.machine.name.clone(),
         time: facts.duration,
         plan_time,
         program: job.program,
+        paper,
+        pulses,
         facts,
     };
     if arguments.json {
         output::json(&report)?;
     } else {
-        print_text(&report);
+        print_text(&report, &input.machine);
     }
     Ok(Exit::Done)
 }
 
-fn print_text(report: &PlanReport) {
+fn print_text(report: &PlanReport, machine: &Machine) {
     let facts = &report.facts;
     say!("job       {}", facts.name);
     say!("machine   {}", report.machine);
@@ -122,6 +160,12 @@ fn print_text(report: &PlanReport) {
         facts.uses.path_acceleration * 100.0,
         facts.uses.path_jerk * 100.0
     );
+    if let Some(paper) = &report.paper {
+        print_paper(paper, report.time);
+    }
+    if let Some(pulses) = &report.pulses {
+        print_pulses(pulses, machine);
+    }
     say!("planning  {:.1} ms", report.plan_time * 1e3);
     for note in &facts.notes {
         match note.line {
@@ -131,9 +175,43 @@ fn print_text(report: &PlanReport) {
     }
 }
 
+fn print_paper(paper: &PaperFacts, own: f64) {
+    let name = match paper.profile {
+        Profile::Trapezoid => "trapezoid of acceleration",
+        Profile::Velocity => "trapezoid of velocity",
+    };
+    let (time, speed) = (paper.time, paper.speed);
+    say!("paper     {time:.4} s at {speed:.4} m/s by a {name}, {:.3} times the plan's", time / own);
+    if let Some(SpeedTime { speed, time }) = paper.least {
+        say!("          {time:.4} s at the least, with all strokes at {speed:.4} m/s");
+    }
+}
+
+fn print_pulses(pulses: &PulseFacts, machine: &Machine) {
+    let steppers = machine.axes.iter().enumerate();
+    let steppers = steppers.filter(|(_, axis)| axis.motor.stepper().is_some());
+    let counts = steppers.map(|(index, axis)| {
+        let (count, rate) = (pulses.counts[index], pulses.largest_rate[index] * 1e-3);
+        format!("{} {count:+} at the end, {rate:.1} kHz at most", axis.name)
+    });
+    say!("pulses    {}", counts.collect::<Vec<_>>().join("; "));
+    say!(
+        "counted   {:.3} µm off the plan at most, {:.3} µm while the laser is on, {:.3} µm rms; \
+         rounding allows {:.3} µm",
+        pulses.deviation_max * 1e6,
+        pulses.deviation_lit_max * 1e6,
+        pulses.deviation_rms * 1e6,
+        pulses.bound * 1e6
+    );
+}
+
 /// One row a setpoint: `t`, the tool, then per axis position, velocity, acceleration and effort,
 /// then laser on and power.
-fn write_samples(file: File, machine: &Machine, plan: &Plan) -> io::Result<()> {
+fn write_samples(
+    file: File,
+    machine: &Machine,
+    setpoints: impl Iterator<Item = Setpoint>,
+) -> io::Result<()> {
     let mut file = BufWriter::new(file);
     write!(file, "t,x,y,z")?;
     for axis in &machine.axes {
@@ -141,7 +219,7 @@ fn write_samples(file: File, machine: &Machine, plan: &Plan) -> io::Result<()> {
         write!(file, ",{name}_position,{name}_velocity,{name}_acceleration,{name}_effort")?;
     }
     writeln!(file, ",laser,power")?;
-    for setpoint in plan.setpoints(1) {
+    for setpoint in setpoints {
         write_row(&mut file, machine.axes.len(), &setpoint)?;
     }
     file.flush()

@@ -1,32 +1,47 @@
-//! `graver plan --pulses`: every step pulse of a plan, with the instant at which it is due.
+//! `graver plan --pulses` and `--pulse-path`: every step pulse of a plan with the instant at which it
+//! is due, and the path that the counted pulses make.
 
-use drives::pulses::{Direction, Segment};
-use machine::{Axis, Machine};
+mod path;
+mod train;
+
+use crate::exit::Failure;
+use machine::{Machine, Mechanism, MechanismVisitor};
 use messages::Setpoint;
-use messages::time::CYCLE_TIME;
+use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use path::PulsePath;
 use planner::Plan;
+use planner::trajectory::{Cursor, Reference};
+use serde::Serialize;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
+use std::path::PathBuf;
+use train::{Due, Train};
 
-/// One stepper, counted from where it stands at the start of the plan.
-struct Train {
-    /// Its axis among all of them.
-    index: usize,
-    name: String,
-    /// Joint units per radian.
-    ratio: f64,
-    per_radian: f64,
-    /// Commanded angle at the start [rad].
-    origin: f64,
-    segment: Segment,
-    count: i64,
+/// What the pulses of a plan come to. What bends, and how far a rotor lags, is taken to be as planned:
+/// the deviation is that of counting alone.
+#[derive(Debug, Clone, Default, Serialize, schemars::JsonSchema)]
+pub struct PulseFacts {
+    /// The count at the end, 0 at the start, per axis; 0 for an axis without a stepper.
+    pub counts: Vec<i64>,
+    /// The largest rate of pulses [1/s], per axis; 0 for an axis without a stepper.
+    pub largest_rate: Vec<f64>,
+    /// The largest distance of the tool from where the plan has it at that time [m].
+    pub deviation_max: f64,
+    /// The same while the laser is on [m].
+    pub deviation_lit_max: f64,
+    /// Its root mean square over time [m].
+    pub deviation_rms: f64,
+    /// How far rounding to whole pulses may put the tool off where it matters most, to first order [m].
+    pub bound: f64,
 }
 
-/// A pulse that is due `offset` nanoseconds into the cycle, and the count from then on.
-struct Due<'a> {
-    offset: i64,
-    name: &'a str,
-    count: i64,
+/// The files to write, those of them that are asked for.
+#[derive(Debug, Default)]
+pub struct PulseFiles {
+    /// For the pulses.
+    pub list: Option<(File, PathBuf)>,
+    /// For the path that they make.
+    pub path: Option<(File, PathBuf)>,
 }
 
 /// Whether any axis of `machine` has a stepper.
@@ -34,72 +49,136 @@ pub fn has_steppers(machine: &Machine) -> bool {
     machine.axes.iter().any(|axis| axis.motor.stepper().is_some())
 }
 
-/// One row a pulse in order of time: `t` [s], the axis, and the count from then on, 0 at the start.
+/// A motion in setpoints, and between them.
+pub struct Motion<'a> {
+    /// One a millisecond.
+    pub setpoints: Box<dyn Iterator<Item = Setpoint> + 'a>,
+    /// What is planned at a stream time [s]; asked in order of time.
+    pub planned: Box<dyn FnMut(f64) -> Reference + 'a>,
+}
+
+impl<'a> Motion<'a> {
+    /// That of `plan`.
+    pub fn of(plan: &'a Plan) -> Self {
+        let mut cursor = Cursor::default();
+        let planned = move |time| plan.trajectory.at(time, &mut cursor);
+        Self { setpoints: plan.setpoints(1), planned: Box::new(planned) }
+    }
+}
+
+/// Follows the pulses of `motion`. The list has one row a pulse in order of time: `t` [s], the axis, and
+/// the count from then on, 0 at the start. The path has one row a pulse too: `t` [s], where the tool is
+/// from then on [m], how far that is from the plan [m], and whether the laser is on.
 ///
 /// The course between two setpoints is the cubic that the drives follow at the planned rate.
 ///
 /// # Errors
-/// Whatever the file system reports.
-pub fn write(file: File, machine: &Machine, plan: &Plan) -> io::Result<()> {
-    let mut file = BufWriter::new(file);
-    writeln!(file, "t,axis,count")?;
-    let mut setpoints = plan.setpoints(1);
-    let Some(first) = setpoints.next() else { return file.flush() };
-    let axes = machine.axes.iter().enumerate();
-    let mut trains: Vec<Train> =
-        axes.filter_map(|(index, axis)| Train::new(index, axis, &first)).collect();
-    // The rate of the lead is the difference across both neighbours, as in the controller.
-    let mut before = first;
-    let mut next = setpoints.next();
-    while let Some(now) = next {
-        next = setpoints.next();
-        let after = next.as_ref().unwrap_or(&now);
-        let start = now.sequence.saturating_sub(1) as f64 * CYCLE_TIME;
-        let mut due: Vec<Due<'_>> = Vec::new();
-        for train in &mut trains {
-            train.follow(&before, &now, after, &mut due);
-        }
-        due.sort_by_key(|pulse| pulse.offset);
-        for Due { offset, name, count } in due {
-            writeln!(file, "{:.9},{name},{count}", start + offset as f64 * 1e-9)?;
-        }
-        before = now;
-    }
-    file.flush()
+/// Whatever the file system reports; a place where the mechanism does not close with counted joints.
+pub fn follow(
+    machine: &Machine,
+    motion: Motion<'_>,
+    files: PulseFiles,
+) -> Result<PulseFacts, Failure> {
+    let table = |file: Option<(File, PathBuf)>| {
+        file.map(|(file, path)| Table { file: BufWriter::new(file), path })
+    };
+    let follower = Follower { machine, motion, list: table(files.list), path: table(files.path) };
+    machine.mechanism.visit(follower)
 }
 
-impl Train {
-    fn new(index: usize, axis: &Axis, start: &Setpoint) -> Option<Self> {
-        let motor = axis.motor.stepper()?;
-        Some(Self {
-            index,
-            name: axis.name.clone(),
-            ratio: axis.ratio,
-            per_radian: motor.pulses_per_radian(),
-            origin: (start.position[index] + start.lead[index]) / axis.ratio,
-            segment: Segment::rest(0.0),
-            count: 0,
-        })
-    }
+/// A file that is written line by line.
+struct Table {
+    file: BufWriter<File>,
+    path: PathBuf,
+}
 
-    /// Goes on to `now`, and adds the pulses of the cycle that ends there.
-    fn follow<'a>(
-        &'a mut self,
-        before: &Setpoint,
-        now: &Setpoint,
-        after: &Setpoint,
-        due: &mut Vec<Due<'a>>,
-    ) {
-        let Self { index, name, ratio, per_radian, origin, segment, count } = self;
-        let lead_speed = (after.lead[*index] - before.lead[*index]) / (2.0 * CYCLE_TIME);
-        let angle = (now.position[*index] + now.lead[*index]) / *ratio - *origin;
-        *segment = segment.then(angle, (now.velocity[*index] + lead_speed) / *ratio);
-        segment.pulses(*per_radian, |pulse| {
-            *count += match pulse.direction {
-                Direction::Up => 1,
-                Direction::Down => -1,
-            };
-            due.push(Due { offset: pulse.offset.0, name, count: *count });
-        });
+impl Table {
+    /// Lets `write` put a line into it.
+    fn put(
+        &mut self,
+        write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    ) -> Result<(), Failure> {
+        write(&mut self.file)
+            .map_err(|error| Failure::output(format!("{}: {error}", self.path.display())))
+    }
+}
+
+struct Follower<'a> {
+    machine: &'a Machine,
+    motion: Motion<'a>,
+    list: Option<Table>,
+    path: Option<Table>,
+}
+
+impl MechanismVisitor for Follower<'_> {
+    type Output = Result<PulseFacts, Failure>;
+
+    fn visit<const N: usize, M: Mechanism<N>>(mut self, mechanism: M) -> Self::Output {
+        if let Some(table) = &mut self.list {
+            table.put(|file| writeln!(file, "t,axis,count"))?;
+        }
+        if let Some(table) = &mut self.path {
+            table.put(|file| writeln!(file, "t,x,y,z,deviation,laser"))?;
+        }
+        let mut facts = PulseFacts::default();
+        if let Some(first) = self.motion.setpoints.next() {
+            facts = self.walk(mechanism, first)?;
+        }
+        for table in [&mut self.list, &mut self.path].into_iter().flatten() {
+            table.put(Write::flush)?;
+        }
+        Ok(facts)
+    }
+}
+
+impl Follower<'_> {
+    fn walk<const N: usize, M: Mechanism<N>>(
+        &mut self,
+        mechanism: M,
+        first: Setpoint,
+    ) -> Result<PulseFacts, Failure> {
+        let axes = self.machine.axes.iter().enumerate();
+        let mut trains: Vec<Train> =
+            axes.filter_map(|(index, axis)| Train::new(index, axis, &first)).collect();
+        let mut path = PulsePath::new(mechanism, &mut self.motion.planned, &trains, &first)
+            .map_err(|error| path::unclosed(first.sequence as f64 * CYCLE_TIME, &error))?;
+        let mut due: Vec<Due> = Vec::new();
+        // The rate of the lead is the difference across both neighbours, as in the controller.
+        let mut before = first;
+        let mut next = self.motion.setpoints.next();
+        while let Some(now) = next {
+            next = self.motion.setpoints.next();
+            let after = next.as_ref().unwrap_or(&now);
+            let start = now.sequence.saturating_sub(1) as f64 * CYCLE_TIME;
+            due.clear();
+            for (index, train) in trains.iter_mut().enumerate() {
+                train.follow(index, &before, &now, after, &mut due);
+            }
+            due.sort_by_key(|pulse| pulse.offset);
+            path.begin(&before, &now);
+            for pulse in &due {
+                let time = start + pulse.offset as f64 * 1e-9;
+                if let Some(list) = &mut self.list {
+                    let (name, count) = (&trains[pulse.train].name, pulse.count);
+                    list.put(|file| writeln!(file, "{time:.9},{name},{count}"))?;
+                }
+                let share = pulse.offset as f64 / CYCLE_PERIOD.0 as f64;
+                let unclosed = |error| path::unclosed(time, &error);
+                // Just before it, and from it on.
+                path.look(share, &trains).map_err(unclosed)?;
+                path.count(pulse);
+                let now = path.look(share, &trains).map_err(unclosed)?;
+                if let Some(table) = &mut self.path {
+                    let [x, y, z] = now.tool;
+                    let (off, lit) = (now.deviation, u32::from(now.is_lit));
+                    table.put(|file| writeln!(file, "{time:.9},{x},{y},{z},{off},{lit}"))?;
+                }
+            }
+            let unclosed = |error| path::unclosed(start + CYCLE_TIME, &error);
+            path.look(1.0, &trains).map_err(unclosed)?;
+            path.end().map_err(unclosed)?;
+            before = now;
+        }
+        Ok(path.facts(&trains))
     }
 }

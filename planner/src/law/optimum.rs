@@ -234,7 +234,7 @@ fn run_in_of(start: &Jet, speed: f64, limits: &FlightLimits) -> Flight {
 
 /// The speed up to `most` with the least time. The time has one minimum for one stroke; for many
 /// it may have more, so trials come first.
-fn fastest(time: impl Fn(f64) -> f64, most: f64) -> f64 {
+pub(crate) fn fastest(time: impl Fn(f64) -> f64, most: f64) -> f64 {
     let trial = |index: usize| most * math::pow(FIRST, 1.0 - index as f64 / TRIALS as f64);
     let (mut best, mut least) = (1, f64::INFINITY);
     for index in 1..=TRIALS {

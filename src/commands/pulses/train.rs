@@ -1,0 +1,80 @@
+//! The pulses of one stepper, cycle by cycle.
+
+use drives::pulses::{Direction, Segment};
+use machine::Axis;
+use messages::Setpoint;
+use messages::time::CYCLE_TIME;
+
+/// One stepper, counted from where it stands at the start of the plan.
+#[derive(Debug)]
+pub(super) struct Train {
+    /// Its axis among all of them.
+    pub(super) axis: usize,
+    pub(super) name: String,
+    /// Joint units per radian.
+    pub(super) ratio: f64,
+    pub(super) per_radian: f64,
+    /// Commanded angle at the start [rad].
+    origin: f64,
+    /// The commanded angle from there in this cycle.
+    pub(super) segment: Segment,
+    /// The count at the end of this cycle.
+    count: i64,
+    /// The largest rate of pulses so far [1/s].
+    pub(super) largest_rate: f64,
+}
+
+/// A pulse that is due `offset` nanoseconds into the cycle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Due {
+    pub(super) offset: i64,
+    /// Whose it is, among the trains.
+    pub(super) train: usize,
+    /// The count from then on.
+    pub(super) count: i64,
+}
+
+impl Train {
+    pub(super) fn new(index: usize, axis: &Axis, start: &Setpoint) -> Option<Self> {
+        let motor = axis.motor.stepper()?;
+        Some(Self {
+            axis: index,
+            name: axis.name.clone(),
+            ratio: axis.ratio,
+            per_radian: motor.pulses_per_radian(),
+            origin: (start.position[index] + start.lead[index]) / axis.ratio,
+            segment: Segment::rest(0.0),
+            count: 0,
+            largest_rate: 0.0,
+        })
+    }
+
+    /// Goes on to `now`, and adds the pulses of the cycle that ends there as those of `train`.
+    pub(super) fn follow(
+        &mut self,
+        train: usize,
+        before: &Setpoint,
+        now: &Setpoint,
+        after: &Setpoint,
+        due: &mut Vec<Due>,
+    ) {
+        let axis = self.axis;
+        let lead_speed = (after.lead[axis] - before.lead[axis]) / (2.0 * CYCLE_TIME);
+        let angle = (now.position[axis] + now.lead[axis]) / self.ratio - self.origin;
+        self.segment = self.segment.then(angle, (now.velocity[axis] + lead_speed) / self.ratio);
+        self.largest_rate = self.largest_rate.max(self.segment.fastest() * self.per_radian);
+        let count = &mut self.count;
+        self.segment.pulses(self.per_radian, |pulse| {
+            *count += match pulse.direction {
+                Direction::Up => 1,
+                Direction::Down => -1,
+            };
+            due.push(Due { offset: pulse.offset.0, train, count: *count });
+        });
+    }
+
+    /// How far a `count` is beyond the commanded angle at a `share` of the cycle [joint units].
+    pub(super) fn beyond(&self, count: i64, share: f64) -> f64 {
+        (count as f64 / self.per_radian - self.segment.at(share).0) * self.ratio
+    }
+}
