@@ -20,6 +20,7 @@ pub mod limits;
 pub mod machine;
 pub mod mechanisms;
 pub mod motor;
+pub mod path_check;
 pub mod pulses;
 pub mod quantity;
 pub mod surface;

@@ -3,12 +3,12 @@
 
 mod interpolation;
 
+use messages::math;
 use nalgebra::Vector3;
 
-use machine::kinematics::{Joints, KinematicsError, Mechanism, Pose};
-use machine::surface::{Surface, facing};
+use crate::kinematics::{Joints, KinematicsError, Pose};
 
-pub(crate) use interpolation::{Interpolated, Interpolation};
+pub use interpolation::{Interpolated, Interpolation};
 
 /// Samples inside of each segment are at multiples of this share of it.
 const SAMPLES: usize = 32;
@@ -24,19 +24,21 @@ const DIFFERENCE: f64 = 1e-6;
 
 /// Largest distances from a curve and its surface.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Deviation {
+pub struct Deviation {
     /// From the point of the curve with the same parameter [m].
-    pub(crate) matched: f64,
+    pub matched: f64,
     /// From the nearest point of the curve [m].
-    pub(crate) geometric: f64,
+    pub geometric: f64,
     /// From the surface, in or out [m].
-    pub(crate) surface: f64,
+    pub surface: f64,
     /// Of the tool's axis, from the surface's normal at the point with the same parameter [rad].
-    pub(crate) axis: f64,
+    pub axis: f64,
 }
 
 impl Deviation {
-    fn worst(self, other: Self) -> Self {
+    /// The larger one of each.
+    #[must_use]
+    pub fn worst(self, other: Self) -> Self {
         Self {
             matched: self.matched.max(other.matched),
             geometric: self.geometric.max(other.geometric),
@@ -46,7 +48,7 @@ impl Deviation {
     }
 
     /// Whether nothing is larger than in `tolerance`.
-    fn within(&self, tolerance: &Self) -> bool {
+    pub fn within(&self, tolerance: &Self) -> bool {
         self.matched <= tolerance.matched
             && self.geometric <= tolerance.geometric
             && self.surface <= tolerance.surface
@@ -54,47 +56,58 @@ impl Deviation {
     }
 }
 
-/// A curve of a drawing, put onto a surface and followed by a machine with the beam across the
-/// surface.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct SurfaceCurve<'a, const N: usize, M: Mechanism<N>, F> {
-    /// The machine.
-    pub(crate) mechanism: &'a M,
-    /// The branch it takes.
-    pub(crate) branch: M::Branch,
-    /// What it marks on.
-    pub(crate) surface: &'a Surface,
-    /// The point of the drawing [m] at a parameter.
-    pub(crate) drawing: F,
+/// Where a tool is, and which way it points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aim {
+    /// [m].
+    pub position: Vector3<f64>,
+    /// Unit vector of the tool's z axis, against the beam.
+    pub axis: Vector3<f64>,
 }
 
-impl<const N: usize, M: Mechanism<N>, F: Fn(f64) -> [f64; 2]> SurfaceCurve<'_, N, M, F> {
-    /// Where the focus has to be [m], and the unit vector that the beam has to follow.
-    fn wanted(&self, parameter: f64) -> Result<[Vector3<f64>; 2], KinematicsError> {
-        let [x, y] = (self.drawing)(parameter);
-        let spot = self.surface.spot(x, y)?;
-        Ok([spot.point.into(), -Vector3::from(spot.normal)])
+impl Aim {
+    /// That of a pose.
+    pub fn of(pose: &Pose) -> Self {
+        Self { position: pose.position, axis: pose.rotation.column(2).into_owned() }
     }
+
+    /// The angle between its axis and that of `other` [rad].
+    pub fn angle(&self, other: &Self) -> f64 {
+        math::atan2(self.axis.cross(&other.axis).norm(), self.axis.dot(&other.axis))
+    }
+}
+
+/// A curve that a machine with `N` axes follows, by a parameter of its own.
+pub trait Curve<const N: usize> {
+    /// Where the tool has to be at `parameter`.
+    ///
+    /// # Errors
+    /// Where the curve is nowhere, such as off its surface.
+    fn wanted(&self, parameter: f64) -> Result<Aim, KinematicsError>;
 
     /// The exact joints at `parameter`, continuous with `previous`.
     ///
     /// # Errors
-    /// Off the surface, or out of the machine's reach.
-    pub(crate) fn joints(
-        &self,
-        parameter: f64,
-        previous: &Joints<N>,
-    ) -> Result<Joints<N>, KinematicsError> {
-        let [position, beam] = self.wanted(parameter)?;
-        let rotation = facing(&-beam);
-        self.mechanism.inverse(&Pose { position, rotation }, self.branch, previous)
-    }
+    /// As for [`Self::wanted`], or out of the machine's reach.
+    fn joints(&self, parameter: f64, previous: &Joints<N>) -> Result<Joints<N>, KinematicsError>;
+
+    /// Where the tool is with the joints at `q`, near `parameter`.
+    ///
+    /// # Errors
+    /// Where a chain does not close.
+    fn reached(&self, parameter: f64, q: &Joints<N>) -> Result<Aim, KinematicsError>;
+
+    /// How far `point` is from the surface that the curve lies on [m]; 0 without one.
+    ///
+    /// # Errors
+    /// Where the surface has no height.
+    fn height(&self, point: &Vector3<f64>) -> Result<f64, KinematicsError>;
 
     /// Exact knots at growing `parameters`, the first continuous with `previous`.
     ///
     /// # Errors
     /// As for [`Self::joints`].
-    pub(crate) fn knots(
+    fn knots(
         &self,
         parameters: impl IntoIterator<Item = f64>,
         previous: &Joints<N>,
@@ -107,11 +120,33 @@ impl<const N: usize, M: Mechanism<N>, F: Fn(f64) -> [f64; 2]> SurfaceCurve<'_, N
         parameters.into_iter().map(knot).collect()
     }
 
+    /// How far the tool strays with the joints at `q`, which belong to `parameter`; from the nearest point
+    /// of the curve in `range` only where `is_near` is asked for, else 0.
+    ///
+    /// # Errors
+    /// Where a chain does not close, or the curve leaves its surface.
+    fn strays(
+        &self,
+        parameter: f64,
+        q: &Joints<N>,
+        range: [f64; 2],
+        is_near: bool,
+    ) -> Result<Deviation, KinematicsError> {
+        let (reached, wanted) = (self.reached(parameter, q)?, self.wanted(parameter)?);
+        let point = reached.position;
+        Ok(Deviation {
+            matched: (point - wanted.position).norm(),
+            geometric: if is_near { self.nearest(&point, parameter, range)? } else { 0.0 },
+            surface: self.height(&point)?.abs(),
+            axis: reached.angle(&wanted),
+        })
+    }
+
     /// The largest deviations inside of `segment` of the interpolated joints.
     ///
     /// # Errors
     /// Where a chain does not close, or the curve leaves its surface.
-    pub(crate) fn deviation(
+    fn deviation(
         &self,
         path: &Interpolated<N>,
         segment: usize,
@@ -121,22 +156,8 @@ impl<const N: usize, M: Mechanism<N>, F: Fn(f64) -> [f64; 2]> SurfaceCurve<'_, N
         let range = [knots[0].0, knots[knots.len() - 1].0];
         for sample in 1..SAMPLES {
             let (parameter, q) = path.at(segment, sample as f64 / SAMPLES as f64);
-            let pose = self.mechanism.forward(&q, self.branch)?;
-            let beam = -pose.rotation.column(2).into_owned();
-            let [point, direction] = self.wanted(parameter)?;
-            let matched = (pose.position - point).norm();
-            let geometric = if sample % NEAREST_EACH == 0 {
-                self.nearest(&pose.position, parameter, range)?
-            } else {
-                0.0
-            };
-            let angle = messages::math::atan2(beam.cross(&direction).norm(), beam.dot(&direction));
-            largest = largest.worst(Deviation {
-                matched,
-                geometric,
-                surface: self.surface.height(<[f64; 3]>::from(pose.position))?.abs(),
-                axis: angle,
-            });
+            let is_near = sample % NEAREST_EACH == 0;
+            largest = largest.worst(self.strays(parameter, &q, range, is_near)?);
         }
         Ok(largest)
     }
@@ -145,10 +166,7 @@ impl<const N: usize, M: Mechanism<N>, F: Fn(f64) -> [f64; 2]> SurfaceCurve<'_, N
     ///
     /// # Errors
     /// As for [`Self::deviation`].
-    pub(crate) fn largest_deviation(
-        &self,
-        path: &Interpolated<N>,
-    ) -> Result<Deviation, KinematicsError> {
+    fn largest_deviation(&self, path: &Interpolated<N>) -> Result<Deviation, KinematicsError> {
         (0..path.segments()).try_fold(Deviation::default(), |largest, segment| {
             Ok(largest.worst(self.deviation(path, segment)?))
         })
@@ -162,16 +180,16 @@ impl<const N: usize, M: Mechanism<N>, F: Fn(f64) -> [f64; 2]> SurfaceCurve<'_, N
         [first, last]: [f64; 2],
     ) -> Result<f64, KinematicsError> {
         let step = (last - first) * DIFFERENCE;
-        let mut least = (self.wanted(parameter)?[0] - point).norm();
+        let mut least = (self.wanted(parameter)?.position - point).norm();
         for _ in 0..NEAREST_STEPS {
             let (low, high) = ((parameter - step).max(first), (parameter + step).min(last));
-            let rate = (self.wanted(high)?[0] - self.wanted(low)?[0]) / (high - low);
-            let away = point - self.wanted(parameter)?[0];
+            let rate = (self.wanted(high)?.position - self.wanted(low)?.position) / (high - low);
+            let away = point - self.wanted(parameter)?.position;
             if rate.norm_squared() == 0.0 {
                 break;
             }
             parameter = (parameter + away.dot(&rate) / rate.norm_squared()).clamp(first, last);
-            least = least.min((self.wanted(parameter)?[0] - point).norm());
+            least = least.min((self.wanted(parameter)?.position - point).norm());
         }
         Ok(least)
     }
@@ -181,14 +199,14 @@ impl<const N: usize, M: Mechanism<N>, F: Fn(f64) -> [f64; 2]> SurfaceCurve<'_, N
     ///
     /// # Errors
     /// As for [`Self::deviation`]; `too_many_knots` where `most` knots are not enough.
-    pub(crate) fn subdivided(
+    fn subdivided(
         &self,
         [first, last]: [f64; 2],
         interpolation: Interpolation,
         tolerance: &Deviation,
         most: usize,
         previous: &Joints<N>,
-    ) -> Result<Interpolated<N>, KinematicsError> {
+    ) -> Result<(Interpolated<N>, Deviation), KinematicsError> {
         let mut parameters = vec![first, last];
         loop {
             let knots = self.knots(parameters.iter().copied(), previous)?;
@@ -196,17 +214,18 @@ impl<const N: usize, M: Mechanism<N>, F: Fn(f64) -> [f64; 2]> SurfaceCurve<'_, N
             let mut finer = vec![first];
             let mut largest = Deviation::default();
             for segment in 0..path.segments() {
-                let deviation = self.deviation(&path, segment)?;
-                largest = largest.worst(deviation);
+                // A segment on which a chain does not close is too long.
+                let deviation = self.deviation(&path, segment).ok();
+                largest = largest.worst(deviation.unwrap_or_default());
                 // A curve with one bend each way crosses the middle of its chord unseen, but not
                 // all of the samples.
-                if !deviation.within(tolerance) {
+                if !deviation.is_some_and(|deviation| deviation.within(tolerance)) {
                     finer.push((parameters[segment] + parameters[segment + 1]) / 2.0);
                 }
                 finer.push(parameters[segment + 1]);
             }
             if finer.len() == parameters.len() {
-                return Ok(path);
+                return Ok((path, largest));
             }
             if finer.len() > most {
                 return Err(KinematicsError {
