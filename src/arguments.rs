@@ -302,6 +302,10 @@ pub struct PlanArguments {
     /// Write the path that the counted pulses alone make, one row a pulse, to a CSV file.
     #[arg(long, value_name = "FILE")]
     pub pulse_path: Option<PathBuf>,
+    /// Write how far the tool strays from each stroke, as it is executed and with its joints interpolated
+    /// between knots, to a CSV file.
+    #[arg(long, value_name = "FILE")]
+    pub path_check: Option<PathBuf>,
     /// Check the path limits only, as if motors were ideal.
     #[arg(long)]
     pub ideal: bool,

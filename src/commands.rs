@@ -8,6 +8,7 @@ pub mod figures;
 pub mod kinematics;
 pub mod manual;
 pub mod operator;
+pub mod path_check;
 pub mod plan;
 pub mod pulses;
 pub mod run;

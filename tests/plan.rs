@@ -1,4 +1,4 @@
-//! `graver plan`: jobs on paper beside what is planned.
+//! `graver plan`: jobs on paper beside what is planned, and how far the tool strays from its strokes.
 
 #![allow(clippy::unwrap_used)]
 
@@ -78,4 +78,54 @@ fn a_profile_is_for_paper_only() {
     let error = refused.json(2);
     let message = error["error"]["message"].as_str().unwrap();
     assert!(message.contains("[surface]"), "{message}");
+}
+
+#[test]
+fn the_check_of_paths_is_told_and_written() {
+    let place = Place::new();
+    let machine = support::source("machines").join("mcm.toml");
+    let job = support::source("jobs").join("mcm.toml");
+    let file = place.path("check.csv");
+    let graver = |more: &[&str]| {
+        let arguments = ["plan", job.to_str().unwrap(), "--machine", machine.to_str().unwrap()];
+        place.graver(&[&arguments, more].concat())
+    };
+    let report = graver(&["--path-check", file.to_str().unwrap(), "--json"]).json(0);
+    support::assert_valid("plan", &report);
+    let strokes = report["strokes"].as_u64().unwrap() as usize;
+    let checked = &report["path_check"];
+    assert_eq!(checked["strokes"], strokes);
+    assert!(checked["executed"]["surface"].as_f64().unwrap() < 1e-6, "{checked:#}");
+    assert_eq!(checked["linear"]["too_many"], 0);
+    let text = std::fs::read_to_string(&file).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(
+        text.lines().next(),
+        Some("stroke,interpolation,knots,matched,geometric,surface,axis")
+    );
+    assert_eq!(rows.len(), 1 + 4 * strokes);
+    let knots = |name: &str| -> u64 {
+        let rows = rows.iter().filter(|row| row[1] == name);
+        rows.map(|row| row[2].parse::<u64>().unwrap()).sum()
+    };
+    for name in ["linear", "natural", "not_a_knot"] {
+        assert_eq!(checked[name]["knots"], knots(name));
+    }
+    let worst = rows.iter().filter(|row| row[1] == "executed").map(|row| row[3].parse().unwrap());
+    assert_eq!(checked["executed"]["matched"], worst.fold(0.0, f64::max));
+
+    // Without the file the plan says as much as it saw; and no input is written over.
+    let told = graver(&[]);
+    told.accepted();
+    assert!(told.error.contains("between   the tool strays by 0."), "{}", told.error);
+    assert!(told.error.contains("from the surface"), "{}", told.error);
+    let plan = graver(&["--json"]).json(0);
+    assert_eq!(plan["path_check"], serde_json::Value::Null);
+    assert!(plan["interpolation"]["deviation"].as_f64().unwrap() < 1e-6);
+    let own = place.file("own.ngc", "G21\nM4 S1000 F600\nG1 X5\nM2\n");
+    let own = own.to_str().unwrap();
+    let taken = place.graver(&["plan", own, "--path-check", own]);
+    assert_eq!(taken.code, Some(2), "{}", taken.error);
+    assert!(taken.error.contains("--path-check"), "{}", taken.error);
+    assert!(std::fs::read_to_string(own).unwrap().contains("G1 X5"));
 }

@@ -29,6 +29,24 @@ pub struct PlanFacts {
     pub uses: LimitUtilization,
     /// What bound the motion along paths, the limit that ruled longest first.
     pub binding: Vec<Binding>,
+    /// How far the tool strays from the path between two setpoints while it marks; null where the joints
+    /// go straight with it, and of a plan against the limits of the path only.
+    #[serde(default)]
+    pub interpolation: Option<InterpolationFacts>,
+}
+
+/// How far the tool strays in the middle between two setpoints, which the controller joins by a cubic of
+/// each joint.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct InterpolationFacts {
+    /// From where it should be at that time [m].
+    pub deviation: f64,
+    /// From the surface that is marked on [m]; null where the job has none.
+    pub surface: Option<f64>,
+    /// Of the tool's axis from where it should point [rad].
+    pub axis: f64,
+    /// Line of the job file where it strays most, 0 for none.
+    pub line: u64,
 }
 
 /// A limit that bound the motion, for how long, and where most.

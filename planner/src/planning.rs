@@ -88,6 +88,8 @@ pub(crate) struct Task<'a> {
     /// Whether z is the tool's height over the work, below which it must not dip in the dark.
     pub(crate) z_is_height: bool,
     pub(crate) attitude: crate::geometry::attitude::AttitudeLaw,
+    /// What is marked on, where not in a plane.
+    pub(crate) surface: Option<machine::surface::Surface>,
     /// How long the job takes at the speeds asked for, if starts and turns took no time [s].
     pub(crate) estimate: f64,
     /// Where the tool is before it [m].
@@ -150,7 +152,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         operations: OperationQueue<'a>,
         stream: u64,
     ) -> Result<Self, PlanError> {
-        let Task { machine, limits, scope, attitude, .. } = *task;
+        let Task { machine, limits, scope, attitude, surface, .. } = *task;
         let joints = Joints::<N>::from_fn(|axis, _| task.standing[axis]);
         let limits = MotionLimits::new(mechanism, &machine.axes, limits, &joints, attitude, scope);
         let now = Configuration { joints, branch: 0 };
@@ -190,7 +192,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             line: 0,
             sampler,
             checker: Checker::new(machine, limits.path, scope),
-            interpolation: interpolates.then(|| InterpolationCheck::new(tolerance)),
+            interpolation: interpolates.then(|| InterpolationCheck::new(tolerance, surface)),
             samples: 0,
             lead_in: Some(lead_in),
             estimated: 0.0,
@@ -413,6 +415,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     /// What of every limit has been used so far.
     pub(crate) fn utilization(&self) -> &messages::plan::LimitUtilization {
         self.front.checker.utilization()
+    }
+
+    /// How far the tool has strayed between setpoints so far; `None` where it cannot.
+    pub(crate) fn interpolation(&self) -> Option<messages::plan::InterpolationFacts> {
+        self.front.interpolation.as_ref().map(|check| *check.found())
     }
 
     /// What a person should know of the job so far.

@@ -3,3 +3,4 @@
 pub mod checker;
 pub(crate) mod interpolation;
 pub mod margins;
+pub mod path_check;

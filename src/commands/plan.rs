@@ -1,6 +1,7 @@
 //! `graver plan`: plans a job without running it.
 
 use crate::arguments::PlanArguments;
+use crate::commands::path_check::{self, PathCheckFacts};
 use crate::commands::pulses::{self, Motion, PulseFacts, PulseFiles};
 use crate::exit::{Exit, Failure};
 use crate::files::Sources;
@@ -8,9 +9,10 @@ use crate::output::say;
 use crate::{inputs, output};
 use machine::Machine;
 use messages::Setpoint;
+use messages::plan::InterpolationFacts;
 use messages::time::CYCLE_TIME;
 use planner::paper::{PaperFacts, Profile, SpeedTime};
-use planner::{Plan, PlanError, PlanFacts};
+use planner::{Job, Plan, PlanError, PlanFacts};
 use runtime::message;
 use serde::Serialize;
 use std::fs::File;
@@ -32,6 +34,8 @@ pub struct PlanReport {
     pub plan_time: f64,
     /// What a G-code program asks for; null for other jobs.
     pub program: Option<planner::job::gcode::ProgramFacts>,
+    /// With `--path-check`, how far the tool strays from all strokes; else null.
+    pub path_check: Option<PathCheckFacts>,
     /// With `--profile`, the same job on paper; else null.
     pub paper: Option<PaperFacts>,
     /// With `--pulses` or `--pulse-path`, what the pulses of all steppers come to; else null.
@@ -56,22 +60,12 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         input.folder.as_deref(),
         &input.job_overrides,
     );
-    if arguments.profile.is_some() && !arguments.ideal {
-        let message = "--profile is a comparison on paper, against the limits of the path only: give \
-                       --ideal with it";
-        return Err(Failure::bad_input(message));
-    }
+    refuse_contradictions(arguments, &input.machine)?;
     let counts = arguments.pulses.is_some() || arguments.pulse_path.is_some();
-    if counts && !pulses::has_steppers(&input.machine) {
-        let option = if arguments.pulses.is_some() { "--pulses" } else { "--pulse-path" };
-        let name = &input.machine.name;
-        let message = format!("{option}: {name} has no steppers, and DC motors take no pulses");
-        return Err(Failure::bad_input(message));
-    }
     let started = Instant::now();
     let job = request.open(&input.machine)?;
     let refuse = |error: PlanError| request.refuse(&error);
-    let is_listed = arguments.samples.is_some() || counts;
+    let is_listed = arguments.samples.is_some() || arguments.path_check.is_some() || counts;
     let planned = if arguments.ideal {
         Planned::Whole(Box::new(planner::plan_ideal(&input.machine, &job).map_err(refuse)?))
     } else if is_listed {
@@ -86,25 +80,29 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
     let paper = paper.transpose()?;
     let plan_time = started.elapsed().as_secs_f64();
     let mut sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
-    let written = |path: &Path, result: io::Result<()>| {
-        result.map_err(|error| Failure::output(format!("{}: {error}", path.display())))
+    let checked = match (&arguments.path_check, &planned) {
+        (Some(path), Planned::Whole(plan)) => {
+            Some(check_paths(path, plan, &job, &input.machine, &mut sources)?)
+        }
+        _ => None,
     };
-    let motion = || -> Result<Option<Motion<'_>>, PlanError> {
+    // Of a profile where there is one: only what is written of it has to be within reach.
+    let motion = |is_asked: bool| -> Result<Option<Motion<'_>>, Failure> {
         match (&paper, &planned) {
-            (Some(paper), _) => {
-                let setpoints = paper.setpoints(&input.machine, 1)?;
+            (Some(paper), _) if is_asked => {
+                let setpoints = paper.setpoints(&input.machine, 1).map_err(refuse)?;
                 Ok(Some(Motion { setpoints, planned: Box::new(|time| paper.reference(time)) }))
             }
-            (None, Planned::Whole(plan)) => Ok(Some(Motion::of(plan))),
-            (None, Planned::Facts(_)) => Ok(None),
+            (None, Planned::Whole(plan)) if is_asked => Ok(Some(Motion::of(plan))),
+            _ => Ok(None),
         }
     };
-    if let (Some(path), Some(motion)) = (&arguments.samples, motion().map_err(refuse)?) {
+    if let (Some(path), Some(motion)) = (&arguments.samples, motion(arguments.samples.is_some())?) {
         let file = sources.create("--samples", path)?;
         written(path, write_samples(file, &input.machine, motion.setpoints))?;
     }
     let mut pulses = None;
-    if let (true, Some(motion)) = (counts, motion().map_err(refuse)?) {
+    if let Some(motion) = motion(counts)? {
         let mut create = |argument, path: &Option<PathBuf>| match path {
             Some(path) => Ok::<_, Failure>(Some((sources.create(argument, path)?, path.clone()))),
             None => Ok(None),
@@ -129,6 +127,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         time: facts.duration,
         plan_time,
         program: job.program,
+        path_check: checked,
         paper,
         pulses,
         facts,
@@ -139,6 +138,48 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         print_text(&report, &input.machine);
     }
     Ok(Exit::Done)
+}
+
+/// Refuses options that do not go with each other or with the machine.
+fn refuse_contradictions(arguments: &PlanArguments, machine: &Machine) -> Result<(), Failure> {
+    if arguments.profile.is_some() && !arguments.ideal {
+        let message = "--profile is a comparison on paper, against the limits of the path only: give \
+                       --ideal with it";
+        return Err(Failure::bad_input(message));
+    }
+    let option = match (&arguments.pulses, &arguments.pulse_path) {
+        (Some(_), _) => "--pulses",
+        (None, Some(_)) => "--pulse-path",
+        (None, None) => return Ok(()),
+    };
+    if !pulses::has_steppers(machine) {
+        let name = &machine.name;
+        let message = format!("{option}: {name} has no steppers, and DC motors take no pulses");
+        return Err(Failure::bad_input(message));
+    }
+    Ok(())
+}
+
+/// Checks the strokes of `plan`, and writes what came of it to `path`.
+fn check_paths(
+    path: &Path,
+    plan: &Plan,
+    job: &Job,
+    machine: &Machine,
+    sources: &mut Sources,
+) -> Result<PathCheckFacts, Failure> {
+    let tolerance = job.marking.tolerance.unwrap_or(machine.path.tolerance);
+    let checks = plan.path_check(job.surface.as_ref(), tolerance).map_err(|error| {
+        Failure::bad_input(format!("--path-check: a stroke cannot be followed: {error}"))
+    })?;
+    let file = sources.create("--path-check", path)?;
+    written(path, path_check::write(file, &checks, job.surface.is_some()))?;
+    Ok(path_check::facts(&checks, tolerance, job.surface.is_some()))
+}
+
+/// What the file system says of the output at `path`.
+fn written(path: &Path, result: io::Result<()>) -> Result<(), Failure> {
+    result.map_err(|error| Failure::output(format!("{}: {error}", path.display())))
 }
 
 fn print_text(report: &PlanReport, machine: &Machine) {
@@ -160,6 +201,12 @@ fn print_text(report: &PlanReport, machine: &Machine) {
         facts.uses.path_acceleration * 100.0,
         facts.uses.path_jerk * 100.0
     );
+    if let (Some(found), true) = (&facts.interpolation, draws) {
+        print_interpolation(found);
+    }
+    if let Some(checked) = &report.path_check {
+        path_check::print(checked);
+    }
     if let Some(paper) = &report.paper {
         print_paper(paper, report.time);
     }
@@ -173,6 +220,16 @@ fn print_text(report: &PlanReport, machine: &Machine) {
             line => say!("note      line {line}: {}", note.text),
         }
     }
+}
+
+fn print_interpolation(found: &InterpolationFacts) {
+    let surface = found.surface.map_or_else(String::new, |off| {
+        format!(", {:.3} nm from the surface, {:.3} nrad of its axis", off * 1e9, found.axis * 1e9)
+    });
+    say!(
+        "between   the tool strays by {:.3} nm at most between two setpoints{surface}",
+        found.deviation * 1e9
+    );
 }
 
 fn print_paper(paper: &PaperFacts, own: f64) {

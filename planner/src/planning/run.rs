@@ -68,6 +68,7 @@ pub(crate) fn plan_windows(
             && job.surface.is_none()
             && job.attitude == AttitudeLaw::Level,
         attitude: job.attitude,
+        surface: job.surface,
         standing,
         estimate,
         start: drawing.start,
@@ -112,6 +113,7 @@ impl Facts<'_> {
             speed_limit: planning.task.speeds.most,
             notes,
             uses: planning.utilization().clone(),
+            interpolation: planning.interpolation(),
             binding: account.shares.report(&planning.task.machine.axes),
         }
     }

@@ -7,11 +7,10 @@
 
 use std::sync::Arc;
 
-use machine::kinematics::{JointMotion, Joints, KinematicsError, ToolMotion};
+use machine::kinematics::{JointMotion, Joints, KinematicsError, Pose, ToolMotion};
 use machine::{Axis, Friction, Mechanism, StepperMotor};
 use messages::time::CYCLE_TIME;
 use messages::{AxisArray, GateEdge, Setpoint, setpoint::flags};
-use nalgebra::Vector3;
 
 use crate::geometry::attitude::AttitudeLaw;
 use crate::joint_space::configuration::{branches, follow, keeps_margins};
@@ -246,9 +245,21 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         self.trajectory.piece_at(time)
     }
 
-    /// What is said of the motion at `time` [s], near the last sample.
-    pub(crate) fn reference_at(&self, time: f64) -> Reference {
-        self.trajectory.at(time, &mut self.cursor.clone())
+    /// The tool's motion at `time` [s], near the last sample, turned as its place asks; `None` where the
+    /// joints lead.
+    ///
+    /// # Errors
+    /// Where there is no attitude.
+    pub(crate) fn tool_at(&self, time: f64) -> Result<Option<ToolMotion>, KinematicsError> {
+        match self.trajectory.at(time, &mut self.cursor.clone()) {
+            Reference::Tool(tool) => self.trajectory.attitude.apply(&tool).map(Some),
+            Reference::Joints(_) => Ok(None),
+        }
+    }
+
+    /// How the joints stand, in which branch, and the solved chain, half a cycle after the last sample.
+    pub(crate) fn stands(&self) -> (Joints<N>, M::Branch, M::ChainState) {
+        (self.joints, self.branches[self.branch], self.assembly)
     }
 
     /// Why it ended early, if it did.
@@ -262,10 +273,9 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     }
 
     /// Where the tool is with the joints at `joints` [m or rad], near the last sample and on its
-    /// branch [m].
-    pub(crate) fn locate(&self, joints: &Joints<N>) -> Result<Vector3<f64>, KinematicsError> {
-        let branch = self.branches[self.branch];
-        Ok(self.mechanism.locate(joints, branch, Some(&self.assembly))?.position)
+    /// branch.
+    pub(crate) fn locate(&self, joints: &Joints<N>) -> Result<Pose, KinematicsError> {
+        self.mechanism.locate(joints, self.branches[self.branch], Some(&self.assembly))
     }
 
     /// The mechanism with the joints at `joints` [m or rad], near the last sample and on its branch.

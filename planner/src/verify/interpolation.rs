@@ -8,11 +8,14 @@
 
 use machine::Mechanism;
 use machine::kinematics::{Joints, KinematicsError};
+use machine::path_check::Aim;
+use machine::surface::Surface;
+use messages::Setpoint;
+use messages::plan::InterpolationFacts;
 use messages::time::CYCLE_TIME;
-use messages::{AxisArray, Setpoint};
 
 use crate::sampling::sampler::Sampler;
-use crate::trajectory::{Motion, Piece, Reference};
+use crate::trajectory::{Motion, Piece};
 use crate::verify::checker::{LimitViolation, Quantity};
 
 /// Looks at the middle between two setpoints that follow each other, where a cubic that fits both
@@ -21,21 +24,23 @@ use crate::verify::checker::{LimitViolation, Quantity};
 pub(crate) struct InterpolationCheck {
     /// How far the tool may stray [m].
     tolerance: f64,
-    before: Option<Ends>,
-}
-
-/// What the cubic between two setpoints needs of each.
-#[derive(Debug, Clone, Copy)]
-struct Ends {
-    sequence: u64,
-    position: AxisArray,
-    velocity: AxisArray,
+    /// What it marks on.
+    surface: Option<Surface>,
+    before: Option<Setpoint>,
+    found: InterpolationFacts,
 }
 
 impl InterpolationCheck {
-    /// Allows the tool to stray by `tolerance` [m].
-    pub(crate) fn new(tolerance: f64) -> Self {
-        Self { tolerance, before: None }
+    /// Allows the tool to stray by `tolerance` [m] from a path, on `surface` if it lies on one.
+    pub(crate) fn new(tolerance: f64, surface: Option<Surface>) -> Self {
+        let found =
+            InterpolationFacts { surface: surface.map(|_| 0.0), ..InterpolationFacts::default() };
+        Self { tolerance, surface, before: None, found }
+    }
+
+    /// How far it has strayed so far.
+    pub(crate) fn found(&self) -> &InterpolationFacts {
+        &self.found
     }
 
     /// Looks between the setpoint before and this one of `trajectory`, the last that `sampler` has
@@ -48,21 +53,26 @@ impl InterpolationCheck {
         setpoint: &Setpoint,
         sampler: &Sampler<N, M>,
     ) -> Result<Option<LimitViolation>, KinematicsError> {
-        let Setpoint { sequence, position, velocity, .. } = *setpoint;
-        let now = Ends { sequence, position, velocity };
-        let Some(before) = self.before.replace(now) else { return Ok(None) };
+        let Some(before) = self.before.replace(*setpoint) else { return Ok(None) };
         let time = (before.sequence as f64 + 0.5) * CYCLE_TIME;
         // Where light falls, and not where the source is told to begin and to end.
         let marks = |piece: &Piece| matches!(piece.motion, Motion::Path { is_lit: true, .. });
-        if !sampler.piece_at(time).is_some_and(marks) {
-            return Ok(None);
-        }
-        let Reference::Tool(tool) = sampler.reference_at(time) else {
+        let Some(piece) = sampler.piece_at(time).filter(|piece| marks(piece)) else {
             return Ok(None);
         };
-        let there = sampler.locate(&middle(&before, &now))?;
+        let Some(tool) = sampler.tool_at(time)? else { return Ok(None) };
+        let wanted = Aim::of(&tool.pose());
+        let there = Aim::of(&sampler.locate(&between(&before, setpoint, 0.5))?);
         // From where it should be at that time: never less than from the path.
-        let value = (there - tool.position).norm();
+        let value = (there.position - wanted.position).norm();
+        if value > self.found.deviation {
+            (self.found.deviation, self.found.line) = (value, piece.line);
+        }
+        self.found.axis = self.found.axis.max(there.angle(&wanted));
+        if let Some(surface) = &self.surface {
+            let height = surface.height(<[f64; 3]>::from(there.position))?.abs();
+            self.found.surface = self.found.surface.map(|most| most.max(height));
+        }
         if value <= self.tolerance {
             return Ok(None);
         }
@@ -72,11 +82,14 @@ impl InterpolationCheck {
     }
 }
 
-/// The joints in the middle of the cubic that has the positions and velocities of both ends.
-fn middle<const N: usize>(from: &Ends, to: &Ends) -> Joints<N> {
+/// The joints at a `share` of the cycle, on the cubic that has the positions and velocities of both ends.
+pub(crate) fn between<const N: usize>(from: &Setpoint, to: &Setpoint, share: f64) -> Joints<N> {
+    let rest = 1.0 - share;
+    let (before, after) = (rest * rest * (1.0 + 2.0 * share), share * share * (1.0 + 2.0 * rest));
+    let (leaving, coming) = (rest * rest * share * CYCLE_TIME, share * share * rest * CYCLE_TIME);
     Joints::from_fn(|axis, _| {
-        (from.position[axis] + to.position[axis]) / 2.0
-            + (from.velocity[axis] - to.velocity[axis]) * (CYCLE_TIME / 8.0)
+        from.position[axis] * before + to.position[axis] * after + from.velocity[axis] * leaving
+            - to.velocity[axis] * coming
     })
 }
 
@@ -97,7 +110,7 @@ mod tests {
         fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
             let Self(plan, tolerance) = self;
             let mut sampler = crate::plan::sampler(plan, mechanism, 1).unwrap();
-            let mut check = InterpolationCheck::new(tolerance);
+            let mut check = InterpolationCheck::new(tolerance, None);
             while let Some(setpoint) = sampler.next() {
                 if let Some(violation) = check.check(&setpoint, &sampler).unwrap() {
                     return Err(violation);
