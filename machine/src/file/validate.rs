@@ -87,8 +87,10 @@ fn axes(
         if let Some(dc) = &axis_table.motor.dc {
             warnings::of_motor(joint.name, dc, diagnostics);
         }
-        let speeds = [&table.path.speed, &table.path.rapid];
-        warnings::of_speeds(speeds, joint, &axis, diagnostics);
+        if axis_table.limits.velocity.is_none() {
+            let speeds = [&table.path.speed, &table.path.rapid];
+            warnings::of_speeds(speeds, joint, &axis, diagnostics);
+        }
         axes.push(axis);
     }
     if axes.len() == tables.len() {

@@ -55,7 +55,8 @@ pub(super) fn of_motor(axis: &str, motor: &DcMotorTable, diagnostics: &mut Diagn
     }
 }
 
-/// Warns about path speeds that `axis` cannot follow in every direction.
+/// Warns about path speeds that the motor of `axis` cannot follow in every direction; a limit that the file
+/// sets for it is meant.
 pub(super) fn of_speeds(
     speeds: [&Quantity<Speed, Positive>; 2],
     joint: &Joint,
@@ -68,7 +69,7 @@ pub(super) fn of_speeds(
         if asked > limit {
             let text = format!(
                 "axis `{}` reaches {limit:.3} m/s, but a path at {} m/s may ask it for {asked:.3} m/s: \
-                 jobs that do will be refused",
+                 jobs that do are slowed",
                 axis.name, speed.value
             );
             diagnostics.warn(speed.span, text);
