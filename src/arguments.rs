@@ -1,8 +1,10 @@
 //! The command line.
 
 use crate::exit;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use workbench::new::Kind;
 
 const RUN_EXAMPLES: &str = "\
 Examples:
@@ -66,6 +68,16 @@ Examples:
 A catalogue is a TOML file, or one of thesis, dc, bldc, steppers and gears, which are built in.
 --out writes the machine file with the motors; its comments stay.";
 
+const NEW_EXAMPLES: &str = "\
+Examples:
+  graver machine new corexy                         asks for the rest on a terminal
+  graver machine new cartesian_lift --area \"300 x 200 mm\" --z \"60 mm\" --head \"0.8 kg\" --yes
+  graver machine new five_bar --speed \"0.5 m/s\" --acceleration \"20 m/s^2\" --out mine.toml
+  graver machine new prrrp --steppers --motors my-motors.toml --motors gears
+
+The file is written only if `graver check` has nothing to say of it and its sample is marked in
+simulation. What no motor can do is asked for less, and the file says so.";
+
 const COMPARE_EXAMPLES: &str = "\
 Examples:
   graver compare                                    the four machines of source 003 on its letters
@@ -123,6 +135,9 @@ pub enum Command {
     /// Draw figures of machines, motors and jobs: SVG, the numbers as CSV, and a page of them all.
     #[command(after_help = FIGURES_EXAMPLES)]
     Figures(FiguresArguments),
+    /// Make machine files.
+    #[command(subcommand)]
+    Machine(MachineCommand),
     /// Measure this PC: latencies, planning speed, simulation speed.
     #[command(subcommand)]
     Bench(BenchCommand),
@@ -605,6 +620,66 @@ fn temperature(text: &str) -> Result<f64, String> {
     } else {
         Err(format!("{value} °C is not from -100 °C to 200 °C"))
     }
+}
+
+/// What can be done with machine files.
+#[derive(Debug, Clone, Subcommand)]
+pub enum MachineCommand {
+    /// Write a commented machine file to start from, with motors from catalogues, and a sample job.
+    #[command(after_help = NEW_EXAMPLES)]
+    New(NewArguments),
+}
+
+/// Arguments of `machine new`. What is left out is asked for on a terminal.
+#[derive(Debug, Clone, Args)]
+pub struct NewArguments {
+    /// Kind of the machine.
+    #[arg(value_parser = kinds())]
+    pub kind: Kind,
+    /// Name of the machine; without it that of its kind.
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// Width and depth of the area, 20 mm to 2000 mm each: "300 x 200 mm".
+    #[arg(long, value_name = "WIDTHxDEPTH")]
+    pub area: Option<String>,
+    /// Travel in z, 10 mm to 300 mm; of kinds that move in z.
+    #[arg(long, value_name = "LENGTH")]
+    pub z: Option<String>,
+    /// Mass of the head, 0.01 kg to 20 kg.
+    #[arg(long, value_name = "MASS")]
+    pub head: Option<String>,
+    /// Speed of the tool, 0.01 m/s to 2 m/s.
+    #[arg(long, value_name = "SPEED")]
+    pub speed: Option<String>,
+    /// Acceleration of the tool, 0.1 m/s^2 to 50 m/s^2.
+    #[arg(long, value_name = "ACCELERATION")]
+    pub acceleration: Option<String>,
+    /// Steppers in place of DC motors.
+    #[arg(long)]
+    pub steppers: bool,
+    /// Catalogue of motors and gears: a .toml file, or thesis, dc, bldc, steppers or gears, which are built in.
+    /// Can be repeated; without it all that are built in.
+    #[arg(long, value_name = "CATALOGUE")]
+    pub motors: Vec<String>,
+    /// The machine file; without it KIND.toml. The sample job is written beside it, as FILE-sample.toml.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Write over files that are there.
+    #[arg(long)]
+    pub force: bool,
+    /// Ask nothing: what is left out is as usual.
+    #[arg(long)]
+    pub yes: bool,
+    /// Print one JSON object on stdout; nothing is asked.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Reads the kind of a machine.
+fn kinds() -> impl TypedValueParser<Value = Kind> {
+    PossibleValuesParser::new(Kind::ALL.map(Kind::name)).try_map(|name| {
+        Kind::ALL.into_iter().find(|kind| kind.name() == name).ok_or("there is no such kind")
+    })
 }
 
 /// Arguments of `compare`.

@@ -6,6 +6,7 @@ pub mod compare;
 pub mod export;
 pub mod figures;
 pub mod kinematics;
+pub mod machine;
 pub mod manual;
 pub mod operator;
 pub mod path_check;

@@ -12,11 +12,11 @@ pub mod inputs;
 pub mod output;
 pub mod pipeline;
 
-use arguments::{Arguments, BenchCommand, Command};
+use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
-    bench, check, compare, export, figures, kinematics, manual, operator, plan, run, service,
-    simulate, size, tables, verify,
+    bench, check, compare, export, figures, kinematics, machine, manual, operator, plan, run,
+    service, simulate, size, tables, verify,
 };
 use exit::{Exit, Failure};
 use pipeline::operators::Verb;
@@ -46,6 +46,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Export(arguments) => export::run(arguments),
         Command::Size(arguments) => size::run(arguments),
         Command::Figures(arguments) => figures::run(arguments),
+        Command::Machine(MachineCommand::New(arguments)) => machine::new(arguments),
         Command::Bench(BenchCommand::Latency(arguments)) => bench::latency(arguments),
         Command::Bench(BenchCommand::Plan(arguments)) => bench::planning::run(arguments),
         Command::Bench(BenchCommand::Simulate(arguments)) => bench::simulate(arguments),
@@ -81,6 +82,7 @@ fn wants_json(command: &Command) -> bool {
         Command::Check(arguments) => arguments.json,
         Command::Size(arguments) => arguments.json,
         Command::Figures(arguments) => arguments.json,
+        Command::Machine(MachineCommand::New(arguments)) => arguments.json,
         Command::Submit(arguments) => arguments.instance.json,
         Command::Compare(arguments) => arguments.json,
         Command::Tables(arguments) => arguments.json,

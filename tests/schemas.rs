@@ -12,6 +12,7 @@ use graver::commands::bench::{LatencyReport, SpeedReport};
 use graver::commands::check::CheckReport;
 use graver::commands::figures::FiguresReport;
 use graver::commands::kinematics::lines::Reply;
+use graver::commands::machine::NewReport;
 use graver::commands::plan::PlanReport;
 use graver::pipeline::operators::VerbReply;
 use graver::pipeline::status::Status;
@@ -30,6 +31,7 @@ fn schemas() -> Vec<(&'static str, Schema)> {
         ("figures", schema_for!(FiguresReport)),
         ("kinematics", schema_for!(Reply)),
         ("latency", schema_for!(LatencyReport)),
+        ("machine_new", schema_for!(NewReport)),
         ("plan", schema_for!(PlanReport)),
         ("reply", schema_for!(VerbReply)),
         ("speed", schema_for!(SpeedReport)),

@@ -216,6 +216,14 @@ impl Job {
         let document = Document::parse("letters.toml", BUILTIN)?.override_with(overrides, "")?;
         file::job(document, Path::new(""), machine, u64::MAX)
     }
+
+    /// The job file called `name` with this `text`, which may name no other file.
+    ///
+    /// # Errors
+    /// Where it is not sound, with the place.
+    pub fn parse(name: &str, text: &str, machine: &Machine) -> Result<Self, JobError> {
+        file::job(Document::parse(name, text)?, Path::new(""), machine, u64::MAX)
+    }
 }
 
 impl JobError {

@@ -90,7 +90,7 @@ fn options(arguments: &SizeArguments, catalogue: &Catalogue) -> Options {
 }
 
 /// The catalogues that are named, or all that are built in, and the files that were read.
-fn catalogue(names: &[String]) -> Result<(Catalogue, Vec<PathBuf>), Failure> {
+pub(crate) fn catalogue(names: &[String]) -> Result<(Catalogue, Vec<PathBuf>), Failure> {
     let builtin = |name: &str| catalogue::BUILTIN.iter().find(|(known, _)| *known == name);
     let mut all = Catalogue::default();
     let mut files = Vec::new();

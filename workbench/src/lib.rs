@@ -7,6 +7,7 @@ pub mod catalogue;
 pub mod compare;
 pub mod figures;
 pub mod mechanics;
+pub mod new;
 pub mod operating;
 pub mod reach;
 pub mod simulation;

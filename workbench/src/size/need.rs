@@ -100,14 +100,7 @@ pub fn needs(
     job: &Job,
 ) -> Result<(Plan, Vec<AxisNeed>), SizeError> {
     let plan = planner::plan(&unbounded(machine, table), job)?;
-    let mut needs: Vec<AxisNeed> = machine
-        .axes
-        .iter()
-        .enumerate()
-        .filter_map(|(index, axis)| {
-            Some(axis_need(machine, table, index, axis_table(table, &axis.name)?))
-        })
-        .collect();
+    let mut needs = axes(machine, table);
     let setpoints: Vec<_> = plan.setpoints(1).collect();
     for (index, need) in needs.iter_mut().enumerate() {
         let motor_side = |at: usize| setpoints[at].position[index] + setpoints[at].lead[index];
@@ -131,6 +124,14 @@ pub fn needs(
             .collect();
     }
     Ok((plan, needs))
+}
+
+/// The joints of `machine`, whose file has `table`, before anything is asked of them.
+pub fn axes(machine: &Machine, table: &MachineTable) -> Vec<AxisNeed> {
+    let need = |(index, axis): (usize, &Axis)| {
+        Some(axis_need(machine, table, index, axis_table(table, &axis.name)?))
+    };
+    machine.axes.iter().enumerate().filter_map(need).collect()
 }
 
 fn axis_table<'a>(table: &'a MachineTable, name: &str) -> Option<&'a AxisTable> {
