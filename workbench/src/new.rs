@@ -5,6 +5,7 @@
 //! over its whole area, motors are chosen for that, and the file is checked, planned with and simulated
 //! before it is given out. What no motor can do is asked for less, and the file says so.
 
+mod choose;
 mod draft;
 mod drive;
 pub mod kinds;
@@ -157,7 +158,7 @@ fn drives(
     let axes = draft.axes.iter().zip(worst).zip(needs);
     axes.map(|((axis, worst), need)| match asked.planar {
         Some(force) => drive::planar(axis, worst, force),
-        None => drive::choose(axis, worst, need, catalogue, steppers, asked),
+        None => choose::choose(axis, worst, need, catalogue, steppers, asked),
     })
     .collect()
 }
