@@ -133,6 +133,18 @@ impl MechanismKind {
         self.visit(MovesInZ)
     }
 
+    /// Whether a job can say how its tool is turned, or at least where the beam points.
+    pub fn turns_its_tool(&self) -> bool {
+        struct TurnsItsTool;
+        impl MechanismVisitor for TurnsItsTool {
+            type Output = bool;
+            fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> bool {
+                matches!(mechanism.task_space(), TaskSpace::Axis | TaskSpace::Pose)
+            }
+        }
+        self.visit(TurnsItsTool)
+    }
+
     /// Whether its transmissions are springs, none of them rigid.
     pub fn is_elastic(&self) -> bool {
         struct IsElastic;

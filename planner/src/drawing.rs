@@ -3,11 +3,15 @@
 //! Every reader (letters, points, G-code) ends here, and everything after starts here. Machine
 //! frame, SI units. Nothing is timed yet.
 
+use std::sync::Arc;
+
 use machine::CornerMode;
 use messages::math;
 use nalgebra::Vector3;
 
 pub use messages::plan::Note;
+
+use crate::geometry::posed_path::PosedPath;
 
 /// A job as geometry: what to mark and how to get there, in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +44,13 @@ pub enum Action {
         curve: Curve,
         /// Speed while the laser is on [m/s]; `None` leaves it to the job's policy.
         speed: Option<f64>,
+        /// The laser.
+        power: Power,
+    },
+    /// Mark along a path through poses, whose turns the tool follows, wherever the tool is before.
+    Follow {
+        /// Where it goes, and how the tool is turned.
+        path: Arc<PosedPath>,
         /// The laser.
         power: Power,
     },

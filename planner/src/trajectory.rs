@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use machine::kinematics::{Attitude, ToolMotion};
+use machine::kinematics::ToolMotion;
 use messages::Nanoseconds;
 use messages::time::CYCLE_TIME;
 
@@ -173,19 +173,10 @@ impl Motion {
             Self::Rest(joints) | Self::Joints(joints) => Reference::Joints(joints.at(time)),
             Self::Path { path, law, .. } => {
                 let along = law.at_near(time, &mut cursor.cell);
-                let jet = path.at_near(along.position, &mut cursor.path);
-                Reference::Tool(jet.motion(along.velocity, along.acceleration, along.jerk))
+                let rates = [along.velocity, along.acceleration, along.jerk];
+                Reference::Tool(path.tool_near(along.position, rates, &mut cursor.path))
             }
-            Self::Flight(flight) => {
-                let now = flight.at(time);
-                Reference::Tool(ToolMotion {
-                    position: now.position,
-                    velocity: now.velocity,
-                    acceleration: now.acceleration,
-                    jerk: now.jerk,
-                    attitude: Attitude::LEVEL,
-                })
-            }
+            Self::Flight(flight) => Reference::Tool(flight.tool(time)),
         }
     }
 }

@@ -11,6 +11,8 @@ pub enum AttitudeLaw {
     /// Straight down.
     #[default]
     Level,
+    /// As the path says: at a place of it, on the way to it and from it.
+    AlongPath,
     /// Turned by this rotation all the time.
     Fixed(Matrix3<f64>),
     /// The beam against the normal of a surface, on it and beside it.
@@ -36,7 +38,7 @@ impl AttitudeLaw {
     #[inline]
     pub fn apply(&self, tool: &ToolMotion) -> Result<ToolMotion, KinematicsError> {
         match self {
-            Self::Level => Ok(*tool),
+            Self::Level | Self::AlongPath => Ok(*tool),
             Self::Fixed(rotation) => {
                 Ok(ToolMotion { attitude: Attitude::fixed(*rotation), ..*tool })
             }
@@ -55,10 +57,10 @@ impl AttitudeLaw {
 }
 
 /// A matrix, row by row.
-type Rows<S> = [[S; 3]; 3];
+pub(super) type Rows<S> = [[S; 3]; 3];
 
 /// The attitude whose rotation is this series: R′ = ω × R, so that [ω] = R′·Rᵀ.
-fn moving(rotation: &Rows<Taylor>) -> Attitude {
+pub(super) fn moving(rotation: &Rows<Taylor>) -> Attitude {
     let spin = |row: usize, column: usize| {
         let term = |k: usize| rotation[row][k].derivative() * rotation[column][k];
         term(0) + term(1) + term(2)
@@ -95,7 +97,7 @@ fn about<S: Scalar>(vector: [S; 3], first: S, second: S) -> Rows<S> {
 }
 
 /// The rotation by the length of `vector` [rad] about it (Rodrigues).
-fn exponential<S: Scalar>(vector: [S; 3]) -> Rows<S> {
+pub(super) fn exponential<S: Scalar>(vector: [S; 3]) -> Rows<S> {
     /// Terms of the power series of sin θ/θ and (1 − cos θ)/θ² in θ², which unlike the closed forms
     /// have derivatives at 0: the next is below rounding for all θ up to half a turn.
     const TERMS: u32 = 16;
@@ -122,6 +124,20 @@ fn facing<S: Scalar>(normal: [S; 3]) -> Rows<S> {
     let turn = about(lean, one, one / (z * sign + 1.0));
     let upside_down = [1.0, sign, sign];
     turn.map(|row| core::array::from_fn(|column| row[column] * upside_down[column]))
+}
+
+/// A fixed rotation, row by row.
+pub(super) fn rows<S: Scalar>(rotation: &Matrix3<f64>) -> Rows<S> {
+    core::array::from_fn(|row| core::array::from_fn(|column| S::from(rotation[(row, column)])))
+}
+
+/// `one` after `other`.
+pub(super) fn product<S: Scalar>(one: &Rows<S>, other: &Rows<S>) -> Rows<S> {
+    one.map(|[x, y, z]| {
+        core::array::from_fn(|column| {
+            x * other[0][column] + y * other[1][column] + z * other[2][column]
+        })
+    })
 }
 
 /// `rows` after `base`.

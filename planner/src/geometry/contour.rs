@@ -3,6 +3,8 @@
 
 mod parts;
 
+use std::sync::Arc;
+
 use machine::PathLimits;
 use nalgebra::Vector3;
 
@@ -10,6 +12,7 @@ use crate::geometry::blend::{Blend, BlendSegment};
 use crate::geometry::jet::Jet;
 use crate::geometry::path::Path;
 use crate::geometry::track::{Bend, Track};
+use crate::geometry::turning::Turning;
 use crate::light::Policy;
 
 /// A corner that is rounded more than its speed requires stays within this fraction of the tolerance.
@@ -72,6 +75,8 @@ pub(crate) struct Contour {
     /// What its tracks weigh.
     weight: usize,
     is_lit: bool,
+    /// How the tool is turned along it, and where on that it begins [m]; `None` where it says nothing.
+    turning: Option<(Arc<Turning>, f64)>,
 }
 
 impl Contour {
@@ -91,7 +96,18 @@ impl Contour {
             bend,
             weight,
             is_lit: demands.iter().any(|demand| demand.power > 0.0),
+            turning: None,
         }
+    }
+
+    /// With the tool turned as `turning` has it from the place `from` on [m].
+    pub(crate) fn turned(self, turning: Option<Arc<Turning>>, from: f64) -> Self {
+        Self { turning: turning.map(|turning| (turning, from)), ..self }
+    }
+
+    /// Whether it says how the tool is turned.
+    pub(crate) fn is_turned(&self) -> bool {
+        self.turning.is_some()
     }
 
     /// Whether it is the next part of the contour before it, which is gone on with without a stop.
@@ -323,7 +339,10 @@ impl Contour {
             }
             from = reach;
         }
-        path
+        match &self.turning {
+            Some((turning, from)) => path.turning(turning.clone(), *from),
+            None => path,
+        }
     }
 
     /// The direction in which it ends.

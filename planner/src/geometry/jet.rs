@@ -52,9 +52,9 @@ impl Jet {
     }
 
     /// The tool's motion along a curve taken by arc length, when it is here with `velocity`,
-    /// `acceleration` and `jerk` along the curve.
+    /// `acceleration` and `jerk` along the curve; level, since a curve turns nothing.
     #[inline]
-    pub fn motion(&self, velocity: f64, acceleration: f64, jerk: f64) -> ToolMotion {
+    pub fn motion(&self, [velocity, acceleration, jerk]: [f64; 3]) -> ToolMotion {
         ToolMotion {
             position: self.point,
             velocity: self.first * velocity,

@@ -14,9 +14,10 @@ use dark_ends::without_dark_ends;
 use rasters::Extent;
 
 use super::operation::{Dot, OffSurface, Operation, OperationKind};
-use crate::drawing::{Action, Corners, Curve, Note, Step};
+use crate::drawing::{Action, Corners, Curve, Note, Power, Step};
 use crate::geometry::contour::{Contour, Demand, GAP, Joining};
 use crate::geometry::polyline::{Chord, Polyline, goes_straight};
+use crate::geometry::posed_path::PosedPath;
 use crate::geometry::projected;
 use crate::geometry::track::Track;
 use crate::job::{Marking, MarkingSpeed};
@@ -113,6 +114,7 @@ impl<'a> Operations<'a> {
                 let demand = Demand { from: 0.0, power: 0.0, speed: Some(*speed), line };
                 self.curve(curve, demand, None)
             }
+            Action::Follow { path, power } => self.follow(path, power),
             Action::Rapid { to } => self.rapid(*to, line),
             Action::Corners(corners) => {
                 self.flush_polyline()?;
@@ -196,6 +198,27 @@ impl<'a> Operations<'a> {
             self.add(&track, &[demand], policy);
         }
         Ok(())
+    }
+
+    /// Goes along a path through poses.
+    fn follow(&mut self, path: &PosedPath, power: &Power) -> Result<(), OffSurface> {
+        self.flush()?;
+        let policy = Some(self.marking.policy(power));
+        let mut from = 0.0;
+        for (track, line) in &path.tracks {
+            let power = self.steady(power.level, *line);
+            let demand = Demand { from: 0.0, power, speed: None, line: *line };
+            self.add(track, &[demand], policy);
+            // Another contour begins at a corner that is not passed on the way.
+            if let Some(contour) =
+                self.contour.take_if(|contour| contour.length() <= track.length())
+            {
+                self.contour = Some(contour.turned(path.turning.clone(), from));
+            }
+            from += track.length();
+        }
+        self.place = path.end().unwrap_or(self.place);
+        self.flush()
     }
 
     /// A free move: part of the path where it goes straight on, else a move of its own.

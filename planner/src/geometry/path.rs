@@ -1,12 +1,17 @@
 //! The path that the tool follows: curves with smoothed joints, by one parameter that is the arc
 //! length on lines and arcs, and near it elsewhere.
 
-use nalgebra::Vector3;
+use std::sync::Arc;
+
+use machine::kinematics::{Attitude, ToolMotion};
+use machine::taylor::Taylor;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::drawing::Curve;
 use crate::geometry::blend::BlendSegment;
 use crate::geometry::jet::Jet;
 use crate::geometry::track::Track;
+use crate::geometry::turning::Turning;
 use crate::search::partition_near;
 
 /// The path of a contour. It is never empty once it is planned.
@@ -14,6 +19,17 @@ use crate::search::partition_near;
 pub struct Path {
     spans: Vec<Span>,
     length: f64,
+    turned: Turned,
+}
+
+/// How the tool is turned along a path, where the path says it.
+#[derive(Debug, Clone, Default, PartialEq)]
+enum Turned {
+    #[default]
+    Level,
+    Fixed(Matrix3<f64>),
+    /// From this place of the turning on [m].
+    Along(Arc<Turning>, f64),
 }
 
 /// Where on a path it was looked last.
@@ -21,6 +37,7 @@ pub struct Path {
 pub(crate) struct PathCursor {
     span: usize,
     piece: usize,
+    knot: usize,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -63,6 +80,16 @@ impl Path {
         path
     }
 
+    /// With the tool turned by `rotation` all along.
+    pub(crate) fn facing(self, rotation: Matrix3<f64>) -> Self {
+        Self { turned: Turned::Fixed(rotation), ..self }
+    }
+
+    /// With the tool turned as `turning` has it from the place `from` on [m].
+    pub(crate) fn turning(self, turning: Arc<Turning>, from: f64) -> Self {
+        Self { turned: Turned::Along(turning, from), ..self }
+    }
+
     /// The range of the parameter [m].
     pub fn length(&self) -> f64 {
         self.length
@@ -101,9 +128,56 @@ impl Path {
         }
     }
 
-    /// The last point, as its shape ends.
-    pub(crate) fn end(&self) -> Jet {
-        self.on_side(self.length, true, &mut PathCursor::default())
+    /// The tool's motion at `distance` [m], where the parameter goes with these rates: velocity [m/s],
+    /// acceleration [m/s²] and jerk [m/s³].
+    pub fn tool(&self, distance: f64, rates: [f64; 3]) -> ToolMotion {
+        self.tool_near(distance, rates, &mut PathCursor::default())
+    }
+
+    /// As [`Self::tool`], looked for from the place of `near` on.
+    #[inline]
+    pub(crate) fn tool_near(
+        &self,
+        distance: f64,
+        rates: [f64; 3],
+        near: &mut PathCursor,
+    ) -> ToolMotion {
+        self.turn(self.at_near(distance, near).motion(rates), distance, rates, near)
+    }
+
+    /// The same, from the shape that ends at `distance` where one does and `before` says so.
+    pub(crate) fn tool_on_side(
+        &self,
+        distance: f64,
+        before: bool,
+        rates: [f64; 3],
+        near: &mut PathCursor,
+    ) -> ToolMotion {
+        self.turn(self.on_side(distance, before, near).motion(rates), distance, rates, near)
+    }
+
+    /// The tool's motion at the last point, as its shape ends.
+    pub(crate) fn end_tool(&self, rates: [f64; 3]) -> ToolMotion {
+        self.tool_on_side(self.length, true, rates, &mut PathCursor::default())
+    }
+
+    #[inline]
+    fn turn(
+        &self,
+        tool: ToolMotion,
+        distance: f64,
+        [velocity, acceleration, jerk]: [f64; 3],
+        near: &mut PathCursor,
+    ) -> ToolMotion {
+        let attitude = match &self.turned {
+            Turned::Level => return tool,
+            Turned::Fixed(rotation) => Attitude::fixed(*rotation),
+            Turned::Along(turning, from) => {
+                let place = Taylor::new(from + distance, velocity, acceleration, jerk);
+                turning.attitude(place, &mut near.knot)
+            }
+        };
+        ToolMotion { attitude, ..tool }
     }
 
     /// Distances at which the path goes over from one shape into the next [m].
@@ -112,7 +186,7 @@ impl Path {
     }
 
     /// Appends where its third derivative may jump from `from` to `to`: seams, and the knots of splines
-    /// [m], growing.
+    /// [m], growing; then where the turning has its knots, and half way between them.
     pub(crate) fn borders(&self, from: f64, to: f64, borders: &mut Vec<f64>) {
         let first = self.spans.partition_point(|span| span.start <= from).max(1) - 1;
         for (index, span) in self.spans.iter().enumerate().skip(first) {
@@ -130,10 +204,15 @@ impl Path {
                 borders.extend(knots.take_while(|knot| *knot <= to).filter(inside));
             }
         }
+        if let Turned::Along(turning, offset) = &self.turned {
+            let knots = turning.places().map(|place| place - offset);
+            borders.extend(knots.filter(|knot| *knot > 0.0 && (from..=to).contains(knot)));
+        }
     }
 
-    /// Whether it is one straight line.
+    /// Whether it is one straight line, on which nothing changes.
     pub(crate) fn is_straight(&self) -> bool {
-        matches!(&*self.spans, [Span { shape: Shape::Track(Track::Line { .. }, _), .. }])
+        !matches!(self.turned, Turned::Along(..))
+            && matches!(&*self.spans, [Span { shape: Shape::Track(Track::Line { .. }, _), .. }])
     }
 }

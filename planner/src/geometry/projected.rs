@@ -50,17 +50,6 @@ impl Projected {
             }
         }
     }
-
-    /// The largest value on the curve of a function of a point and its derivatives by arc length.
-    pub(crate) fn largest(&self, of: impl Fn(&Jet) -> f64) -> f64 {
-        /// A top between two looks is higher than both by less than this.
-        const BETWEEN: f64 = 1.001;
-        let looks = 4 * LOOKS;
-        (0..=looks)
-            .map(|look| of(&self.jet(f64::from(look) / f64::from(looks)).by_arc_length()))
-            .fold(0.0, f64::max)
-            * BETWEEN
-    }
 }
 
 /// Where a flat point comes to lie [m]; the drawing's z is the height over the surface.

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 
 use crate::drawing::Curve;
 use crate::geometry::arc_length::{ByArcLength, Parametric};
+use crate::geometry::cubic::Cubic;
 use crate::geometry::jet::Jet;
 use crate::geometry::projected::Projected;
 use crate::geometry::spline::Spline;
@@ -19,6 +20,12 @@ const STEPS_PER_TURN: f64 = 64.0;
 /// How far the two semi-axes of a circle may differ, and how far from perpendicular its helix
 /// axis may be, before the arc is taken by a table [1].
 const ROUND: f64 = 1e-12;
+
+/// Looks along a curve on a surface, and along a cubic, for where it bends most: a top between two of them
+/// is higher than both by less than [`BETWEEN`].
+const PROJECTED_LOOKS: u32 = 1024;
+const CUBIC_LOOKS: u32 = 128;
+const BETWEEN: f64 = 1.001;
 
 /// A curve by arc length.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +38,8 @@ pub(crate) enum Track {
     Ellipse(Arc<ByArcLength<Ellipse>>),
     /// A flat curve on a surface.
     Projected(Arc<ByArcLength<Projected>>),
+    /// A cubic between two points of a smooth curve.
+    Cubic(Arc<ByArcLength<Cubic>>),
     /// A smooth curve through a dense polyline, and the vertices that it stands for.
     Spline { spline: Arc<Spline>, vertices: Arc<[Vector3<f64>]> },
     /// A stretch of another curve from this distance on.
@@ -164,6 +173,7 @@ impl Track {
             }
             Self::Ellipse(table) => table.length(),
             Self::Projected(table) => table.length(),
+            Self::Cubic(table) => table.length(),
             Self::Spline { spline, .. } => spline.length(),
         }
     }
@@ -195,6 +205,7 @@ impl Track {
             }
             Self::Ellipse(table) => table.at(distance),
             Self::Projected(table) => table.at(distance),
+            Self::Cubic(table) => table.at(distance),
             Self::Spline { spline, .. } => spline.at_near(distance, near),
             Self::Part { of, from, .. } => of.at_near(from + distance, near),
         }
@@ -251,10 +262,8 @@ impl Track {
                 curvature: table.curve().largest(|jet| jet.second.norm()),
                 third: table.curve().largest(|jet| jet.third.norm()),
             },
-            Self::Projected(table) => Bend {
-                curvature: table.curve().largest(|jet| jet.second.norm()),
-                third: table.curve().largest(|jet| jet.third.norm()),
-            },
+            Self::Projected(table) => table.bend(PROJECTED_LOOKS),
+            Self::Cubic(table) => table.bend(CUBIC_LOOKS),
             Self::Spline { spline, .. } => spline
                 .jets()
                 .iter()
@@ -280,6 +289,18 @@ impl Track {
             let point = self.at(self.length() * index as f64 / count as f64).point;
             points.push([point.x, point.y, point.z]);
         }
+    }
+}
+
+impl<C: Parametric> ByArcLength<C> {
+    /// How sharply it bends at most, as found at so many places.
+    fn bend(&self, looks: u32) -> Bend {
+        let curve = self.curve();
+        let looks = (0..=looks).map(|look| curve.end() * f64::from(look) / f64::from(looks));
+        let bend = looks
+            .map(|parameter| Bend::of(&curve.jet(parameter).by_arc_length()))
+            .fold(Bend::default(), Bend::or);
+        Bend { curvature: bend.curvature * BETWEEN, third: bend.third * BETWEEN }
     }
 }
 

@@ -25,6 +25,10 @@ impl Job {
                     place = curve.to();
                     length(curve) / marking(*speed)
                 }
+                Action::Follow { path, .. } => {
+                    place = path.end().unwrap_or(place);
+                    path.length() / marking(None)
+                }
                 Action::Feed { curve, speed } => {
                     place = curve.to();
                     length(curve) / speed.min(limits.rapid)

@@ -147,6 +147,20 @@ pub(super) fn job(
         }
         None => machine,
     };
+    if let (Some(path), Some(_)) = (&path, surface)
+        && path.smooth.value
+    {
+        let text = "a smooth curve through points is not put on a surface".to_owned();
+        diagnostics.contradict(path.smooth.span, text, "leave `smooth` or [surface] out");
+    }
+    if let Some(poses) = path.as_ref().and_then(|path| path.poses.as_ref()) {
+        let tables = [surface.map(|_| "[surface]"), attitude.as_ref().map(|_| "[attitude]")];
+        for table in tables.into_iter().flatten() {
+            let place = poses.first().map_or(place, |pose| pose.at.span);
+            let text = format!("{table} and `poses` both say how the tool is turned");
+            diagnostics.contradict(place, text, "keep one of them");
+        }
+    }
     let kinds = Kinds { letters, points, path, cloud, gcode };
     let files = Files { folder, most };
     let job = of_tables(kinds, &marking, place, diagnostics, files, machine)?;
@@ -201,9 +215,8 @@ fn of_tables(
     } else if let Some(path) = path {
         let line = line(&diagnostics, path.span);
         let name = stem(&diagnostics, "path");
-        let home = Vector3::from(machine.home);
-        let drawing = path_table::draw(&path, &name, power, home, line, &mut diagnostics);
-        Ok(diagnostics.finish(job_of(drawing, marking))?)
+        let job = path_table::job(&path, &name, power, machine, line, &mut diagnostics);
+        Ok(diagnostics.finish(Job { marking: how(marking), ..job })?)
     } else if let Some(cloud) = cloud {
         let drawing = cloud_table::draw(&cloud, folder, power, &mut diagnostics, machine)?;
         let files = cloud.file.iter().map(|file| folder.join(&file.value)).collect();

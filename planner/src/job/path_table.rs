@@ -1,24 +1,48 @@
 //! The job file's table of a path in space.
 
-use core::f64::consts::TAU;
+use core::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
-use machine::document::{Diagnostics, Point, Positive, Quantity};
+use machine::document::{Diagnostics, Point, Positive, Quantity, Span, Spanned};
+use machine::kinematics::{Joints, KinematicsError};
 use machine::quantity::{Angle, Length};
-use machine::table;
-use nalgebra::Vector3;
+use machine::{Machine, Mechanism, MechanismVisitor, Pose, table};
+use nalgebra::{Matrix3, Vector3};
 
+use super::Job;
 use crate::drawing::{Action, Curve, Drawing, Power, Step};
-use crate::geometry::attitude::turned;
+use crate::geometry::attitude::{AttitudeLaw, turned};
+use crate::geometry::posed_path::{Between, PathPose, PosedPath};
+use crate::geometry::turning::logarithm;
+use crate::joint_space::configuration::branches;
 
 table! {
-    /// A path in space, marked in one go: exactly one of `points` and `circle`.
+    /// A path in space, marked in one go: exactly one of `points`, `poses` and `circle`.
     pub struct PathTable {
         /// Where its origin lies as seen from the machine's home.
         pub at: Option<Point>,
         /// Corners [x, y] or [x, y, z] as seen from its origin, joined by straight lines.
         pub points: Option<Vec<Point>>,
+        /// Places to pass, each with how the tool is turned there; joined like `points`.
+        pub poses: Option<Vec<PoseTable>>,
+        /// Whether a smooth curve goes through the points or poses instead of straight lines.
+        pub smooth: Spanned<bool> = false,
         /// A circle around its origin.
         pub circle: Option<CircleTable>,
+    }
+}
+
+table! {
+    /// A place to pass, and how the tool is turned there: about x, then y, then z of the machine.
+    pub struct PoseTable {
+        /// The place [x, y] or [x, y, z] as seen from the path's origin.
+        pub at: Point,
+        /// About x.
+        pub roll: Quantity<Angle> = "0 deg",
+        /// About y.
+        pub pitch: Quantity<Angle> = "0 deg",
+        /// About z.
+        pub yaw: Quantity<Angle> = "0 deg",
     }
 }
 
@@ -34,48 +58,216 @@ table! {
     }
 }
 
-/// The drawing of a path at `power`, reached from `home` [m], as asked for in `line` of the job
-/// `name`; what is wrong with the table goes to `diagnostics`.
-pub(super) fn draw(
+/// The job that marks a path at `power` on `machine`, named `name`, as asked for in `line` of its file;
+/// what is wrong with the table goes to `diagnostics`.
+pub(super) fn job(
     table: &PathTable,
     name: &str,
     power: f64,
-    home: Vector3<f64>,
+    machine: &Machine,
     line: u64,
     diagnostics: &mut Diagnostics,
-) -> Drawing {
-    let at = table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
-    let origin = home + at;
-    let curves = match (&table.points, &table.circle) {
-        (Some(points), None) => {
+) -> Job {
+    let home = Vector3::from(machine.home);
+    let origin = home + table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
+    let power = Power { level: power, follows_speed: false };
+    let between = if table.smooth.value { Between::Curves } else { Between::Lines };
+    let mut attitude = AttitudeLaw::Level;
+    let actions = match (&table.points, &table.poses, &table.circle) {
+        (Some(points), None, None) => {
             if points.len() < 2 {
                 let help = "write points such as [[\"0 mm\", \"0 mm\"], [\"10 mm\", \"5 mm\"]]";
                 let text = "a path has two points at least".to_owned();
                 diagnostics.contradict(table.span, text, help);
             }
-            let corner = |point: &Point| origin + Vector3::from(point.value);
-            let lines = points.windows(2);
-            lines.map(|pair| Curve::Line { from: corner(&pair[0]), to: corner(&pair[1]) }).collect()
+            let corners: Vec<Vector3<f64>> =
+                points.iter().map(|point| origin + Vector3::from(point.value)).collect();
+            if between == Between::Curves {
+                let level = |(point, at): (&Point, &Vector3<f64>)| {
+                    let (position, rotation) = (*at, Matrix3::identity());
+                    (
+                        PathPose { position, rotation, line: line_of(diagnostics, point.span) },
+                        point.span,
+                    )
+                };
+                let poses: Vec<(PathPose, Span)> = points.iter().zip(&corners).map(level).collect();
+                follow(&poses, between, diagnostics).map(|path| (path, power)).map(marks)
+            } else {
+                let lines = corners.windows(2);
+                Some(
+                    lines
+                        .map(|pair| mark(Curve::Line { from: pair[0], to: pair[1] }, power))
+                        .collect(),
+                )
+            }
         }
-        (None, Some(circle)) => {
+        (None, Some(poses), None) => {
+            let poses: Vec<(PathPose, Span)> = poses
+                .iter()
+                .map(|pose| {
+                    let rotation = turned(pose.roll.value, pose.pitch.value, pose.yaw.value);
+                    let position = origin + Vector3::from(pose.at.value);
+                    let line = line_of(diagnostics, pose.at.span);
+                    (PathPose { position, rotation, line }, pose.at.span)
+                })
+                .collect();
+            can_be_taken(&poses, machine, diagnostics);
+            follow(&poses, between, diagnostics).map(|path| {
+                if path.is_turned() {
+                    attitude = AttitudeLaw::AlongPath;
+                }
+                marks((path, power))
+            })
+        }
+        (None, None, Some(circle)) => {
+            if table.smooth.value {
+                let text = "a circle is smooth as it is".to_owned();
+                diagnostics.contradict(table.smooth.span, text, "leave `smooth` out");
+            }
             let plane = turned(circle.roll.value, circle.pitch.value, 0.0);
-            vec![Curve::Arc {
+            let curve = Curve::Arc {
                 centre: origin,
                 major: plane.column(0) * circle.radius.value,
                 minor: plane.column(1) * circle.radius.value,
                 start: 0.0,
                 sweep: TAU,
                 rise: Vector3::zeros(),
-            }]
+            };
+            Some(vec![mark(curve, power)])
         }
         _ => {
-            let help = "write one of `points` and a table [path.circle]";
+            let help = "write one of `points`, `poses` and a table [path.circle]";
             diagnostics.contradict(table.span, "which path is not clear".to_owned(), help);
-            Vec::new()
+            None
         }
     };
-    let power = Power { level: power, follows_speed: false };
-    let mark = |curve| Step { action: Action::Mark { curve, speed: None, power }, line };
-    let steps = curves.into_iter().map(mark).collect();
-    Drawing { name: name.to_owned(), start: home, steps, notes: Vec::new() }
+    let steps = actions.into_iter().flatten().map(|action| Step { action, line }).collect();
+    let drawing = Drawing { name: name.to_owned(), start: home, steps, notes: Vec::new() };
+    Job { attitude, ..Job::of(drawing) }
+}
+
+fn mark(curve: Curve, power: Power) -> Action {
+    Action::Mark { curve, speed: None, power }
+}
+
+fn marks((path, power): (PosedPath, Power)) -> Vec<Action> {
+    vec![Action::Follow { path: Arc::new(path), power }]
+}
+
+/// The path through `poses`, if there is one.
+fn follow(
+    poses: &[(PathPose, Span)],
+    between: Between,
+    diagnostics: &mut Diagnostics,
+) -> Option<PosedPath> {
+    /// Nearer to each other two places are one [m].
+    const APART: f64 = 1e-7;
+    /// A turn that differs from half a turn by less has no one way [rad].
+    const CLEAR: f64 = 1e-6;
+    let [_, _, ..] = poses else { return None };
+    let mut is_sound = true;
+    for (index, pair) in poses.windows(2).enumerate() {
+        let [(before, _), (here, span)] = pair else { continue };
+        let [one, other] = [index + 1, index + 2];
+        if (here.position - before.position).norm() < APART {
+            is_sound = false;
+            diagnostics.contradict(
+                *span,
+                format!(
+                    "places {one} and {other} of the path are one: the tool cannot turn on the spot"
+                ),
+                "leave one of them out, or move it by a micrometre at least",
+            );
+        }
+        let turn = logarithm(&before.rotation.tr_mul(&here.rotation)).norm();
+        if turn > PI - CLEAR {
+            is_sound = false;
+            diagnostics.contradict(
+                *span,
+                format!(
+                    "from pose {one} to pose {other} the tool turns by {:.4} deg, and half a turn has no \
+                     one way",
+                    turn.to_degrees()
+                ),
+                "put a pose between them",
+            );
+        }
+    }
+    is_sound
+        .then(|| PosedPath::new(&poses.iter().map(|(pose, _)| *pose).collect::<Vec<_>>(), between))
+}
+
+/// That there are poses enough, and each is one that the machine can take: what no speed can do is told
+/// at its line.
+fn can_be_taken(poses: &[(PathPose, Span)], machine: &Machine, diagnostics: &mut Diagnostics) {
+    /// Rounding at the edge of the area [m].
+    const ROUNDING: f64 = 1e-9;
+    if let [(_, span)] = poses {
+        let text = "a path has two poses at least".to_owned();
+        diagnostics.contradict(*span, text, "add a pose such as { at = [\"10 mm\", \"0 mm\"] }");
+    }
+    let is_turned = |pose: &PathPose| pose.rotation != Matrix3::identity();
+    for (index, (pose, span)) in poses.iter().enumerate() {
+        let number = index + 1;
+        if is_turned(pose) && !machine.mechanism.turns_its_tool() {
+            diagnostics.contradict(
+                *span,
+                format!(
+                    "pose {number} turns the tool, which the mechanism `{}` cannot",
+                    machine.mechanism.name()
+                ),
+                "leave roll, pitch and yaw out, or take a machine that turns its tool, such as tri_planar",
+            );
+            return;
+        }
+        let area = &machine.area;
+        for (row, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let (place, lower, upper) = (pose.position[row], area.lower[row], area.upper[row]);
+            let inside = place >= lower - ROUNDING && place <= upper + ROUNDING;
+            if !inside {
+                diagnostics.contradict(
+                    *span,
+                    format!(
+                        "{name} of pose {number} would be {:.3} mm in machine coordinates, outside the area",
+                        place * 1e3
+                    ),
+                    &format!("keep {name} from {:.3} mm to {:.3} mm there", lower * 1e3, upper * 1e3),
+                );
+            }
+        }
+        let target = Pose { position: pose.position, rotation: pose.rotation };
+        if let Err(cause) = machine.mechanism.visit(Reached { machine, target }) {
+            diagnostics.contradict(
+                *span,
+                format!("the tool cannot take pose {number}: {cause}"),
+                "turn it less there, or move it to where the mechanism has room",
+            );
+        }
+    }
+}
+
+/// Whether a pose can be reached on some branch.
+struct Reached<'a> {
+    machine: &'a Machine,
+    target: Pose,
+}
+
+impl MechanismVisitor for Reached<'_> {
+    type Output = Result<(), KinematicsError>;
+
+    fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
+        let home = Joints::<N>::from_fn(|axis, _| self.machine.home_joints[axis]);
+        let mut refused = Ok(());
+        for branch in branches(&mechanism, &home) {
+            match mechanism.inverse(&self.target, branch, &home) {
+                Ok(_) => return Ok(()),
+                Err(cause) => refused = refused.and(Err(cause)),
+            }
+        }
+        refused
+    }
+}
+
+fn line_of(diagnostics: &Diagnostics, place: Span) -> u64 {
+    diagnostics.position(place).map_or(0, |(line, _)| line as u64)
 }

@@ -164,6 +164,8 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
             }
             Action::Mark { curve, .. } | Action::Feed { curve, .. } => *curve,
             Action::Rapid { to } => Curve::Line { from: extent.place, to: *to },
+            // Only planning tells what the tool's turns do.
+            Action::Follow { .. } => return false,
             _ => return true,
         };
         let to = curve.to();

@@ -146,7 +146,7 @@ pub(super) fn place(
             })
         }
         (None, Some(surface)) => AttitudeLaw::Normal(surface),
-        (None, None) => AttitudeLaw::Level,
+        (None, None) => job.attitude,
     };
     Job { surface, attitude: law, ..job }
 }

@@ -245,7 +245,7 @@ pub(crate) fn trail<const N: usize, M: Mechanism<N>>(
     if limits.mechanism.is_linear() || limits.scope == Scope::PathAlone {
         return Ok(trail);
     }
-    let along = |share: f64| path.at(length * share).motion(1.0, 0.0, 0.0);
+    let along = |share: f64| path.tool(length * share, [1.0, 0.0, 0.0]);
     walk_noting(limits, *start, &[&along], &mut |share, now| {
         trail.push((length * share, *now));
     })?;

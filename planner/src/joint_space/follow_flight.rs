@@ -1,6 +1,6 @@
 //! Whether the joints can follow a flight of the tool, and which of their limits it takes too much of.
 
-use machine::kinematics::{Attitude, KinematicsError, ToolMotion};
+use machine::kinematics::{KinematicsError, ToolMotion};
 use machine::{Mechanism, WorkArea};
 
 use crate::joint_space::configuration::{Configuration, keeps_margins};
@@ -91,7 +91,7 @@ pub(crate) fn follow_flight<const N: usize, M: Mechanism<N>>(
     let mut followed = Followed { end: *start, used: [[0.0; JointLimit::COUNT]; N] };
     let mut rows = Vec::new();
     for (index, time) in looks(flight).into_iter().enumerate() {
-        step(limits, &mut followed, &tool(flight, time), shares, &mut rows)?;
+        step(limits, &mut followed, &flight.tool(time), shares, &mut rows)?;
         if followed.used.iter().flatten().any(|used| used.is_nan() || *used > most) {
             return Some(followed);
         }
@@ -117,18 +117,6 @@ fn looks(flight: &Flight) -> Vec<f64> {
         .collect();
     looks.sort_by(f64::total_cmp);
     looks
-}
-
-/// The tool's motion in a flight.
-pub(crate) fn tool(flight: &Flight, time: f64) -> ToolMotion {
-    let now = flight.at(time);
-    ToolMotion {
-        position: now.position,
-        velocity: now.velocity,
-        acceleration: now.acceleration,
-        jerk: now.jerk,
-        attitude: Attitude::LEVEL,
-    }
 }
 
 /// Follows the tool to one instant, at which time itself is the parameter of the limits.

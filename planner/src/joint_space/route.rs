@@ -161,8 +161,11 @@ impl<const N: usize, M: Mechanism<N>> Router<'_, '_, N, M> {
     ) -> Result<Approach<N>, Refused> {
         let from = self.tool()?.position;
         let to = first.position;
-        let line =
-            |share: f64| ToolMotion { velocity: to - from, ..still(from + (to - from) * share) };
+        let rotation = first.attitude.rotation;
+        let line = |share: f64| {
+            let pose = Pose { position: from + (to - from) * share, rotation };
+            ToolMotion { velocity: to - from, ..ToolMotion::rest(&pose) }
+        };
         let is_free = self.limits.scope == Scope::PathAlone;
         if !is_free {
             self.starts_here(&line(0.0))?;
@@ -178,7 +181,7 @@ impl<const N: usize, M: Mechanism<N>> Router<'_, '_, N, M> {
         if (to - from).norm() <= NOTHING {
             return Ok(Approach { motion: None, start });
         }
-        let path = Path::line(from, to);
+        let path = Path::line(from, to).facing(rotation);
         let motion = straight_move(self.limits, &self.now, path, self.shares)?;
         Ok(Approach { motion: Some(motion), start })
     }

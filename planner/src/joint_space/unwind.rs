@@ -23,7 +23,7 @@ const PIECES: usize = 512;
 /// `contour` in parts such that the axis that is `axis` can turn as far as each asks. `near` is where
 /// the joints stand.
 ///
-/// `None` where the axis does not come round to the same place, or the contour winds it up too little
+/// `None` where the path says how the tool is turned, the axis does not come round to the same place, or the contour winds it up too little
 /// for a division to help.
 pub(crate) fn divide<const N: usize, M: Mechanism<N>>(
     limits: &MotionLimits<'_, N, M>,
@@ -33,7 +33,8 @@ pub(crate) fn divide<const N: usize, M: Mechanism<N>>(
 ) -> Option<Vec<Contour>> {
     let [lower, upper] = limits.axes.get(axis)?.limits.position;
     let travel = upper - lower;
-    if !travel.is_finite() {
+    // A part may end in the midst of a turn of the tool, which a flight from there does not go on with.
+    if !travel.is_finite() || contour.is_turned() {
         return None;
     }
     let cuts = (0..limits.branches.len())
@@ -57,7 +58,7 @@ fn cuts<const N: usize, M: Mechanism<N>>(
     travel: f64,
 ) -> Result<Option<Vec<f64>>, KinematicsError> {
     let length = contour.length();
-    let at = |distance: f64| contour.at(distance).motion(1.0, 0.0, 0.0);
+    let at = |distance: f64| contour.at(distance).motion([1.0, 0.0, 0.0]);
     let mut now = Configuration { joints: *near, branch };
     let start = limits.follow(&at(0.0), &mut now.branch, near)?;
     now.joints = start.position;

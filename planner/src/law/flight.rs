@@ -17,7 +17,8 @@ mod run;
 mod search;
 mod speed;
 
-use nalgebra::Vector3;
+use machine::kinematics::{Attitude, ToolMotion};
+use nalgebra::{Matrix3, Vector3};
 
 pub(crate) use direction::DirectionLimit;
 
@@ -38,6 +39,8 @@ pub struct State {
     pub velocity: Vector3<f64>,
     /// [m/s²].
     pub acceleration: Vector3<f64>,
+    /// How it is turned in all of the flight, where the path says it.
+    pub rotation: Matrix3<f64>,
 }
 
 /// What the tool may do, as the norms of vectors; all positive.
@@ -83,7 +86,8 @@ pub struct Flight {
 impl State {
     /// At rest at `position` [m].
     pub fn rest(position: Vector3<f64>) -> Self {
-        Self { position, velocity: Vector3::zeros(), acceleration: Vector3::zeros() }
+        let (velocity, acceleration) = (Vector3::zeros(), Vector3::zeros());
+        Self { position, velocity, acceleration, rotation: Matrix3::identity() }
     }
 
     fn is_finite(&self) -> bool {
@@ -180,13 +184,20 @@ impl Flight {
     /// The tool's motion at `time` since the start [s]; that at the ends before and after.
     pub fn at(&self, time: f64) -> Motion3 {
         if time >= self.duration {
-            let State { position, velocity, acceleration } = self.end;
+            let State { position, velocity, acceleration, .. } = self.end;
             let jerk = self.phases.last().map_or(Vector3::zeros(), |phase| phase.motion.jerk);
             return Motion3 { position, velocity, acceleration, jerk };
         }
         let index = self.phases.partition_point(|phase| phase.start <= time).max(1) - 1;
         let Phase { start, motion } = self.phases[index];
         motion.after((time - start).max(0.0))
+    }
+
+    /// The same, with the tool turned as it is at the end.
+    pub fn tool(&self, time: f64) -> ToolMotion {
+        let Motion3 { position, velocity, acceleration, jerk } = self.at(time);
+        let attitude = Attitude::fixed(self.end.rotation);
+        ToolMotion { position, velocity, acceleration, jerk, attitude }
     }
 
     /// The least box of all its positions, lower and upper corner [m].
@@ -223,7 +234,7 @@ impl Flight {
         accelerations: impl Iterator<Item = Vector3<f64>>,
     ) -> Self {
         let mut phases = Vec::with_capacity(steps.len());
-        let State { position, velocity, acceleration } = *from;
+        let State { position, velocity, acceleration, .. } = *from;
         let mut motion = Motion3 { position, velocity, acceleration, jerk: Vector3::zeros() };
         let mut start = 0.0;
         for (&step, next) in steps.iter().zip(accelerations) {
@@ -237,7 +248,7 @@ impl Flight {
 
     /// Nowhere, in no time.
     fn nothing(at: &State) -> Self {
-        let State { position, velocity, acceleration } = *at;
+        let State { position, velocity, acceleration, .. } = *at;
         let motion = Motion3 { position, velocity, acceleration, jerk: Vector3::zeros() };
         Self { phases: vec![Phase { start: 0.0, motion }], duration: 0.0, end: *at }
     }
@@ -272,7 +283,8 @@ impl Flight {
             phases.push(Phase { start: self.duration - end.start, motion });
         }
         let Motion3 { position, velocity, acceleration, .. } = self.at(0.0);
-        let end = State { position, velocity: -velocity, acceleration };
+        let rotation = self.end.rotation;
+        let end = State { position, velocity: -velocity, acceleration, rotation };
         Self { phases, duration: self.duration, end }
     }
 }

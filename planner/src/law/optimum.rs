@@ -228,6 +228,7 @@ fn run_in_of(start: &Jet, speed: f64, limits: &FlightLimits) -> Flight {
         position: start.point,
         velocity: start.first * speed,
         acceleration: start.second * (speed * speed),
+        ..State::rest(start.point)
     };
     Flight::ramp_in(&to, &FlightLimits { speed, ..*limits })
 }

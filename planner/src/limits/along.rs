@@ -69,8 +69,7 @@ impl<'a, 'm, const N: usize, M: Mechanism<N>> AlongPath<'a, 'm, N, M> {
         before: bool,
         rows: &mut Vec<Row>,
     ) -> Result<Local, KinematicsError> {
-        let jet = self.path.on_side(place, before, &mut self.near);
-        let tool = jet.motion(1.0, 0.0, 0.0);
+        let tool = self.path.tool_on_side(place, before, [1.0, 0.0, 0.0], &mut self.near);
         let limit = self.speed(place, before);
         let (path, shares) = (&self.limits.path, self.shares);
         let by_places = shares.by_places();
@@ -78,7 +77,7 @@ impl<'a, 'm, const N: usize, M: Mechanism<N>> AlongPath<'a, 'm, N, M> {
             if self.is_exact { [shares.acceleration, shares.jerk] } else { by_places };
         let (acceleration, jerk) = (acceleration * path.acceleration, jerk * path.jerk);
         let speed = if self.is_tool_free { f64::INFINITY } else { shares.speed * limit.speed };
-        let mut local = Local::new(speed, limit.source, jet.first.norm(), jerk);
+        let mut local = Local::new(speed, limit.source, tool.velocity.norm(), jerk);
         if !self.is_tool_free {
             tool_rows(derivatives(&tool), acceleration, jerk, rows);
         }

@@ -54,7 +54,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let smoothed_for = Some(fastest.min(top));
         let path = contour.trace(smoothed_for, &self.limits.path);
         let length = path.length();
-        let middle = |share: f64| path.at(length * share).motion(1.0, 0.0, 0.0);
+        let middle = |share: f64| path.tool(length * share, [1.0, 0.0, 0.0]);
         let mut wanted = match self.wanted(&path, &middle) {
             Ok(wanted) => wanted,
             Err(cause) => return self.in_parts(&contour, cause, draft),
@@ -113,7 +113,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         if self.limits.scope == Scope::PathAlone {
             return Ok(self.front.now);
         }
-        let first = path.at(0.0).motion(1.0, 0.0, 0.0);
+        let first = path.tool(0.0, [1.0, 0.0, 0.0]);
         if self.limits.mechanism.is_linear() {
             let start = self.joints_at(&first, &self.front.now)?;
             walk(&self.limits, start, &[middle])?.within(&self.limits)?;

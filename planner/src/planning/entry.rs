@@ -9,9 +9,8 @@ use super::Planning;
 use super::path_run::PathRun;
 use super::run_in_out::{FAR_BEYOND, FOLLOW_TRIALS, Unfit, state};
 use crate::drawing::Turns;
-use crate::geometry::jet::Jet;
 use crate::joint_space::configuration::{Configuration, PathFunction, Refused, candidates, walk};
-use crate::joint_space::follow_flight::{follow_flight, tool};
+use crate::joint_space::follow_flight::follow_flight;
 use crate::law::End;
 use crate::law::flight::{DirectionLimit, Flight, FlightLimits, State};
 use crate::limits::motion_limits::Scope;
@@ -39,11 +38,11 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         middle: &PathFunction<'_>,
         shares: &Tightening,
     ) -> Result<Entry<N>, Refused> {
-        let first = run.path.at(0.0);
+        let first = run.path.tool(0.0, [1.0, 0.0, 0.0]);
         let End::Moving { speed, .. } = run.begin else {
             return self.enter_from_rest(None, &first, middle, shares);
         };
-        let to = state(&first, speed);
+        let to = state(&run.path.tool(0.0, [speed, 0.0, 0.0]));
         let flown =
             (self.task.turns == Turns::Fly).then(|| self.fly(run, &to, middle, shares)).flatten();
         let is_linear = self.limits.mechanism.is_linear();
@@ -107,7 +106,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     fn enter_from_rest(
         &self,
         to: Option<&State>,
-        first: &Jet,
+        first: &ToolMotion,
         middle: &PathFunction<'_>,
         shares: &Tightening,
     ) -> Result<Entry<N>, Refused> {
@@ -118,17 +117,16 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             motions.push((flight.duration(), Motion::Flight(Arc::new(flight))));
             router.now = end;
         }
-        let still = first.motion(1.0, 0.0, 0.0);
         let Some(to) = to else {
-            let approach = router.approach(&still, &[middle])?;
+            let approach = router.approach(first, &[middle])?;
             motions.extend(approach.motion);
-            let start = self.joints_at(&still, &approach.start)?;
+            let start = self.joints_at(first, &approach.start)?;
             return Ok(Entry { motions, start });
         };
-        let near = self.joints_at(&still, &self.wanted_near(&still, &router.now)?)?;
+        let near = self.joints_at(first, &self.wanted_near(first, &router.now)?)?;
         let run_in = self.run_in(to, &near, shares);
         let run_in = run_in.ok_or(Refused::NoConfiguration { tried: FOLLOW_TRIALS })?;
-        let into = |share: f64| tool(&run_in, run_in.duration() * share);
+        let into = |share: f64| run_in.tool(run_in.duration() * share);
         let approach = router.approach(&into(0.0), &[&into, middle])?;
         motions.extend(approach.motion);
         let end = if self.limits.scope == Scope::PathAlone {
@@ -136,7 +134,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         } else {
             walk(&self.limits, approach.start, &[&into])?.end
         };
-        let start = self.joints_at(&still, &end)?;
+        let start = self.joints_at(first, &end)?;
         motions.push((run_in.duration(), Motion::Flight(Arc::new(run_in))));
         Ok(Entry { motions, start })
     }

@@ -11,7 +11,11 @@ use crate::light::Policy;
 /// it begins.
 pub(super) fn leaves_speeds_open(job: &Job) -> bool {
     let is_open = |step: &Step| {
-        let Action::Mark { speed, power, .. } = &step.action else { return false };
+        let (speed, power) = match &step.action {
+            Action::Mark { speed, power, .. } => (*speed, power),
+            Action::Follow { power, .. } => (None, power),
+            _ => return false,
+        };
         speed.is_none() && job.marking.policy(power) == Policy::Constant
     };
     match job.marking.speed {

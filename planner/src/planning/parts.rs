@@ -75,11 +75,11 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let (contour, left_out) = run.contour.followed_by(run.at, next);
         let path = contour.trace(run.smoothed_for, &self.limits.path);
         let near = run.trail.partition_point(|(at, _)| *at <= left_out).max(1) - 1;
-        let tool = path.at(0.0).motion(1.0, 0.0, 0.0);
+        let tool = path.tool(0.0, [1.0, 0.0, 0.0]);
         let start = self.joints_at(&tool, &run.trail[near].1).ok()?;
         let trail = trail(&self.limits, &start, &path).ok()?;
         let within = |(_, now): &(f64, Configuration<N>)| self.is_within_travel(now);
-        let end = path.end().motion(1.0, 0.0, 0.0);
+        let end = path.end_tool([1.0, 0.0, 0.0]);
         let end = self.joints_at(&end, &trail.last()?.1).ok()?;
         if !trail.iter().all(within) || !self.is_within_travel(&end) {
             return None;

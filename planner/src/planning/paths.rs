@@ -81,7 +81,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         self.halt(draft)?;
         let path = contour.trace(None, &self.limits.path);
         let length = path.length();
-        let along = |share: f64| path.at(length * share).motion(1.0, 0.0, 0.0);
+        let along = |share: f64| path.tool(length * share, [1.0, 0.0, 0.0]);
         let first = along(0.0);
         let found = self.router(draft.shares).approach(&first, &[&along]);
         let approach = match found {

@@ -78,6 +78,7 @@ pub(super) fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
                 Track::new(curve).sample(CHORD, &mut points);
                 points
             }
+            Action::Follow { path, .. } => path.points(CHORD),
             Action::Rapid { to } => vec![(*to).into()],
             _ => return None,
         };

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use machine::Mechanism;
+use machine::kinematics::ToolMotion;
 
 use super::path_run::PathRun;
 use super::{Draft, Planning};
 use crate::error::PlanError;
-use crate::geometry::jet::Jet;
 use crate::joint_space::configuration::{Configuration, Refused};
 use crate::joint_space::directions::{Parts, directions};
-use crate::joint_space::follow_flight::{Followed, follow_flight, tool};
+use crate::joint_space::follow_flight::{Followed, follow_flight};
 use crate::law::flight::{DirectionLimit, Flight, FlightLimits, State};
 use crate::limits::limit_id::JointLimit;
 use crate::limits::motion_limits::Scope;
@@ -63,12 +63,12 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         if self.limits.scope == Scope::PathAlone {
             return true;
         }
-        let end = run.path.end();
-        let tool = end.motion(1.0, 0.0, 0.0);
+        let tool = run.path.end_tool([1.0, 0.0, 0.0]);
         let Ok(now) = self.joints_at(&tool, &run.trail[run.trail.len() - 1].1) else {
             return false;
         };
-        self.run_out(&state(&end, speed), &now, &shares.with_reserve()).is_some()
+        self.run_out(&state(&run.path.end_tool([speed, 0.0, 0.0])), &now, &shares.with_reserve())
+            .is_some()
     }
 
     /// The tool's limits in a flight.
@@ -182,15 +182,19 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         for step in (0..STEPS).rev() {
             let time = flight.duration() * f64::from(step) / f64::from(STEPS);
             let motion =
-                self.limits.follow(&tool(flight, time), &mut now.branch, &now.joints).ok()?;
+                self.limits.follow(&flight.tool(time), &mut now.branch, &now.joints).ok()?;
             now.joints = motion.position;
         }
         Some(now)
     }
 }
 
-/// The tool's state at a place of a path that is passed at an even speed [m/s].
-pub(super) fn state(jet: &Jet, speed: f64) -> State {
-    let tool = jet.motion(speed, 0.0, 0.0);
-    State { position: tool.position, velocity: tool.velocity, acceleration: tool.acceleration }
+/// The state of a tool in motion.
+pub(super) fn state(tool: &ToolMotion) -> State {
+    State {
+        position: tool.position,
+        velocity: tool.velocity,
+        acceleration: tool.acceleration,
+        rotation: tool.attitude.rotation,
+    }
 }

@@ -39,7 +39,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         for look in 0..=TAIL_SAMPLES {
             let time = begin + TAIL * f64::from(look) / f64::from(TAIL_SAMPLES);
             let now = law.at(time.max(0.0));
-            let tool = run.path.at(now.position).motion(now.velocity, now.acceleration, now.jerk);
+            let rates = [now.velocity, now.acceleration, now.jerk];
+            let tool = run.path.tool(now.position, rates);
             let speed = limit_at(&run.speeds, now.position).speed;
             let used = [
                 tool.velocity.norm() / speed,

@@ -97,11 +97,11 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
 
     /// Ends a path: the joints are where it ends, at rest or moving at `speed` [m/s].
     fn leave(&mut self, run: &PathRun<N>, speed: f64) -> Result<(), PlanError> {
-        let end = run.path.end();
-        let tool = end.motion(1.0, 0.0, 0.0);
+        let tool = run.path.end_tool([1.0, 0.0, 0.0]);
         let now = self.joints_at(&tool, &run.trail[run.trail.len() - 1].1);
         self.front.now = now.map_err(|cause| self.refusal(cause))?;
-        self.front.moving = (run.exit != End::Rest).then(|| state(&end, speed));
+        self.front.moving =
+            (run.exit != End::Rest).then(|| state(&run.path.end_tool([speed, 0.0, 0.0])));
         Ok(())
     }
 }

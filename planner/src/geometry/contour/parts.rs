@@ -1,10 +1,13 @@
 //! Contours in parts: what lies between two places, and a long one piece by piece.
 
+use std::sync::Arc;
+
 use machine::PathLimits;
 
 use super::{Contour, Demand, GAP};
 use crate::geometry::blend::Blend;
 use crate::geometry::track::Track;
+use crate::geometry::turning::Turning;
 
 /// Share of a curve that is not left as a part of its own where a line is divided.
 const SLIVER: f64 = 0.1;
@@ -34,7 +37,13 @@ impl Contour {
             }
         }
         // What begins where this does goes on as it does.
-        part.map(|part| Self { joint: self.joint.clone().filter(|_| from <= GAP), ..part })
+        let turning = self.turning_from(from);
+        let joint = self.joint.clone().filter(|_| from <= GAP);
+        part.map(|part| Self { joint, turning, ..part })
+    }
+
+    fn turning_from(&self, place: f64) -> Option<(Arc<Turning>, f64)> {
+        self.turning.as_ref().map(|(turning, from)| (turning.clone(), from + place))
     }
 
     fn demands_between(&self, from: f64, to: f64) -> Vec<Demand> {
@@ -76,7 +85,8 @@ impl Contour {
         let joint = self.blends.pop()?;
         let (track, start) = (self.tracks.pop()?, self.starts.pop()?);
         let demands = self.demands_between(start, self.length);
-        let next = Self { joint: Some(joint), ..Self::new(track, &demands, self.policy) };
+        let turning = self.turning_from(start);
+        let next = Self { joint: Some(joint), turning, ..Self::new(track, &demands, self.policy) };
         let first = self.demands.partition_point(|demand| demand.from < start - GAP);
         self.demands.truncate(first);
         self.is_lit = self.demands.iter().any(|demand| demand.power > 0.0);
@@ -102,6 +112,7 @@ impl Contour {
             bend: self.bend,
             weight: self.tracks[first..].iter().map(Track::weight).sum(),
             is_lit: self.is_lit,
+            turning: self.turning_from(left_out),
         };
         for (index, track) in next.tracks.iter().enumerate() {
             let blend = match index.checked_sub(1) {

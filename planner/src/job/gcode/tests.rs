@@ -56,6 +56,7 @@ fn check_sound(program: &Program, input: &str) {
                 assert!(time > 0.0, "{step:?}\n{input}");
                 continue;
             }
+            Action::Follow { .. } => panic!("no program has poses"),
             Action::Output { .. } | Action::Pause | Action::Corners(_) => continue,
         };
         if let Curve::Arc { centre, major, .. } = curve {

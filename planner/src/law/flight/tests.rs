@@ -93,7 +93,7 @@ fn state(random: &mut SplitMix64, flat: bool, limits: &FlightLimits) -> State {
     let part = if kind == 3 { 1.0 } else { random.fraction() };
     // On a line the jerk is at least a²/v.
     let top = limits.acceleration.min(0.7 * (limits.jerk * velocity.norm()).sqrt());
-    State { position, velocity, acceleration: across * top * part }
+    State { velocity, acceleration: across * top * part, ..State::rest(position) }
 }
 
 #[test]
