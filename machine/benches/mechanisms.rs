@@ -198,6 +198,9 @@ fn spatial(criterion: &mut Criterion) {
     measure(criterion, "serial, six joints", six_joints(), [0.3, -1.0, 1.0, 0.4, 1.0, 0.2]);
     let platform = TriPlanar {
         side: 0.2,
+        struts: [[0.2; 2]; 3],
+        mounting: None,
+        home: None,
         stator: [[-0.5, 0.5], [-0.4, 0.4]],
         inductor: 0.08,
         gap: 0.005,

@@ -289,6 +289,9 @@ fn a_wrench_loads_every_foot_of_the_platform() {
         let fold = |mode: f64| if mode > 0.0 { Fold::Outward } else { Fold::Inward };
         let mechanism = TriPlanar {
             side: value("side"),
+            struts: [[value("side"); 2]; 3],
+            mounting: None,
+            home: None,
             stator: [[-0.6, 0.6]; 2],
             inductor: 0.02,
             gap: 0.005,

@@ -8,7 +8,7 @@ use machine::Mechanism;
 use machine::kinematics::{
     Attitude, Branch, JointMotion, Joints, KinematicsError, Pose, ToolMotion,
 };
-use machine::mechanisms::tri_planar::{Fold, Legs, TriPlanar, TriPlanarBranch};
+use machine::mechanisms::tri_planar::{Fold, Legs, Mounting, TriPlanar, TriPlanarBranch};
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 use serde_json::Value;
 use support::{Random, golden, number};
@@ -24,6 +24,9 @@ fn matrix(value: &Value) -> Matrix3<f64> {
 fn mechanism(params: &Value) -> TriPlanar {
     TriPlanar {
         side: number(&params["a"]),
+        struts: [[number(&params["a"]); 2]; 3],
+        mounting: None,
+        home: None,
         stator: [list(&params["stator"][0]), list(&params["stator"][1])],
         inductor: number(&params["inductor"]),
         gap: number(&params["gap"]),
@@ -278,9 +281,51 @@ fn any_pose(random: &mut Random, height: f64, tilt: f64) -> Pose {
     Pose { position, rotation: (yaw * lean).into_inner() }
 }
 
+/// The same as built: legs that are not as drawn, a stator that stands askew, and a tool off the centroid.
+fn as_built(drawn: &TriPlanar) -> TriPlanar {
+    let frame = |position: [f64; 3], [roll, pitch, yaw]: [f64; 3]| Pose {
+        position: position.into(),
+        rotation: Rotation3::from_euler_angles(roll, pitch, yaw).into_inner(),
+    };
+    let off = [[0.4e-3, -0.7e-3], [1.1e-3, 0.2e-3], [-0.9e-3, 0.6e-3]];
+    TriPlanar {
+        struts: off.map(|pair| pair.map(|off| drawn.side + off)),
+        mounting: Some(Mounting {
+            base: frame([1.3e-3, -0.8e-3, 0.5e-3], [4e-3, -7e-3, 0.02]),
+            tool: frame([2e-3, -1e-3, 15e-3], [0.01, 0.02, -0.3]),
+        }),
+        ..*drawn
+    }
+}
+
+#[test]
+fn a_platform_that_is_not_as_drawn_stands_as_it_was_measured() {
+    let mechanism = as_built(&mechanism(&golden("tri_planar")["params"]));
+    let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
+    let mut random = Random::new(0x0dd_ba11);
+    let mut count = 0;
+    while count < 500 {
+        let pose = any_pose(&mut random, height, 0.5);
+        let branch = TriPlanarBranch::default();
+        let Ok(q) = mechanism.inverse(&pose, branch, &at_rest()) else { continue };
+        let context = &format!("{pose:?}");
+        let measured = mechanism.measured_struts(&pose, &q);
+        for (found, wanted) in measured.iter().flatten().zip(mechanism.struts.iter().flatten()) {
+            near(*found, *wanted, 1e-14, context);
+        }
+        count += 1;
+    }
+}
+
 #[test]
 fn feet_and_pose_lead_to_each_other_over_the_working_range() {
-    let mechanism = mechanism(&golden("tri_planar")["params"]);
+    let drawn = mechanism(&golden("tri_planar")["params"]);
+    for mechanism in [as_built(&drawn), drawn] {
+        lead_to_each_other(&mechanism);
+    }
+}
+
+fn lead_to_each_other(mechanism: &TriPlanar) {
     let height = mechanism.side * 3.0_f64.sqrt() / 2.0;
     let mut random = Random::new(0x9e37_79b9_7f4a_7c15);
     let mut counts = [0; 2];
@@ -379,12 +424,18 @@ fn courses(mechanism: &TriPlanar, branch: TriPlanarBranch, count: usize) -> Vec<
 
 #[test]
 fn every_derivative_of_the_joints_is_that_of_the_one_below() {
-    let mechanism = mechanism(&golden("tri_planar")["params"]);
+    let drawn = mechanism(&golden("tri_planar")["params"]);
+    for mechanism in [as_built(&drawn), drawn] {
+        derivatives_hold(&mechanism);
+    }
+}
+
+fn derivatives_hold(mechanism: &TriPlanar) {
     let mixed = TriPlanarBranch::from(Legs([Fold::Outward, Fold::Inward, Fold::Outward]));
     for branch in [TriPlanarBranch::default(), mixed] {
-        for course in courses(&mechanism, branch, 200) {
+        for course in courses(mechanism, branch, 200) {
             let context = &format!("{branch:?} {:?}", course.tool);
-            let free = unlimited(&mechanism);
+            let free = unlimited(mechanism);
             let at = |time: f64| {
                 free.joint_motion(&course.later(time), branch, &at_rest()).expect(context)
             };
@@ -542,6 +593,7 @@ fn its_dynamics_are_those_of_an_independent_library() {
         let params = &machine["params"];
         let mechanism = TriPlanar {
             side: number(&params["side"]),
+            struts: [[number(&params["side"]); 2]; 3],
             platform_mass: number(&params["platform_mass"]),
             platform_inertia: list(&params["platform_inertia"]),
             leg_mass: number(&params["leg_mass"]),
@@ -606,7 +658,7 @@ fn inward_poses(mechanism: &TriPlanar, count: usize) -> Vec<(Pose, TriPlanarBran
 #[test]
 fn the_branch_of_the_inverse_leads_back_to_its_pose_with_legs_folded_inwards() {
     let mechanism = mechanism(&golden("tri_planar")["params"]);
-    let mut ambiguous = 0;
+    let (mut ambiguous, mut carried_on) = (0, 0);
     for (pose, branch, q) in inward_poses(&mechanism, 12_000) {
         let context = &format!("{branch:?}: {pose:?}");
         let known = mechanism.solve_at(&pose, &q, branch, None).expect(context);
@@ -633,11 +685,26 @@ fn the_branch_of_the_inverse_leads_back_to_its_pose_with_legs_folded_inwards() {
             }
             (Some(number), Ok(_)) => panic!("assembly {number} is not the only one: {context}"),
         }
+        // A machine that is known to stand near by at home carries its assembly on from there.
+        if named.assembly.is_some() {
+            let aside = Vector3::new(1e-3, -2e-3, 1e-3);
+            let beside = Pose { position: pose.position + aside, ..pose };
+            let free = TriPlanar { legs: branch.legs, ..unlimited(&mechanism) };
+            if let Ok(feet) = free.inverse(&beside, branch, &at_rest()) {
+                let home = free.standing_near(&feet, &beside);
+                assert!(home.is_some(), "{context}");
+                let built = TriPlanar { home, ..mechanism };
+                let carried = built.solve(&q, branch, None).expect(context);
+                same_pose(&built.pose(&carried), &pose, 1e-12, context);
+                carried_on += 1;
+            }
+        }
         // A solution near by goes on as it is, whichever it is.
         let near = mechanism.solve(&q, branch, Some(&known)).expect(context);
         same_pose(&mechanism.pose(&near), &pose, 1e-12, context);
     }
     assert!(ambiguous > 3, "only {ambiguous} of the poses are not the only ones");
+    assert!(carried_on > 3, "only {carried_on} of them have a home beside them");
 }
 
 /// Each number gives another pose on the same feet; beyond the last there is none.

@@ -44,7 +44,7 @@ pub const BOUNDS: &[Bounds] = &[
     row(&["ShaftTable.core_diameter", "ShaftTable.length", "SectionTable.spans", "LinkTable.length",
           "PolarTable.arm", "PolarTable.center_distance", "McmTable.tool", "FiveBarTable.half_base",
           "FiveBarTable.proximal", "FiveBarTable.distal", "PrrrpTable.link", "TriPlanarTable.side",
-          "TriPlanarTable.inductor"],
+          "TriPlanarTable.legs_length", "TriPlanarTable.inductor"],
         ["10 um", "100 m"], ["1 mm", "10 m"],
         "from parts of watches to the longest gantries"),
     row(&["ShaftTable.bore", "PolarTable.arm_center", "PolarTable.head_center",

@@ -58,6 +58,9 @@ fn the_platform_on_planar_motors_conforms() {
     for legs in [Legs::default(), mixed] {
         let mechanism = TriPlanar {
             side: 0.2,
+            struts: [[0.2; 2]; 3],
+            mounting: None,
+            home: None,
             stator: [[-0.5, 0.5], [-0.4, 0.4]],
             inductor: 0.08,
             gap: 0.005,

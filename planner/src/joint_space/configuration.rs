@@ -205,7 +205,8 @@ fn walk_noting<const N: usize, M: Mechanism<N>>(
         while at < 1.0 {
             let next = (at + step).min(1.0);
             let mut tried = branch;
-            let motion = limits.follow(&part(next), &mut tried, &joints)?;
+            let tool = part(next);
+            let motion = limits.follow(&tool, &mut tried, &joints)?;
             let change = motion.position - joints;
             if change.amax() > JUMP {
                 step /= 2.0;
@@ -220,7 +221,7 @@ fn walk_noting<const N: usize, M: Mechanism<N>>(
                 }
                 continue;
             }
-            let assembly = limits.solve(&motion.position, tried, near.as_ref())?;
+            let assembly = limits.solve_at(&tool, &motion.position, tried, near.as_ref())?;
             keeps_margins(mechanism, &assembly)?;
             near = Some(assembly);
             (joints, branch, at) = (motion.position, tried, next);

@@ -144,7 +144,7 @@ fn step<const N: usize, M: Mechanism<N>>(
         }
     }
     let mut look = || -> Result<Local, KinematicsError> {
-        let state = limits.solve(&motion.position, branch, None)?;
+        let state = limits.solve_at(tool, &motion.position, branch, None)?;
         keeps_margins(limits.mechanism, &state)?;
         rows.clear();
         let mut local = Local::new(f64::INFINITY, LimitId::RAPID, 1.0, f64::INFINITY);

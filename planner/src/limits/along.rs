@@ -87,7 +87,7 @@ impl<'a, 'm, const N: usize, M: Mechanism<N>> AlongPath<'a, 'm, N, M> {
         let after = self.trail.partition_point(|(at, _)| *at <= place);
         let Configuration { joints, mut branch } = self.trail[after.max(1) - 1].1;
         let motion = self.limits.follow(&tool, &mut branch, &joints)?;
-        let state = self.limits.solve(&motion.position, branch, None)?;
+        let state = self.limits.solve_at(&tool, &motion.position, branch, None)?;
         self.limits.joint_rows(&motion, &state, shares, &mut local, rows)?;
         Ok(local)
     }

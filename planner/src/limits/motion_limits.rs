@@ -53,6 +53,19 @@ impl<'a, const N: usize, M: Mechanism<N>> MotionLimits<'a, N, M> {
         configuration::follow(self.mechanism, &self.branches, &tool, branch, previous)
     }
 
+    /// The mechanism with the joints at `joints`, which bring the tool to where `tool` says, turned as the job
+    /// asks, on the branch with this number.
+    pub(crate) fn solve_at(
+        &self,
+        tool: &ToolMotion,
+        joints: &Joints<N>,
+        branch: usize,
+        near: Option<&M::ChainState>,
+    ) -> Result<M::ChainState, KinematicsError> {
+        let pose = self.attitude.apply(tool)?.pose();
+        self.mechanism.solve_at(&pose, joints, self.branches[branch], near)
+    }
+
     /// The mechanism with the joints at `joints` on the branch with this number.
     pub(crate) fn solve(
         &self,

@@ -303,3 +303,42 @@ fn poses_that_cannot_be_are_refused_at_their_line_with_what_would_be_right() {
     let both = format!("[path]\npoints = [[\"0 mm\", \"0 mm\"]]\nposes = [{level}, {leaning}]\n");
     assert!(read(&both, &platform).unwrap_err().contains("which path is not clear"));
 }
+
+/// The platform with all legs folded below it, at a height at which more than one pose closes them.
+fn folded() -> Machine {
+    let text = std::fs::read_to_string(Path::new(ROOT).join("machines/tri_planar.toml")).unwrap();
+    let text = text
+        .replace("inductor = \"80 mm\"", "inductor = \"40 mm\"\nlegs = [-1, -1, -1]")
+        .replace("clearance = \"20 mm\"", "clearance = \"10 mm\"")
+        .replace("type_1_margin = 0.15", "type_1_margin = 0.1")
+        .replace("type_2_margin = 0.05", "type_2_margin = 0.02")
+        .replace("z = [\"70 mm\", \"140 mm\"]", "z = [\"70 mm\", \"160 mm\"]")
+        .replace(
+            "home = [\"0 mm\", \"0 mm\", \"104 mm\"]",
+            "home = [\"0 mm\", \"0 mm\", \"138 mm\"]",
+        );
+    Machine::parse("folded.toml", &text, &[]).unwrap()
+}
+
+#[test]
+fn a_machine_whose_assembly_only_its_home_tells_is_planned() {
+    let machine = folded();
+    let machine::MechanismKind::TriPlanar(mechanism) = &machine.mechanism else { panic!() };
+    let home = Joints::<6>::from_fn(|axis, _| machine.home_joints[axis]);
+    let unknown = machine::mechanisms::tri_planar::TriPlanar { home: None, ..*mechanism };
+    let error = unknown.solve(&home, unknown.branch(), None).unwrap_err();
+    assert_eq!(error.code, "ambiguous_assembly");
+    let leaning = [
+        [-6.0, 0.0, -3.0, 1.0, 0.0, 0.0],
+        [0.0, 4.0, 0.0, 0.0, 1.0, 1.0],
+        [6.0, 0.0, 2.0, -1.0, 0.0, 0.0],
+    ];
+    for text in [
+        "[path.circle]\nradius = \"5 mm\"\n".to_owned(),
+        text(&leaning).replace("[path]", "[path]\nsmooth = true"),
+    ] {
+        let job = read(&format!("{text}[marking]\nspeed = \"10 mm/s\"\n"), &machine).unwrap();
+        let plan = plan(&machine, &job).unwrap_or_else(|error| panic!("{error}"));
+        hold_together(&machine, &plan);
+    }
+}

@@ -180,8 +180,12 @@ fn standing<const N: usize, M: Mechanism<N>>(
     diagnostics: &mut Diagnostics,
 ) -> Option<(Joints<N>, M::ChainState)> {
     let branch = mechanism.branch();
+    let level = Pose::at(Vector3::from(home));
     let solved = match &table.home_axes {
-        None => mechanism.inverse(&Pose::at(Vector3::from(home)), branch, &Joints::zeros()),
+        // The pose is known, and with it which way the chain closes.
+        None => mechanism
+            .inverse(&level, branch, &Joints::zeros())
+            .and_then(|q| Ok((q, mechanism.solve_at(&level, &q, branch, None)?))),
         Some(values) if values.len() == N => {
             for (value, (name, unit)) in values.iter().zip(names) {
                 unit.expect(value, name, diagnostics);
@@ -193,7 +197,8 @@ fn standing<const N: usize, M: Mechanism<N>>(
                     "keep one of them",
                 );
             }
-            Ok(Joints::from_fn(|row, _| values[row].value))
+            let q = Joints::from_fn(|row, _| values[row].value);
+            mechanism.solve(&q, branch, None).map(|chain| (q, chain))
         }
         Some(values) => {
             let span = values.first().map_or(table.span, |value| value.span);
@@ -205,8 +210,7 @@ fn standing<const N: usize, M: Mechanism<N>>(
             return None;
         }
     };
-    let found = solved.and_then(|q| Ok((q, mechanism.solve(&q, branch, None)?)));
-    found.map_err(|error| refuse_home(&error, table, diagnostics)).ok()
+    solved.map_err(|error| refuse_home(&error, table, diagnostics)).ok()
 }
 
 fn refuse_home(error: &KinematicsError, table: &MachineTable, diagnostics: &mut Diagnostics) {

@@ -142,7 +142,7 @@ fn link(table: &SerialLinkTable, context: &BuildContext<'_>, name: &str) -> Link
     }
 }
 
-fn frame(table: &FrameTable) -> Pose {
+pub(super) fn frame(table: &FrameTable) -> Pose {
     Pose {
         position: Vector3::from(table.position.map_or([0.0; 3], |point| point.value)),
         rotation: *Rotation3::from_euler_angles(

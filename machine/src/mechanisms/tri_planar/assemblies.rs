@@ -1,6 +1,6 @@
 //! All poses in which the platform can stand on one set of feet.
 //!
-//! Each corner is a side away from two feet, so it lies on a circle about the line between them,
+//! Each corner is a strut, as drawn a side, away from two feet, so it lies on a circle about the line between them,
 //! upright on the stator. Corner A anywhere on its circle leaves two places each for B and for C on
 //! theirs, and closes the platform where these two are a side apart. A scan along A's circle finds
 //! where that is so, and Newton's method ends there.
@@ -10,9 +10,9 @@ use core::cmp::Ordering;
 use messages::math;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
 
-use super::Legs;
 use super::chain_state::{Feet, Stance, stand};
 use super::struts::{State, Struts};
+use super::{HINGES, Legs};
 
 /// More than ever stand above the stator: the equations have sixteen solutions, in mirrored pairs.
 const MOST: usize = 8;
@@ -99,10 +99,16 @@ impl Circle {
     fn of(struts: &Struts<'_>, corner: usize) -> Option<Self> {
         let foot = |index: usize| Vector2::new(struts.feet[2 * index], struts.feet[2 * index + 1]);
         let [one, other] = FEET[corner].map(foot);
-        let (middle, apart) = ((one + other) / 2.0, other - one);
+        let [near, far] = FEET[corner].map(|index| {
+            let end = usize::from(HINGES[index][1] == corner);
+            struts.mechanism.struts[index][end]
+        });
+        let apart = other - one;
         let distance = apart.norm();
-        let side = struts.mechanism.side;
-        let square = side * side - distance * distance / 4.0;
+        // From the first foot along the line, in lines: half of it where both struts are alike.
+        let share = 0.5 + (near - far) * (near + far) / (2.0 * distance * distance);
+        let middle = one + apart * share;
+        let square = near * near - share * share * distance * distance;
         // Written so that what is not a number fails too.
         let crosses = distance > 0.0 && square > 0.0;
         crosses.then(|| Self {

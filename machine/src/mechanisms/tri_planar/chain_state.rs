@@ -5,14 +5,16 @@ use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector2, Ve
 
 use super::assemblies::Assemblies;
 use super::struts::{CLOSED, State, Struts, invert, struts};
-use super::{Fold, Legs, OUTWARD, TriPlanar, TriPlanarBranch};
+use super::{Fold, Legs, OUTWARD, Standing, TriPlanar, TriPlanarBranch};
 use crate::kinematics::{Jacobian, Joints, KinematicsError, Pose};
 
 /// A leg of a solved chain; vectors in the machine frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Leg {
-    /// From the platform's centroid to the hinge's middle [m].
+    /// From the platform's centroid to the hinge's middle, or to where the foot is beside it [m].
     pub(super) middle: Vector3<f64>,
+    /// From the hinge to the foot [m].
+    pub(super) height: f64,
     /// Unit vector along the hinge.
     pub(super) hinge: Vector3<f64>,
     /// Unit vector from the hinge's middle to the foot.
@@ -78,7 +80,7 @@ impl TriPlanarChainState {
     pub fn fold_angles(&self) -> [f64; 3] {
         self.legs.map(|leg| {
             let platform = self.rotation.column(2);
-            let outward = leg.middle.normalize();
+            let outward = platform.cross(&leg.hinge);
             math::atan2(-leg.shank.dot(&platform), leg.shank.dot(&outward))
         })
     }
@@ -252,7 +254,7 @@ fn search(feet: &Feet<'_>, branch: TriPlanarBranch) -> Result<Stance, Kinematics
     match (found.count(), branch.assembly) {
         (0, _) => Err(missing()),
         (1, None) => found.get(0).ok_or_else(missing),
-        (count, None) => Err(KinematicsError {
+        (count, None) => carried(feet, branch.legs).ok_or(KinematicsError {
             code: "ambiguous_assembly",
             axis: None,
             value: count as f64,
@@ -270,6 +272,31 @@ fn search(feet: &Feet<'_>, branch: TriPlanarBranch) -> Result<Stance, Kinematics
             })
         }
     }
+}
+
+/// The stance on the feet to which the one at home leads while they go there straight.
+fn carried(feet: &Feet<'_>, legs: Legs) -> Option<Stance> {
+    /// Steps of the way.
+    const STEPS: u32 = 64;
+    let mechanism = feet.equations.mechanism;
+    let Standing { joints, platform, .. } =
+        mechanism.home.as_ref().filter(|home| home.legs == legs)?;
+    let to = Joints::from_fn(|row, _| feet.equations.feet[row] + feet.centroid[row % 2]);
+    let rotation = Rotation3::from_matrix_unchecked(platform.rotation);
+    let mut attitude = UnitQuaternion::from_rotation_matrix(&rotation);
+    let mut position = platform.position;
+    for step in 1..=STEPS {
+        let share = f64::from(step) / f64::from(STEPS);
+        let here = Feet::of(mechanism, &(joints + (to - joints) * share));
+        let state = State { position: position - here.centroid, attitude };
+        let found = here.equations.solve(state)?;
+        if found.attitude.coords.dot(&attitude.coords).abs() <= NEARBY {
+            return None;
+        }
+        stand(&here, &found, legs)?;
+        (position, attitude) = (here.position(&found), found.attitude);
+    }
+    stand(feet, &State { position: position - feet.centroid, attitude }, legs)
 }
 
 /// The branch of a solved chain, its assembly numbered where it is not the only one.
@@ -302,18 +329,18 @@ fn no_assembly(residual: f64) -> KinematicsError {
 /// The leg `index` of a solved pose.
 #[inline]
 fn leg(equations: &Struts<'_>, state: &State, rotation: &Matrix3<f64>, index: usize) -> Leg {
-    let height = equations.mechanism.height();
+    let (beside, height) = equations.mechanism.shape(index);
     let [x, y] = OUTWARD[index];
     let outward: Vector3<f64> = rotation.column(0) * x + rotation.column(1) * y;
-    let middle = outward * (height / 3.0);
     let hinge = outward.cross(&rotation.column(2));
+    let middle = outward * (equations.mechanism.height() / 3.0) + hinge * beside;
     let foot = Vector3::new(equations.feet[2 * index], equations.feet[2 * index + 1], 0.0);
     let arm = foot - state.position;
     let shank = (arm - middle) / height;
     let normal = hinge.cross(&shank);
     // The foot's velocity along z, v_z + (Ω×arm)_z + h·turn·normal_z, is none.
     let turn = SVector::from([0.0, 0.0, 1.0, arm.y, -arm.x, 0.0]) / (-height * normal.z);
-    Leg { middle, hinge, shank, normal, turn }
+    Leg { middle, height, hinge, shank, normal, turn }
 }
 
 /// The stance of a solved pose, if it is one that the machine can stand in: see [`find`].

@@ -2,7 +2,8 @@
 //!
 //! Everything is gathered at the platform's twist and then seen from the feet through the
 //! Jacobian. With the platform's twist V, a leg turns at `turn·V` about its hinge besides. The mass
-//! matrix is that of the composite body; the bias is Newton's and Euler's, body by body.
+//! matrix is that of the composite body; the bias is Newton's and Euler's, body by body. Legs that are
+//! not quite as drawn keep their thin triangles, and a base that leans its vertical.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -42,7 +43,6 @@ pub(super) fn mass_matrix(
     mechanism: &TriPlanar,
     chain: &TriPlanarChainState,
 ) -> SMatrix<f64, 6, 6> {
-    let third = mechanism.height() / 3.0;
     let plate = mechanism.leg_inertia();
     let rotation = &chain.rotation;
 
@@ -54,6 +54,7 @@ pub(super) fn mass_matrix(
         rotation * Matrix3::from_diagonal(&Vector3::new(x, y, z)) * rotation.transpose();
     let mut mass = SMatrix::<f64, 6, 6>::zeros();
     for leg in &chain.legs {
+        let third = leg.height / 3.0;
         let center = leg.middle + leg.shank * third;
         let lever = center * mechanism.leg_mass;
         moment += lever;
@@ -131,7 +132,6 @@ pub(super) fn bias(
     chain: &TriPlanarChainState,
     velocity: &Joints<6>,
 ) -> Joints<6> {
-    let third = mechanism.height() / 3.0;
     let plate = mechanism.leg_inertia();
     let platform = chain.jacobian * velocity;
     let spin = platform.fixed_rows::<3>(3).into_owned();
@@ -140,6 +140,7 @@ pub(super) fn bias(
     let mut drift = Joints::zeros();
     let mut carry = |index: usize| {
         let leg = &chain.legs[index];
+        let third = leg.height / 3.0;
         let rate = leg.turn.dot(&platform);
         let turning = spin + leg.hinge * rate;
         let carried = spin.cross(&leg.hinge) * rate;
@@ -163,6 +164,7 @@ pub(super) fn bias(
         + local.cross(&local.component_mul(&inertia));
     let mut effort = twist(&(linear * mechanism.platform_mass), &(chain.rotation * torque));
     for (leg, own) in chain.legs.iter().zip(&carried) {
+        let third = leg.height / 3.0;
         let turn = own.turn + leg.turn.dot(&platform);
         let center = leg.middle + leg.shank * third;
         let acceleration = linear

@@ -27,7 +27,8 @@ pub(super) fn feet<S: Scalar>(
     Ok(joints)
 }
 
-/// The foot is `m + h·(e·cos ω − n·sin ω)`: m the hinge's middle, e the unit vector from the
+/// The foot is `m + h·(e·cos ω − n·sin ω)`: m the hinge's middle, or for a leg that is not as drawn the
+/// place on the hinge that is nearest to the foot, e the unit vector from the
 /// platform's centroid to it, n the platform's normal, and ω the turn from the platform's own
 /// plane, downwards. It lies in the stator plane where `cos(ω − φ) = k`, with
 /// `φ = atan2(n_z, −e_z)` and `k = m_z/(h·ρ)`, `ρ = √(n_z² + e_z²)`.
@@ -42,11 +43,20 @@ fn foot<S: Scalar>(
     branch: Legs,
     leg: usize,
 ) -> Result<[S; 2], KinematicsError> {
-    let height = mechanism.height();
+    let (beside, height) = mechanism.shape(leg);
     let [along, across] = OUTWARD[leg];
     let e = rotation.map(|row| row[0] * along + row[1] * across);
     let n = rotation.map(|row| row[2]);
-    let middle = |axis: usize| position[axis] + e[axis] * (height / 3.0);
+    let out = mechanism.height() / 3.0;
+    let mut foot_of_hinge: [S; 3] = core::array::from_fn(|axis| position[axis] + e[axis] * out);
+    if beside != 0.0 {
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
+            (e[next] * n[last] - e[last] * n[next]) * beside
+        });
+        foot_of_hinge = [foot_of_hinge[0] + x, foot_of_hinge[1] + y, foot_of_hinge[2] + z];
+    }
+    let middle = |axis: usize| foot_of_hinge[axis];
 
     let rho = (n[2] * n[2] + e[2] * e[2]).sqrt();
     let k = middle(2) / (rho * height);

@@ -1,4 +1,4 @@
-//! The six struts of equal length between feet and corners, closed by Newton's method.
+//! The six struts between feet and corners, all a side long as drawn, closed by Newton's method.
 
 use messages::math;
 use nalgebra::{Matrix3, Quaternion, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
@@ -68,7 +68,7 @@ pub(super) struct Struts<'a> {
 }
 
 impl Struts<'_> {
-    /// How much each strut is too long, `(l² − a²)/2a²`.
+    /// How much each strut is too long, `(l² − d²)/2a²`, d being its length as measured.
     pub(super) fn residual(&self, state: &State) -> SVector<f64, 6> {
         let arms = self.mechanism.arms(state.attitude.to_rotation_matrix().matrix());
         let square = self.mechanism.side * self.mechanism.side;
@@ -78,7 +78,8 @@ impl Struts<'_> {
             let from_foot = state.position - foot;
             for (end, &corner) in hinges.iter().enumerate() {
                 let length = (from_foot + arms[corner]).norm_squared();
-                residual[2 * leg + end] = (length / square - 1.0) / 2.0;
+                let strut = self.mechanism.struts[leg][end];
+                residual[2 * leg + end] = (length / square - strut * strut / square) / 2.0;
             }
         }
         residual
