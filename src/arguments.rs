@@ -78,6 +78,14 @@ Examples:
 The file is written only if `graver check` has nothing to say of it and its sample is marked in
 simulation. What no motor can do is asked for less, and the file says so.";
 
+const CALIBRATE_EXAMPLES: &str = "\
+Examples:
+  graver calibrate poses.csv --machine mine.toml --out calibrated.toml
+  graver calibrate poses.csv --machine mine.toml --free legs,base
+
+poses.csv has the columns xD,yD,xE,yE,xF,yF (where the motors say the feet are) and x,y,z,qw,qx,qy,qz (the
+measured pose of the tool in the machine's frame), in metres, a pose a line.";
+
 const COMPARE_EXAMPLES: &str = "\
 Examples:
   graver compare                                    the four machines of source 003 on its letters
@@ -132,6 +140,9 @@ pub enum Command {
     /// Say what motor and gear each axis needs for a job, and choose them from catalogues.
     #[command(after_help = SIZE_EXAMPLES)]
     Size(SizeArguments),
+    /// Identify the leg lengths and the mounting of a tri-planar platform from measured poses.
+    #[command(after_help = CALIBRATE_EXAMPLES)]
+    Calibrate(CalibrateArguments),
     /// Draw figures of machines, motors and jobs: SVG, the numbers as CSV, and a page of them all.
     #[command(after_help = FIGURES_EXAMPLES)]
     Figures(FiguresArguments),
@@ -446,6 +457,37 @@ pub struct SizeArguments {
     /// Print one JSON object on stdout.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `calibrate`.
+#[derive(Debug, Clone, Args)]
+pub struct CalibrateArguments {
+    /// The measured poses: a CSV file with a header.
+    pub measurements: PathBuf,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub machine: MachineArguments,
+    /// What to identify: any of legs, base (where the stator stands) and tool (where the measured point is on
+    /// the platform). The rest stays as the machine file has it.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "legs,base,tool")]
+    pub free: Vec<CalibratePart>,
+    /// Write the machine file with what was identified.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What `calibrate` identifies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CalibratePart {
+    /// The lengths of the legs.
+    Legs,
+    /// Where the stator stands.
+    Base,
+    /// Where the measured point is on the platform.
+    Tool,
 }
 
 /// What makes one motor smaller than another.

@@ -1,6 +1,7 @@
 //! One file for each command, or family of commands.
 
 pub mod bench;
+pub mod calibrate;
 pub mod check;
 pub mod compare;
 pub mod export;

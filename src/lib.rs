@@ -15,8 +15,8 @@ pub mod pipeline;
 use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
-    bench, check, compare, export, figures, kinematics, machine, manual, operator, plan, run,
-    service, simulate, size, tables, verify,
+    bench, calibrate, check, compare, export, figures, kinematics, machine, manual, operator, plan,
+    run, service, simulate, size, tables, verify,
 };
 use exit::{Exit, Failure};
 use pipeline::operators::Verb;
@@ -45,6 +45,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Kinematics(arguments) => kinematics::run(arguments),
         Command::Export(arguments) => export::run(arguments),
         Command::Size(arguments) => size::run(arguments),
+        Command::Calibrate(arguments) => calibrate::run(arguments),
         Command::Figures(arguments) => figures::run(arguments),
         Command::Machine(MachineCommand::New(arguments)) => machine::new(arguments),
         Command::Bench(BenchCommand::Latency(arguments)) => bench::latency(arguments),
@@ -81,6 +82,7 @@ fn wants_json(command: &Command) -> bool {
         Command::Plan(arguments) => arguments.json,
         Command::Check(arguments) => arguments.json,
         Command::Size(arguments) => arguments.json,
+        Command::Calibrate(arguments) => arguments.json,
         Command::Figures(arguments) => arguments.json,
         Command::Machine(MachineCommand::New(arguments)) => arguments.json,
         Command::Submit(arguments) => arguments.instance.json,

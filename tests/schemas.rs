@@ -19,6 +19,7 @@ use graver::pipeline::status::Status;
 use monitor::summary::Summary;
 use schemars::{Schema, schema_for};
 use support::{Place, assert_valid, lines};
+use workbench::calibrate::CalibrationReport;
 use workbench::compare::Comparison;
 use workbench::size::report::SizeReport;
 use workbench::thesis::TablesReport;
@@ -26,6 +27,7 @@ use workbench::thesis::TablesReport;
 /// The schemas by the name of their file.
 fn schemas() -> Vec<(&'static str, Schema)> {
     vec![
+        ("calibrate", schema_for!(CalibrationReport)),
         ("check", schema_for!(CheckReport)),
         ("compare", schema_for!(Comparison)),
         ("figures", schema_for!(FiguresReport)),

@@ -114,8 +114,8 @@ pub(crate) fn catalogue(names: &[String]) -> Result<(Catalogue, Vec<PathBuf>), F
     Ok((all, files))
 }
 
-/// Writes the machine file with what was chosen to `out`; its sample job is named from there.
-fn write_machine(
+/// Writes the machine file with what was found to `out`; its sample job is named from there.
+pub(super) fn write_machine(
     input: &MachineInput,
     machine: &str,
     out: &Path,

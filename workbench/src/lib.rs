@@ -3,6 +3,7 @@
 //! It plans and simulates with the stages that run the machine, and looks at what they did. Nothing here is
 //! on the real-time path.
 
+pub mod calibrate;
 pub mod catalogue;
 pub mod compare;
 pub mod figures;

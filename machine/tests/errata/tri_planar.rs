@@ -12,6 +12,9 @@ const ROOT_3: f64 = 1.732_050_807_568_877_2;
 fn machine() -> TriPlanar {
     TriPlanar {
         side: SIDE,
+        struts: [[SIDE; 2]; 3],
+        mounting: None,
+        home: None,
         stator: [[-1e3, 1e3]; 2],
         inductor: 0.08,
         gap: -1.0,
