@@ -39,7 +39,7 @@ pub enum MechanismKind {
     /// A rotary arm over a rotary table, with a vertical axis.
     Polar(Polar),
     /// A platform on three legs with planar motors as feet.
-    TriPlanar(TriPlanar),
+    TriPlanar(Box<TriPlanar>),
     /// Two arms whose forearms meet in the tool.
     FiveBar(FiveBar),
     /// Two carts on one rail, with a link each to the tool.
@@ -89,7 +89,7 @@ impl MechanismKind {
             Self::CoreXy(mechanism) => visitor.visit(*mechanism),
             Self::Mcm(mechanism) => visitor.visit(*mechanism),
             Self::Polar(mechanism) => visitor.visit(*mechanism),
-            Self::TriPlanar(mechanism) => visitor.visit(*mechanism),
+            Self::TriPlanar(mechanism) => visitor.visit(**mechanism),
             Self::FiveBar(mechanism) => visitor.visit(*mechanism),
             Self::Prrrp(mechanism) => visitor.visit(*mechanism),
             Self::TwinActuator(mechanism) => visitor.visit(*mechanism),

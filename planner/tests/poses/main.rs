@@ -325,7 +325,7 @@ fn a_machine_whose_assembly_only_its_home_tells_is_planned() {
     let machine = folded();
     let machine::MechanismKind::TriPlanar(mechanism) = &machine.mechanism else { panic!() };
     let home = Joints::<6>::from_fn(|axis, _| machine.home_joints[axis]);
-    let unknown = machine::mechanisms::tri_planar::TriPlanar { home: None, ..*mechanism };
+    let unknown = machine::mechanisms::tri_planar::TriPlanar { home: None, ..**mechanism };
     let error = unknown.solve(&home, unknown.branch(), None).unwrap_err();
     assert_eq!(error.code, "ambiguous_assembly");
     let leaning = [

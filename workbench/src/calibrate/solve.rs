@@ -132,7 +132,8 @@ pub(super) fn solve(
             is_told.then(|| {
                 let sum: f64 = (0..values.len())
                     .filter(|index| told(*index))
-                    .map(|index| (vectors[(index, unknown)] / values[index]).powi(2))
+                    .map(|index| vectors[(index, unknown)] / values[index])
+                    .map(|part| part * part)
                     .sum();
                 (variance * sum).sqrt()
             })

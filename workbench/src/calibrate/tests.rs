@@ -16,7 +16,7 @@ fn machine() -> Machine {
 
 fn platform(machine: &Machine) -> TriPlanar {
     let MechanismKind::TriPlanar(mechanism) = &machine.mechanism else { panic!() };
-    *mechanism
+    **mechanism
 }
 
 fn frame(position: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pose {
@@ -123,7 +123,7 @@ fn with_a_known_tool_the_lengths_come_out_within_two_micrometres() {
     let mechanism = platform(&machine);
     let mounting = Mounting { base: frame([0.0; 3], [0.0; 3]), tool: known };
     machine.mechanism =
-        MechanismKind::TriPlanar(TriPlanar { mounting: Some(mounting), ..mechanism });
+        MechanismKind::TriPlanar(Box::new(TriPlanar { mounting: Some(mounting), ..mechanism }));
     for seed in 1..=5 {
         let measurements = measured(40, 1e-6, [0.25, 0.025], 100 + seed);
         let free = [Part::Legs, Part::Base];

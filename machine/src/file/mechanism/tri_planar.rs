@@ -127,5 +127,5 @@ pub(super) fn build(
     }
     mechanism.elasticity = elasticity;
     mechanism.home = standing;
-    Some(Built { mechanism: MechanismKind::TriPlanar(mechanism), joints, home })
+    Some(Built { mechanism: MechanismKind::TriPlanar(Box::new(mechanism)), joints, home })
 }
