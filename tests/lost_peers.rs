@@ -3,20 +3,17 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod chain;
+
 use std::path::Path;
 
-use controller::{Controller, Inputs, Outputs, Peers, Presence};
-use drives::{Bridge, BridgeOptions, Deadlines, GatePermission, PlantOptions, SimulatedPlant};
+use chain::{Chain, START};
+use controller::{Peers, Presence};
+use drives::GatePermission;
 use machine::Machine;
-use messages::time::CYCLE_PERIOD;
-use messages::{
-    CommandMode, ControllerState, FaultCode, Nanoseconds, OperatorRequest, OperatorVerb, Setpoint,
-};
+use messages::{CommandMode, ControllerState, FaultCode};
 use planner::job::Job;
 use planner::{Plan, plan};
-
-/// The cycle in which the job starts.
-const START: u64 = 100;
 
 /// The largest distance of an axis from its reference while the loops or the pulses hold it [m or rad],
 /// and the fastest that one moved in the cycle of the death [m/s or rad/s].
@@ -29,37 +26,19 @@ struct Rest {
 /// cycles later, and on until the machine has faulted.
 fn play(machine: &Machine, plan: &Plan, death: u64, late: u64, lost: (Peers, FaultCode)) -> Rest {
     let case = format!("{}, {:?} at {death}, {late} late", machine.name, lost.1);
-    let mut setpoints = plan.setpoints(1);
-    let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
-    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
-    let mut bridge = Bridge::new(port, options);
-    let mut controller = Controller::new(machine);
-    let mut outputs = Outputs::default();
-    let (mut deadline, mut rest) = (Nanoseconds(0), Rest { off: 0.0, speed: 0.0 });
+    let mut chain = Chain::new(machine, plan);
+    let mut rest = Rest { off: 0.0, speed: 0.0 };
     for step in 1..death + 3000 {
-        deadline = deadline + CYCLE_PERIOD;
         if step >= death {
-            bridge.permit(GatePermission::Inhibited);
+            chain.bridge.permit(GatePermission::Inhibited);
+            chain.is_fed = false;
         }
-        bridge.begin(deadline, deadline);
-        let feedback = *bridge.feedback();
+        let feedback = chain.begin();
         // The light of a cycle is measured at its end.
         assert!(step <= death || !feedback.laser.is_lit(), "{case}: lit in {step}");
-        let verb = match step {
-            2 => Some((OperatorVerb::Enable, 0.0)),
-            START => Some((OperatorVerb::Start, 1.0)),
-            _ => None,
-        };
-        let request =
-            verb.map(|(verb, value)| OperatorRequest { verb: verb as u32, ticket: 1, value });
-        let room = if step > START && step < death { controller.room().min(16) } else { 0 };
-        let batch: Vec<Setpoint> = setpoints.by_ref().take(room).collect();
         let peers = if step < death + late { Peers::default() } else { lost.0 };
-        let inputs =
-            Inputs { feedback: &feedback, received: deadline, setpoints: &batch, request, peers };
-        controller.step(deadline, &inputs, &mut outputs);
-        bridge.latch(&outputs.command, deadline);
-        bridge.finish(deadline);
+        chain.finish(&feedback, None, peers);
+        let outputs = &chain.outputs;
         let axes = || machine.axes.iter().enumerate();
         if step == death {
             let speeds = axes().map(|(index, axis)| (feedback.velocity[index] * axis.ratio).abs());
@@ -78,7 +57,7 @@ fn play(machine: &Machine, plan: &Plan, death: u64, late: u64, lost: (Peers, Fau
             return rest;
         }
     }
-    panic!("{case}: {:?}", outputs.command.state());
+    panic!("{case}: {:?}", chain.outputs.command.state());
 }
 
 #[test]

@@ -3,14 +3,13 @@
 
 #![allow(clippy::unwrap_used)]
 
-use controller::{Controller, Inputs, Outputs, Peers};
-use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
+mod chain;
+
+use chain::{Chain, START};
+use controller::Peers;
 use machine::Machine;
 use messages::artwork::distance;
-use messages::time::CYCLE_PERIOD;
-use messages::{
-    ControllerReport, ControllerState, Nanoseconds, OperatorRequest, OperatorVerb, Setpoint,
-};
+use messages::{ControllerReport, ControllerState, OperatorVerb};
 use planner::job::Job;
 use planner::plan;
 
@@ -27,37 +26,18 @@ struct Played {
 fn play(machine: &Machine, requests: &[(u64, OperatorVerb, f64)]) -> Played {
     let job = Job::builtin(&[], machine).unwrap();
     let plan = plan(machine, &job).unwrap();
-    let mut setpoints = plan.setpoints(1);
-    let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
-    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
-    let mut bridge = Bridge::new(port, options);
-    let mut controller = Controller::new(machine);
-    let mut outputs = Outputs::default();
+    let mut chain = Chain::new(machine, &plan);
     let (mut lit, mut changing) = (0.0_f64, 0);
     let mut rate = 0.0;
-    let start = 100;
-    for cycle in 1..100_000_u64 {
-        let now = Nanoseconds(CYCLE_PERIOD.0 * cycle as i64);
-        bridge.begin(now, now);
-        let asked = match cycle {
-            2 => Some((OperatorVerb::Enable, 0.0)),
-            _ if cycle == start => Some((OperatorVerb::Start, 1.0)),
-            _ => requests
-                .iter()
-                .find(|(at, ..)| start + at == cycle)
-                .map(|(_, verb, value)| (*verb, *value)),
-        };
-        let request = asked.map(|(verb, value)| OperatorRequest {
-            verb: verb as u32,
-            ticket: cycle as u32,
-            value,
-        });
-        let room = if cycle > start { controller.room().min(16) } else { 0 };
-        let batch: Vec<Setpoint> = setpoints.by_ref().take(room).collect();
-        let feedback = bridge.feedback();
-        let peers = Peers::default();
-        let inputs = Inputs { feedback, received: now, setpoints: &batch, request, peers };
-        controller.step(now, &inputs, &mut outputs);
+    while chain.cycle < 100_000 {
+        let feedback = chain.begin();
+        let cycle = chain.cycle;
+        let asked = requests
+            .iter()
+            .find(|(at, ..)| START + at == cycle)
+            .map(|(_, verb, value)| (*verb, *value));
+        chain.finish(&feedback, asked, Peers::default());
+        let outputs = &chain.outputs;
         if let Some(reply) = outputs.reply {
             assert_eq!(reply.accepted, 1, "{asked:?} in cycle {cycle}");
         }
@@ -70,8 +50,6 @@ fn play(machine: &Machine, requests: &[(u64, OperatorVerb, f64)]) -> Played {
             }
         }
         rate = command.rate;
-        bridge.latch(&outputs.command, now);
-        bridge.finish(now);
         if let Some(report) = outputs.report.filter(|report| report.is_final == 1) {
             assert_eq!(outputs.command.state(), ControllerState::Idle);
             return Played { lit, changing, report };

@@ -3,18 +3,16 @@
 
 #![allow(clippy::unwrap_used)]
 
-use controller::{Controller, Inputs, Outputs, Peers};
-use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
+mod chain;
+
+use chain::Chain;
+use controller::Peers;
 use machine::Machine;
-use messages::time::CYCLE_PERIOD;
-use messages::{ControllerState, Nanoseconds, OperatorRequest, OperatorVerb, Setpoint};
+use messages::{ControllerState, OperatorVerb};
 use monitor::marks::{MarkEvaluator, Marks, StreamEnd};
 use monitor::recording::CycleRecord;
 use planner::job::Job;
 use planner::{Plan, plan};
-
-/// The cycle in which the job starts.
-const START: u64 = 100;
 
 /// What the ends of strokes are off by without any delay [m].
 const ACCURACY: f64 = 12e-6;
@@ -25,38 +23,19 @@ fn play(
     plan: &Plan,
     mut ask: impl FnMut(u64, bool) -> Option<(OperatorVerb, f64)>,
 ) -> Marks {
-    let mut setpoints = plan.setpoints(1);
-    let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
-    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
-    let mut bridge = Bridge::new(port, options);
-    let mut controller = Controller::new(machine);
-    let mut outputs = Outputs::default();
+    let mut chain = Chain::new(machine, plan);
     let mut evaluator = MarkEvaluator::new(&plan.artwork);
-    let (mut deadline, mut ended) = (Nanoseconds(0), None);
-    for step in 1..60_000_u64 {
-        deadline = deadline + CYCLE_PERIOD;
-        bridge.begin(deadline, deadline);
-        let feedback = *bridge.feedback();
-        let verb = match step {
-            2 => Some((OperatorVerb::Enable, 0.0)),
-            START => Some((OperatorVerb::Start, 1.0)),
-            _ => ask(step, outputs.command.laser.is_lit()),
-        };
-        let request =
-            verb.map(|(verb, value)| OperatorRequest { verb: verb as u32, ticket: 1, value });
-        let room = if step > START { controller.room().min(16) } else { 0 };
-        let batch: Vec<Setpoint> = setpoints.by_ref().take(room).collect();
-        let peers = Peers::default();
-        let inputs =
-            Inputs { feedback: &feedback, received: deadline, setpoints: &batch, request, peers };
-        controller.step(deadline, &inputs, &mut outputs);
-        bridge.latch(&outputs.command, deadline);
-        bridge.finish(deadline);
+    let mut ended = None;
+    while chain.cycle < 60_000 {
+        let feedback = chain.begin();
+        let asked = ask(chain.cycle, chain.outputs.command.laser.is_lit());
+        chain.finish(&feedback, asked, Peers::default());
+        let outputs = &chain.outputs;
         evaluator.push(&CycleRecord { feedback, command: outputs.command });
         ended = outputs.report.filter(|report| report.is_final == 1).or(ended);
         if let Some(report) = ended
             && outputs.command.state() == ControllerState::Idle
-            && step > report.last_cycle.0 + 10
+            && chain.cycle > report.last_cycle.0 + 10
         {
             assert_eq!(report.completed, 1);
             return evaluator.finish(StreamEnd::Reported(&report)).unwrap().marks;

@@ -4,26 +4,22 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod chain;
+
 use std::path::Path;
 
-use controller::{Controller, Inputs, Outputs, Peers};
-use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
+use chain::{Chain, START};
+use controller::Peers;
 use machine::Machine;
 use messages::feedback::status;
 use messages::random::SplitMix64;
 use messages::time::CYCLE_PERIOD;
-use messages::{
-    ControllerReport, ControllerState, FaultCode, Nanoseconds, OperatorRequest, OperatorVerb,
-    RealtimeFacts, Setpoint,
-};
+use messages::{ControllerReport, ControllerState, FaultCode, Nanoseconds, RealtimeFacts};
 use monitor::marks::{MarkEvaluator, Marks, StreamEnd};
 use monitor::recording::{CycleRecord, Recorder};
 use monitor::trace::lit_share;
 use planner::job::Job;
 use planner::{Plan, plan};
-
-/// The cycle in which the job starts.
-const START: u64 = 100;
 
 /// What a run came to.
 struct Played {
@@ -42,37 +38,17 @@ fn planned(machine: &Machine) -> Plan {
 
 /// Plays the sample job; `stall` says after each cycle, by its number, how many are skipped.
 fn play(machine: &Machine, plan: &Plan, mut stall: impl FnMut(u64) -> u64) -> Played {
-    let mut setpoints = plan.setpoints(1);
-    let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
-    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
-    let mut bridge = Bridge::new(port, options);
-    let mut controller = Controller::new(machine);
-    let mut outputs = Outputs::default();
+    let mut chain = Chain::new(machine, plan);
     let (mut evaluator, mut recorder) = (MarkEvaluator::new(&plan.artwork), Recorder::new());
-    let (mut skipped, mut deadline) = (0, Nanoseconds(0));
+    let mut skipped = 0;
     let mut report = ControllerReport::default();
     let mut left = u64::MAX;
-    for step in 1..60_000_u64 {
-        deadline = deadline + CYCLE_PERIOD;
-        bridge.begin(deadline, deadline);
-        let feedback = *bridge.feedback();
+    while chain.cycle < 60_000 {
+        let feedback = chain.begin();
         skipped += feedback.skipped;
         assert_no_light_uncommanded(&feedback);
-        let verb = match step {
-            2 => Some((OperatorVerb::Enable, 0.0)),
-            START => Some((OperatorVerb::Start, 1.0)),
-            _ => None,
-        };
-        let request =
-            verb.map(|(verb, value)| OperatorRequest { verb: verb as u32, ticket: 1, value });
-        let room = if step > START { controller.room().min(16) } else { 0 };
-        let batch: Vec<Setpoint> = setpoints.by_ref().take(room).collect();
-        let peers = Peers::default();
-        let inputs =
-            Inputs { feedback: &feedback, received: deadline, setpoints: &batch, request, peers };
-        controller.step(deadline, &inputs, &mut outputs);
-        bridge.latch(&outputs.command, deadline);
-        bridge.finish(deadline);
+        chain.finish(&feedback, None, Peers::default());
+        let outputs = &chain.outputs;
         recorder.feedback(&feedback);
         recorder.command(&outputs.command);
         evaluator.push(&CycleRecord { feedback, command: outputs.command });
@@ -83,12 +59,12 @@ fn play(machine: &Machine, plan: &Plan, mut stall: impl FnMut(u64) -> u64) -> Pl
         if left == 0 {
             recorder.finish();
             assert_eq!(recorder.continuity().missing, 0, "what drives skipped is no loss");
-            let stalls = bridge.report(RealtimeFacts::default()).stalls;
             let state = outputs.command.state();
+            let stalls = chain.bridge.report(RealtimeFacts::default()).stalls;
             let marks = evaluator.finish(StreamEnd::Reported(&report)).unwrap().marks;
             return Played { marks, report, stalls: stalls.count, skipped: skipped.into(), state };
         }
-        deadline = deadline + Nanoseconds::of_cycles(stall(step));
+        chain.skip(stall(chain.cycle));
     }
     panic!("the job does not end");
 }
@@ -193,26 +169,11 @@ fn the_time_of_a_run_counts_what_was_skipped() {
 #[test]
 fn the_feedback_after_a_stall_says_that_commands_were_missed() {
     let machine = Machine::builtin();
-    let port = SimulatedPlant::new(&machine, PlantOptions::default()).unwrap();
-    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
-    let mut bridge = Bridge::new(port, options);
-    let mut controller = Controller::new(&machine);
-    let mut outputs = Outputs::default();
-    let mut deadline = Nanoseconds(0);
+    let mut chain = Chain::idle(&machine);
     for skipped in [0, 0, 0, 4, 0, 0] {
-        deadline = deadline + Nanoseconds::of_cycles(1 + skipped);
-        bridge.begin(deadline, deadline);
-        let feedback = *bridge.feedback();
+        chain.skip(skipped);
+        let feedback = chain.begin();
         assert_eq!(feedback.has(status::COMMAND_MISSED), skipped > 0);
-        let inputs = Inputs {
-            feedback: &feedback,
-            received: deadline,
-            setpoints: &[],
-            request: None,
-            peers: Peers::default(),
-        };
-        controller.step(deadline, &inputs, &mut outputs);
-        bridge.latch(&outputs.command, deadline);
-        bridge.finish(deadline);
+        chain.finish(&feedback, None, Peers::default());
     }
 }

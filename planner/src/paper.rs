@@ -155,7 +155,7 @@ impl Paper {
                 let Item::Stroke(stroke) = &self.items[*item] else { return standing };
                 let place = along.position - before;
                 let jet = stroke.at(place);
-                let tool = jet.motion(along.velocity, along.acceleration, along.jerk);
+                let tool = jet.motion([along.velocity, along.acceleration, along.jerk]);
                 let is_inside = time - stretch.start <= stretch.course.duration();
                 let is_lit = stroke.is_lit && is_inside && (0.0..=stroke.length).contains(&place);
                 (tool, *number, is_lit)

@@ -197,7 +197,7 @@ fn the_speed_of_dashes_is_told_wherever_the_gaps_lie() {
         }
         for dash in 0..40 {
             let gate = if dash % 2 == 0 { on } else { off };
-            write!(text, "{gate}G1 X{:.1}\n", 10.5 + f64::from(dash) * 0.5).unwrap();
+            writeln!(text, "{gate}G1 X{:.1}", 10.5 + f64::from(dash) * 0.5).unwrap();
         }
         text.push_str("M5\n");
         let facts = planned(&text).unwrap().facts;

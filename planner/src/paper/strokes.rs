@@ -87,37 +87,43 @@ pub(super) fn items(job: &Job) -> Result<Vec<Item>, PlanError> {
     let mut items: Vec<Item> = Vec::new();
     for step in job.steps().map_err(unreadable)? {
         let step = step.map_err(unreadable)?;
-        let (curve, asked, is_lit) = match &step.action {
-            Action::Mark { curve, speed, .. } => (curve, *speed, true),
-            Action::Feed { curve, speed } => (curve, Some(*speed), false),
-            Action::Rapid { to } => {
-                items.push(Item::Go(*to));
-                continue;
+        match &step.action {
+            Action::Mark { curve, speed, .. } => {
+                add(&mut items, Stroke::new(Track::new(curve), *speed, true, step.line));
             }
+            Action::Feed { curve, speed } => {
+                add(&mut items, Stroke::new(Track::new(curve), Some(*speed), false, step.line));
+            }
+            Action::Follow { path, .. } => {
+                for (track, line) in &path.tracks {
+                    add(&mut items, Stroke::new(track.clone(), None, true, *line));
+                }
+            }
+            Action::Rapid { to } => items.push(Item::Go(*to)),
             Action::Dwell { time, lit } => {
                 let is_lit = lit.is_some_and(|power| power > 0.0);
                 items.push(Item::Rest { time: *time, is_lit });
-                continue;
             }
             Action::Output { .. } | Action::Pause => {
                 items.push(Item::Rest { time: 0.0, is_lit: false });
-                continue;
             }
-            Action::Corners(_) => continue,
-        };
-        let track = Track::new(curve);
-        if track.length() <= NOTHING {
-            continue;
+            Action::Corners(_) => {}
         }
-        let stroke = Stroke::new(track, asked, is_lit, step.line);
-        if let Some(Item::Stroke(before)) = items.last_mut()
-            && before.goes_on(&stroke)
-        {
-            continue;
-        }
-        let begins = stroke.at(0.0).point;
-        items.pop_if(|item| matches!(item, Item::Go(to) if (*to - begins).norm() <= GAP));
-        items.push(Item::Stroke(stroke));
     }
     Ok(items)
+}
+
+/// Puts `stroke` behind `items`, to the one that it goes on from where there is one.
+fn add(items: &mut Vec<Item>, stroke: Stroke) {
+    if stroke.length <= NOTHING {
+        return;
+    }
+    if let Some(Item::Stroke(before)) = items.last_mut()
+        && before.goes_on(&stroke)
+    {
+        return;
+    }
+    let begins = stroke.at(0.0).point;
+    items.pop_if(|item| matches!(item, Item::Go(to) if (*to - begins).norm() <= GAP));
+    items.push(Item::Stroke(stroke));
 }

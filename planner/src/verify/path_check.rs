@@ -215,7 +215,7 @@ impl<const N: usize, M: Mechanism<N>> Followed<'_, N, M> {
     }
 
     fn tool(&self, place: f64) -> Result<machine::kinematics::ToolMotion, KinematicsError> {
-        self.attitude.apply(&self.path.at(place).motion(1.0, 0.0, 0.0))
+        self.attitude.apply(&self.path.tool(place, [1.0, 0.0, 0.0]))
     }
 }
 
