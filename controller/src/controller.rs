@@ -294,7 +294,10 @@ impl Controller {
             self.pass_in_the_dark(now);
         }
         for _ in 1..elapsed.cycles {
-            self.advance(feedback);
+            // What stands where it is measured stands there after one cycle as after many.
+            if self.state.follows() {
+                self.advance(feedback);
+            }
             self.pass_in_the_dark(now);
         }
         if !self.state.follows() {
@@ -330,17 +333,20 @@ impl Controller {
     /// Goes on by one cycle along the stream, or stands.
     fn advance(&mut self, feedback: &Feedback) {
         if !self.state.follows() {
-            if feedback.position.iter().all(|position| position.is_finite()) {
+            let is_known = |values: &AxisArray| values.iter().all(|value| value.is_finite());
+            let resting = if is_known(&feedback.position) {
                 let (angle, tool) = (feedback.position, self.tool_measured(feedback));
-                // Before the power comes, and with it the load.
-                let torque = match self.state {
-                    State::Enabling { .. } => *self.standing.torque(&angle),
-                    _ => AxisArray::default(),
-                };
-                let resting = Planned { angle, torque, tool, ..Planned::default() };
-                let powered = feedback.has(status::POWERED);
-                self.feedforward.rest_at(resting, powered.then_some(&feedback.current));
-            }
+                // Known all the time, so that the weight is at hand when the power, and with it the load, comes.
+                let weight = *self.standing.torque(&angle);
+                let bears = matches!(self.state, State::Enabling { .. });
+                let torque = if bears { weight } else { AxisArray::default() };
+                Planned { angle, torque, tool, ..Planned::default() }
+            } else {
+                let Planned { angle, tool, .. } = *self.feedforward.now();
+                Planned { angle, tool, ..Planned::default() }
+            };
+            let powered = feedback.has(status::POWERED) && is_known(&feedback.current);
+            self.feedforward.rest_at(resting, powered.then_some(&feedback.current));
             for cascade in self.cascades.iter_mut().flatten() {
                 cascade.reset();
             }

@@ -15,17 +15,28 @@ pub const STANDING_COUNTS: f64 = 1.5;
 /// asked for, and brakes are no clocks.
 const RELEASE_MARGIN: u32 = 2;
 
+/// Cycles until a place at which the mechanism cannot be is tried again: it takes long to find that out.
+const RETRY: u32 = 100;
+
 /// The machine at rest, as its file says it is.
 pub struct Standing {
     axes: usize,
-    gravity: Box<dyn Gravity>,
-    /// What gravity took where it was asked for last [N·m].
+    weight: Box<dyn Weight>,
+    /// What the weight took where it was asked for last [N·m].
     torque: AxisArray,
+    /// Way of the tool per radian of each motor there [m/rad].
+    lever: AxisArray,
+    /// The same at home.
+    lever_at_home: AxisArray,
     /// What friction, brakes and teeth hold without power [N·m].
     unpowered: AxisArray,
-    /// What moves the tool by the path's tolerance, some counts at least, and those counts [rad].
-    tolerance: AxisArray,
+    /// How far the tool may be away [m].
+    tolerance: f64,
+    /// How far a motor may be away that moves no tool, and the least that any may [rad].
+    most: AxisArray,
     counts: AxisArray,
+    /// Cycles in which the mechanism is not asked.
+    pause: u32,
     release: u32,
 }
 
@@ -40,66 +51,97 @@ pub struct Strayed {
     pub limit: f64,
 }
 
+impl Strayed {
+    fn share(&self) -> f64 {
+        self.distance / self.limit
+    }
+}
+
 impl Standing {
     /// Of this machine.
     pub fn new(machine: &Machine) -> Self {
-        let (gravity, lever) = machine.mechanism.visit(AtHome(machine));
-        let [mut tolerance, mut counts, mut unpowered] = [[0.0; MAX_AXES]; 3];
+        let [mut most, mut counts, mut unpowered] = [[0.0; MAX_AXES]; 3];
         for (index, axis) in machine.axes.iter().enumerate().take(MAX_AXES) {
-            // Of an axis that moves no tool there the following error is left.
-            let path = machine.path.tolerance / lever[index].max(f64::MIN_POSITIVE);
-            let joint = path.min(axis.limits.following_error);
+            most[index] = axis.limits.following_error / axis.ratio;
             counts[index] = STANDING_COUNTS * axis.encoder.resolution();
-            tolerance[index] = counts[index].max(joint / axis.ratio);
             let teeth = axis.motor.stepper().map_or(0.0, |motor| motor.detent_torque);
             unpowered[index] = axis.friction.coulomb + axis.brake.torque + teeth;
         }
         let mut standing = Self {
             axes: machine.axes.len().min(MAX_AXES),
-            gravity,
+            weight: machine.mechanism.visit(OfMechanism(machine)),
             torque: [0.0; MAX_AXES],
+            lever: [0.0; MAX_AXES],
+            lever_at_home: [0.0; MAX_AXES],
             unpowered,
-            tolerance,
+            tolerance: machine.path.tolerance,
+            most,
             counts,
+            pause: 0,
             release: release(&machine.axes),
         };
         let home = machine.axes.iter().zip(&machine.home_joints);
         let mut angle = [0.0; MAX_AXES];
         angle.iter_mut().zip(home).for_each(|(angle, (axis, joint))| *angle = joint / axis.ratio);
         standing.torque(&angle);
+        standing.lever_at_home = standing.lever;
         standing
     }
 
     /// Torques that hold the motors at `angle` [rad] against gravity [N·m]. Where the mechanism cannot
     /// be, those of the place before.
     pub fn torque(&mut self, angle: &AxisArray) -> &AxisArray {
-        if let Some(torque) = self.gravity.torque(angle) {
-            self.torque = torque;
+        self.pause = self.pause.saturating_sub(1);
+        if self.pause == 0 {
+            match self.weight.at(angle) {
+                Some((torque, lever)) => (self.torque, self.lever) = (torque, lever),
+                None => self.pause = RETRY,
+            }
         }
         &self.torque
     }
 
-    /// The motor that is furthest from `place` [rad] in what it may be away, if it is further than that.
-    ///
-    /// That is what moves the tool by the path's tolerance, but some counts at least; and those alone for
-    /// a motor that is not `held` and that nothing else holds against its weight.
-    pub fn strayed(&self, place: &AxisArray, angle: &AxisArray, held: bool) -> Option<Strayed> {
+    /// The motor that has sunk furthest from `place` [rad], by more than some counts, of those that nothing
+    /// holds against their weight without power.
+    pub fn sunk(&self, place: &AxisArray, angle: &AxisArray) -> Option<Strayed> {
+        let sinks = |index: &usize| self.torque[*index].abs() > self.unpowered[*index];
+        let of = |index: usize| self.strayed_by(index, place, angle, self.counts[index]);
+        worst((0..self.axes).filter(sinks).map(of))
+    }
+
+    /// The motor that is furthest from `place` [rad] in what it may be away, if it is further than that:
+    /// what moves the tool by the path's tolerance, here or at home, but some counts at least.
+    pub fn strayed(&self, place: &AxisArray, angle: &AxisArray) -> Option<Strayed> {
         let of = |index: usize| {
-            let sinks = !held && self.torque[index].abs() > self.unpowered[index];
-            let limit = if sinks { self.counts[index] } else { self.tolerance[index] };
-            Strayed { index, distance: (angle[index] - place[index]).abs(), limit }
+            // Of an axis that moves no tool the following error is left.
+            let lever = self.lever[index].max(self.lever_at_home[index]);
+            let most = (self.tolerance / lever.max(f64::MIN_POSITIVE)).min(self.most[index]);
+            self.strayed_by(index, place, angle, most.max(self.counts[index]))
         };
-        let share = |strayed: &Strayed| strayed.distance / strayed.limit;
-        (0..self.axes)
-            .map(of)
-            .filter(|strayed| share(strayed) > 1.0)
-            .max_by(|one, other| share(one).total_cmp(&share(other)))
+        worst((0..self.axes).map(of))
+    }
+
+    fn strayed_by(
+        &self,
+        index: usize,
+        place: &AxisArray,
+        angle: &AxisArray,
+        limit: f64,
+    ) -> Strayed {
+        Strayed { index, distance: (angle[index] - place[index]).abs(), limit }
     }
 
     /// Cycles after the power for which a brake may hold; 0 of a machine without.
     pub fn release(&self) -> u32 {
         self.release
     }
+}
+
+/// The one furthest beyond its limit.
+fn worst(strayed: impl Iterator<Item = Strayed>) -> Option<Strayed> {
+    strayed
+        .filter(|strayed| strayed.share() > 1.0)
+        .max_by(|one, other| one.share().total_cmp(&other.share()))
 }
 
 impl fmt::Debug for Standing {
@@ -116,50 +158,48 @@ fn release(axes: &[Axis]) -> u32 {
 }
 
 /// A mechanism of any kind, asked for its weight.
-trait Gravity: Send {
-    /// Torques that hold motors at `angle` [rad]; `None` where the mechanism cannot be.
-    fn torque(&self, angle: &AxisArray) -> Option<AxisArray>;
+trait Weight: Send {
+    /// Torques that hold motors at `angle` [rad], and the way of the tool per radian of each; `None` where
+    /// the mechanism cannot be.
+    fn at(&mut self, angle: &AxisArray) -> Option<(AxisArray, AxisArray)>;
 }
 
-struct Weight<const N: usize, M: Mechanism<N>> {
+struct Of<const N: usize, M: Mechanism<N>> {
     mechanism: M,
     ratio: [f64; N],
+    /// Where it was last: it goes on from there.
+    near: Option<M::ChainState>,
 }
 
-impl<const N: usize, M: Mechanism<N>> Gravity for Weight<N, M> {
-    fn torque(&self, angle: &AxisArray) -> Option<AxisArray> {
+impl<const N: usize, M: Mechanism<N>> Weight for Of<N, M> {
+    fn at(&mut self, angle: &AxisArray) -> Option<(AxisArray, AxisArray)> {
         // What springs have the motors ahead moves no weight to speak of.
         let joints = Joints::from_fn(|row, _| self.ratio[row] * angle[row]);
-        let chain = self.mechanism.solve(&joints, self.mechanism.branch(), None).ok()?;
-        let effort = self.mechanism.gravity(&chain);
-        let mut torque = [0.0; MAX_AXES];
-        for (row, torque) in torque.iter_mut().enumerate().take(N) {
-            *torque = self.ratio[row] * effort[row];
+        let chain = self.mechanism.solve(&joints, self.mechanism.branch(), self.near.as_ref());
+        let chain = chain.ok()?;
+        let (effort, jacobian) = (self.mechanism.gravity(&chain), self.mechanism.jacobian(&chain));
+        let [mut torque, mut lever] = [[0.0; MAX_AXES]; 2];
+        for row in 0..N.min(MAX_AXES) {
+            torque[row] = self.ratio[row] * effort[row];
+            lever[row] = self.ratio[row].abs() * jacobian.fixed_view::<3, 1>(0, row).norm();
         }
-        torque.iter().all(|torque| torque.is_finite()).then_some(torque)
+        let is_known = torque.iter().chain(&lever).all(|value| value.is_finite());
+        is_known.then(|| {
+            self.near = Some(chain);
+            (torque, lever)
+        })
     }
 }
 
-/// Gives the weight of the machine's mechanism, and the way of the tool per joint unit at home
-/// [m/m or m/rad].
-struct AtHome<'a>(&'a Machine);
+/// Gives the weight of the machine's mechanism.
+struct OfMechanism<'a>(&'a Machine);
 
-impl MechanismVisitor for AtHome<'_> {
-    type Output = (Box<dyn Gravity>, AxisArray);
+impl MechanismVisitor for OfMechanism<'_> {
+    type Output = Box<dyn Weight>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let Self(machine) = self;
-        let joint = |row: usize| machine.home_joints.get(row).copied().unwrap_or(f64::NAN);
-        let home = Joints::<N>::from_fn(|row, _| joint(row));
-        let mut lever = [0.0; MAX_AXES];
-        if let Ok(chain) = mechanism.solve(&home, mechanism.branch(), None) {
-            let jacobian = mechanism.jacobian(&chain);
-            for (row, lever) in lever.iter_mut().enumerate().take(N) {
-                *lever = jacobian.fixed_view::<3, 1>(0, row).norm();
-            }
-        }
-        let ratio = core::array::from_fn(|row| machine.axes.get(row).map_or(1.0, |it| it.ratio));
-        (Box::new(Weight { mechanism, ratio }), lever)
+        let ratio = core::array::from_fn(|row| self.0.axes.get(row).map_or(1.0, |axis| axis.ratio));
+        Box::new(Of { mechanism, ratio, near: None })
     }
 }
 
@@ -187,13 +227,11 @@ mod tests {
         assert_eq!(standing.release(), 22, "20 ms");
         // 5 µm of the tool, on a screw of 10 mm/rev.
         let tolerance = 5e-6 / (10e-3 / core::f64::consts::TAU);
-        let strayed = |distance: f64, held| {
-            let angle = [0.0, 0.0, distance, 0.0, 0.0, 0.0, 0.0, 0.0];
-            standing.strayed(&[0.0; MAX_AXES], &angle, held)
-        };
-        assert_eq!(strayed(0.99 * tolerance, true), None);
-        assert_eq!(strayed(0.99 * tolerance, false), None, "its brake holds it");
-        let beyond = strayed(-1.01 * tolerance, true).unwrap();
+        let angle = |distance: f64| [0.0, 0.0, distance, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let strayed = |distance: f64| standing.strayed(&[0.0; MAX_AXES], &angle(distance));
+        assert_eq!(strayed(0.99 * tolerance), None);
+        let beyond = strayed(-1.01 * tolerance).unwrap();
+        assert_eq!(standing.sunk(&[0.0; MAX_AXES], &angle(1.0)), None, "its brake holds it");
         assert_eq!(beyond.index, 2);
         assert!((beyond.distance - 1.01 * tolerance).abs() < 1e-12);
         assert!((beyond.limit - tolerance).abs() < 1e-12);
@@ -206,9 +244,8 @@ mod tests {
         let standing = Standing::new(&machine);
         let two_counts = 2.0 * machine.axes[2].encoder.resolution();
         let angle = [0.0, 0.0, -two_counts, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let strayed = |held| standing.strayed(&[0.0; MAX_AXES], &angle, held);
-        assert_eq!(strayed(true), None);
-        assert_eq!(strayed(false).unwrap().index, 2);
+        assert_eq!(standing.strayed(&[0.0; MAX_AXES], &angle), None);
+        assert_eq!(standing.sunk(&[0.0; MAX_AXES], &angle).unwrap().index, 2);
     }
 
     #[test]

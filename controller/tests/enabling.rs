@@ -35,6 +35,17 @@ struct Rig {
     outputs: Outputs,
     /// Where the motors stand at home [rad].
     home: AxisArray,
+    /// When the power is on.
+    power: Power,
+}
+
+/// When the motors have power.
+#[derive(Clone, Copy, PartialEq)]
+enum Power {
+    /// From the cycle after it was asked for.
+    Asked,
+    Always,
+    Never,
 }
 
 impl Rig {
@@ -44,7 +55,7 @@ impl Rig {
         home.iter_mut().zip(joints).for_each(|(angle, (axis, joint))| *angle = joint / axis.ratio);
         let feedback = Feedback { epoch: 5, position: home, ..Feedback::default() };
         let controller = Controller::new(machine);
-        Self { controller, feedback, outputs: Outputs::default(), home }
+        Self { controller, feedback, outputs: Outputs::default(), home, power: Power::Asked }
     }
 
     /// One cycle with the slide `away` from home [rad].
@@ -53,7 +64,12 @@ impl Rig {
         let feedback = &mut self.feedback;
         feedback.cycle = feedback.cycle.next();
         feedback.deadline = feedback.deadline + CYCLE_PERIOD;
-        feedback.status = if mode == CommandMode::Disabled { 0 } else { status::POWERED };
+        let is_powered = match self.power {
+            Power::Asked => mode != CommandMode::Disabled,
+            Power::Always => true,
+            Power::Never => false,
+        };
+        feedback.status = if is_powered { status::POWERED } else { 0 };
         let before = feedback.position[SLIDE];
         feedback.position[SLIDE] = self.home[SLIDE] + away;
         feedback.velocity[SLIDE] = (feedback.position[SLIDE] - before) / CYCLE_TIME;
@@ -187,4 +203,68 @@ fn an_axis_that_sinks_before_the_power_comes_is_named_at_once() {
     assert_eq!((axis, quantity), (SLIDE as u32 + 1, FaultQuantity::HoldDistance));
     let counts = [value, limit].map(|distance| distance / machine.axes[SLIDE].ratio / count);
     assert!((counts[0] - 2.0).abs() < 1e-6 && (counts[1] - 1.5).abs() < 1e-6, "{counts:?}");
+}
+
+#[test]
+fn a_motor_that_has_power_already_is_given_its_weight_first() {
+    let machine = serial();
+    let motor = *machine.axes[SLIDE].motor.dc().unwrap();
+    let torque = 0.5 * 9.80665 * machine.axes[SLIDE].ratio;
+    let volts = motor.voltage(torque / motor.torque_constant, 0.0, 0.0);
+    let mut rig = Rig::new(&machine);
+    rig.power = Power::Always;
+    rig.cycle(None, 0.0);
+    for cycle in 0..100 {
+        rig.feedback.current[SLIDE] = volts / motor.resistance;
+        let verb = (cycle == 0).then_some(OperatorVerb::Enable);
+        let given = rig.cycle(verb, 0.0).voltage[SLIDE];
+        assert!((given - volts).abs() < 1e-4, "{cycle}: {given} V");
+    }
+    assert_eq!(rig.outputs.command.state(), ControllerState::Idle);
+}
+
+#[test]
+fn an_axis_that_is_moved_before_the_power_comes_is_waited_for() {
+    let machine = serial();
+    let ratio = machine.axes[SLIDE].ratio;
+    let mut rig = Rig::asked(&machine);
+    // Pushed by 1 mm through its brake, from before the power comes on.
+    let ended = rig.enabling(|cycle| 20e-6 * cycle.min(50) as f64 / ratio);
+    assert_eq!(rig.outputs.command.state(), ControllerState::Idle);
+    assert_eq!(ended, 50 + 1 + RELEASE + STANDING);
+}
+
+#[test]
+fn what_fails_before_the_power_comes_stays_without() {
+    let machine = serial();
+    let mut rig = Rig::asked(&machine);
+    rig.power = Power::Never;
+    rig.enabling(|_| 0.0);
+    let command = &rig.outputs.command;
+    assert_eq!(command.state(), ControllerState::Faulted);
+    assert_eq!((command.mode(), command.voltage), (CommandMode::Disabled, [0.0; 8]));
+    let (_, quantity, _, limit) = rig.fault();
+    assert_eq!((quantity, limit), (FaultQuantity::Cycles, 1000.0 + RELEASE as f64));
+}
+
+#[test]
+fn no_voltage_is_given_where_a_position_is_no_number() {
+    let machine = serial();
+    let mut rig = Rig::asked(&machine);
+    rig.enabling(|_| 0.0);
+    let last = rig.outputs.command;
+    assert!(last.state() == ControllerState::Idle && last.voltage[SLIDE] != 0.0);
+    let mut states = Vec::new();
+    for cycle in 0..1200 {
+        let verb = match cycle {
+            1100 => Some(OperatorVerb::Reset),
+            1101 => Some(OperatorVerb::Enable),
+            _ => None,
+        };
+        let command = rig.cycle(verb, f64::NAN);
+        assert_eq!(command.voltage, [0.0; 8], "{cycle}");
+        states.push(command.state());
+    }
+    assert_eq!(states[1100], ControllerState::Disabled);
+    assert!(states[1102..].iter().all(|state| *state != ControllerState::Idle));
 }

@@ -22,7 +22,7 @@ use iceoryx2::service::port_factory::request_response::PortFactory;
 use messages::{OperatorReply, OperatorRequest, OperatorVerb, Sample};
 
 use crate::channel::{ChannelError, Wire};
-use crate::domain::{Domain, DomainError, Entry};
+use crate::domain::{Domain, DomainError, Entry, Role};
 use crate::room::need;
 
 const SERVICE: &str = "operator-requests";
@@ -279,13 +279,20 @@ fn ask(entry: &Entry, ready: &Sender<Result<(), DomainError>>, questions: &Recei
     while let Ok(Question { request, patience, answer }) = questions.recv() {
         let reply = || {
             let lost = |_| ChannelError::Lost { channel: SERVICE };
-            let pending = client
-                .send_copy(Wire(request))
-                .map_err(|_| ChannelError::Lost { channel: SERVICE })?;
-            if pending.number_of_server_connections() == 0 {
-                return Err(OperatorError::NoController);
-            }
             let asked = Instant::now();
+            let pending = loop {
+                let pending = client
+                    .send_copy(Wire(request))
+                    .map_err(|_| ChannelError::Lost { channel: SERVICE })?;
+                if pending.number_of_server_connections() > 0 {
+                    break pending;
+                }
+                // A controller that has joined takes requests a moment later.
+                if domain.peer(Role::Controller).is_none() || asked.elapsed() >= patience {
+                    return Err(OperatorError::NoController);
+                }
+                std::thread::sleep(ANSWER_PERIOD);
+            };
             while asked.elapsed() < patience {
                 if let Some(reply) = pending.receive().map_err(lost)? {
                     return Ok(reply.payload().0);

@@ -86,7 +86,10 @@ impl Controller {
             command.effort[index] = target.effort;
             if !follows {
                 // What holds the weight, in the cycle in which the power comes.
-                command.voltage[index] = reference.voltage;
+                if let (State::Enabling { .. }, Some(motor)) = (self.state, axis.motor.dc()) {
+                    let most = motor.voltage;
+                    command.voltage[index] = reference.voltage.clamp(-most, most);
+                }
                 continue;
             }
             command.following_error[index] = error;

@@ -61,37 +61,49 @@ impl Controller {
         }
     }
 
-    /// Waits for the power and for standstill, then holds the axes where they stand, against their weight,
-    /// until the brakes are open and all have stood there for a moment.
+    /// Waits for the power and for standstill, while what nothing holds must not sink; then holds the axes
+    /// where they stand, against their weight, until the brakes are open and all have stood there for a
+    /// moment.
     fn enable(&mut self, now: Nanoseconds, feedback: &Feedback, cycles: [u32; 3]) {
         let [waited, held, settled] = cycles;
         if waited == 0 {
             self.enabled_at = feedback.position;
         }
-        let place = if held > 0 { &self.feedforward.now().angle } else { &self.enabled_at };
-        let strayed = self.standing.strayed(place, &feedback.position, held > 0);
-        let sinks = held == 0 && strayed.is_some();
+        let (strayed, sinks) = if held > 0 {
+            let place = &self.feedforward.now().angle;
+            (self.standing.strayed(place, &feedback.position), false)
+        } else {
+            let sunk = self.standing.sunk(&self.enabled_at, &feedback.position);
+            (sunk, sunk.is_some())
+        };
         let stands = self.supervision.standing() > 0;
-        let ready = held > 0
-            || feedback.has(status::POWERED)
-                && !feedback.has(status::WATCHDOG_TRIPPED)
-                && !feedback.fault.is_some()
-                && stands;
+        let is_sound = !feedback.has(status::WATCHDOG_TRIPPED) && !feedback.fault.is_some();
+        // Before the controller has been asked once more, it has given no voltage for the weight.
+        let is_borne = waited > 0;
+        let ready = held > 0 || is_borne && feedback.has(status::POWERED) && is_sound && stands;
         let rests = held > self.standing.release() && stands && strayed.is_none();
         let settled = if rests { settled + 1 } else { 0 };
-        self.state = if settled >= STANDING {
-            State::Idle
-        } else {
-            State::Enabling { waited: waited + 1, held: if ready { held + 1 } else { 0 }, settled }
-        };
+        if settled >= STANDING {
+            self.state = State::Idle;
+            return;
+        }
+        self.state =
+            State::Enabling { waited: waited + 1, held: if ready { held + 1 } else { 0 }, settled };
         if sinks || waited >= PATIENCE + self.standing.release() {
             self.fail(Finding::lost(self.restless(feedback, strayed, waited)), now);
+            // A quick stop would power what is not powered yet.
+            if !feedback.has(status::POWERED) {
+                self.end_in_fault(feedback.cycle);
+            }
         }
     }
 
     /// Why the axes cannot be enabled after `waited` cycles: one has `strayed` from its place by so much,
     /// or still moves, or the power does not come.
     fn restless(&self, feedback: &Feedback, strayed: Option<Strayed>, waited: u32) -> Fault {
+        if feedback.fault.is_some() {
+            return feedback.fault;
+        }
         let fault = Fault::new(FaultCode::DriveFault);
         if let Some(Strayed { index, distance, limit }) = strayed {
             let ratio = self.machine.axes[index].ratio;
@@ -101,8 +113,8 @@ impl Controller {
         if let Some((index, speed, limit)) = self.supervision.moving(feedback) {
             return fault.on(index).beyond(FaultQuantity::Velocity, speed, limit);
         }
-        let (value, limit) = (f64::from(waited), f64::from(PATIENCE));
-        fault.beyond(FaultQuantity::Cycles, value, limit)
+        let limit = PATIENCE + self.standing.release();
+        fault.beyond(FaultQuantity::Cycles, f64::from(waited), f64::from(limit))
     }
 
     /// Goes on as soon as there is enough to play, or gives up waiting.
