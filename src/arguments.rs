@@ -27,7 +27,9 @@ Examples:
   graver plan jobs/square_arcs.ngc                  time, length, limits, notes
   graver plan --samples setpoints.csv               every setpoint, one row a millisecond
   graver plan --machine twin.toml --pulses p.csv    every step pulse with its time and count
-  graver plan --ideal --set letters.style=h2        against the limits of the path only";
+  graver plan --ideal --set letters.style=h2        within the limits of the path only
+  graver plan --ideal --profile trapezoid           the time by the source's profile beside it
+  graver plan --machine machines/mcm.toml --path-check check.csv";
 
 const CHECK_EXAMPLES: &str = "\
 Examples:
@@ -76,7 +78,7 @@ Examples:
   graver machine new prrrp --steppers --motors my-motors.toml --motors gears
 
 The file is written only if `graver check` has nothing to say of it and its sample is marked in
-simulation. What no motor can do is asked for less, and the file says so.";
+simulation. Where no motor is enough, speed or acceleration is lowered, and the file says so.";
 
 const CALIBRATE_EXAMPLES: &str = "\
 Examples:
@@ -84,7 +86,7 @@ Examples:
   graver calibrate poses.csv --machine mine.toml --free legs,base
 
 poses.csv has the columns xD,yD,xE,yE,xF,yF (where the motors say the feet are) and x,y,z,qw,qx,qy,qz (the
-measured pose of the tool in the machine's frame), in metres, a pose a line.";
+measured pose of the tool, with base free in the instrument's own frame), in metres, a pose a line.";
 
 const COMPARE_EXAMPLES: &str = "\
 Examples:
@@ -332,11 +334,11 @@ pub struct PlanArguments {
     /// between knots, to a CSV file.
     #[arg(long, value_name = "FILE")]
     pub path_check: Option<PathBuf>,
-    /// Check the path limits only, as if motors were ideal.
+    /// Plan within the limits of the path only, as if the motors had no limits.
     #[arg(long)]
     pub ideal: bool,
-    /// Put the job on paper beside it, by a speed profile of the sources; needs --ideal. The files that
-    /// are written are then of that profile.
+    /// Also time the job by a speed profile of the sources, for comparison; needs --ideal. --samples,
+    /// --pulses and --pulse-path then write the motion of that profile.
     #[arg(long, value_enum)]
     pub profile: Option<ProfileName>,
     /// Print one JSON object on stdout.
@@ -709,7 +711,7 @@ pub struct NewArguments {
     /// Write over files that are there.
     #[arg(long)]
     pub force: bool,
-    /// Ask nothing: what is left out is as usual.
+    /// Ask nothing: what is left out takes its default.
     #[arg(long)]
     pub yes: bool,
     /// Print one JSON object on stdout; nothing is asked.

@@ -443,9 +443,9 @@ fn substeps<const N: usize, M: Mechanism<N>>(
     if stable <= MOST_SUBSTEPS {
         Ok(substeps as u32)
     } else if electrical > mechanical {
-        Err(PlantError::TooQuick { rate: electrical })
+        Err(PlantError::TooQuick { rate: mechanical + electrical })
     } else {
-        Err(PlantError::TooStiff { rate: mechanical })
+        Err(PlantError::TooStiff { rate: mechanical + electrical })
     }
 }
 

@@ -303,7 +303,7 @@ fn a_path_speed_beyond_the_motors_is_a_warning() {
     assert_eq!(
         texts[1],
         "--set machine.path.rapid=0.5 m/s: axis `a` reaches 0.643 m/s, but a path at 0.5 m/s may \
-         ask it for 0.707 m/s: jobs that do will be refused"
+         ask it for 0.707 m/s: jobs that do are slowed"
     );
 }
 

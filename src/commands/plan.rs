@@ -249,7 +249,7 @@ fn print_pulses(pulses: &PulseFacts, machine: &Machine) {
     let steppers = steppers.filter(|(_, axis)| axis.motor.stepper().is_some());
     let counts = steppers.map(|(index, axis)| {
         let (count, rate) = (pulses.counts[index], pulses.largest_rate[index] * 1e-3);
-        format!("{} {count:+} at the end, {rate:.1} kHz at most", axis.name)
+        format!("{} {count:+} pulses from start to end, {rate:.1} kHz at most", axis.name)
     });
     say!("pulses    {}", counts.collect::<Vec<_>>().join("; "));
     say!(

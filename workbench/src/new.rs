@@ -3,7 +3,7 @@
 //!
 //! The machine is like the shipped one of its kind, in another size. What its joints must do is found
 //! over its whole area, motors are chosen for that, and the file is checked, planned with and simulated
-//! before it is given out. What no motor can do is asked for less, and the file says so.
+//! before it is given out. Where no motor is enough, speed or acceleration is lowered, and the file says so.
 
 mod choose;
 mod draft;

@@ -93,7 +93,7 @@ fn drive(what: &str, drive: &Drive) {
     let gear = match &drive.gear {
         Some(gear) => format!(", gear {gear}"),
         None if drive.gear_ratio == 1.0 => ", no gear".to_owned(),
-        None => format!(", gear {}", drive.gear_ratio),
+        None => format!(", ratio {}", drive.gear_ratio),
     };
     let mass = drive.mass.map(|mass| format!(", {:.0} g", mass * 1e3)).unwrap_or_default();
     let warm = drive.temperature.map(|warm| format!(", winding {warm:.0} °C")).unwrap_or_default();
@@ -112,10 +112,10 @@ fn supply(report: &SizeReport) {
     let supply = &report.supply;
     match (supply.voltage, supply.max_voltage) {
         (Some(voltage), Some(most)) => say!(
-            "supply    {:.2} J at once are given back: {voltage:.1} V of at most {most:.1} V",
+            "supply    up to {:.2} J come back at one time: {voltage:.1} V of at most {most:.1} V",
             supply.surplus
         ),
-        _ => say!("supply    {:.2} J at once are given back", supply.surplus),
+        _ => say!("supply    up to {:.2} J come back at one time", supply.surplus),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The choice of a motor and a gear for an axis, by what its joint must do.
 
 use super::draft::{Asked, AxisDraft};
-use super::drive::{Drive, LOOPS};
+use super::drive::Drive;
 use super::text::about;
 use super::worst::Worst;
 use super::{LESS, Short, TOLERANCE};
@@ -14,10 +14,6 @@ use machine::{DcMotor, Friction, Motor};
 
 /// Turns that a motor may have in hand: `graver check` warns from 60 on.
 const MOST_SPEED_RESERVE: f64 = 30.0;
-
-/// Tolerances of the path by which a weight may push the tool off when its brake opens: `graver check`
-/// warns from 25 on.
-const WEIGHT_TOLERANCES: f64 = 20.0;
 
 /// What the shaft does for the worst of `worst`: up to full speed with full acceleration, as long again
 /// at full speed, and down, to and fro for ever. Half of the time is full acceleration.
@@ -134,8 +130,8 @@ pub(super) fn choose(
     }
     let why = nearest
         .as_ref()
-        .map_or_else(String::new, |failed| format!(": the nearest, {}", failed.why));
-    let why = format!("no motor of the catalogues does it on axis {}{why}", axis.name);
+        .map_or_else(String::new, |failed| format!(". The nearest is {}", failed.why));
+    let why = format!("no motor of the catalogues is enough for axis {}{why}", axis.name);
     Err(match nearest {
         // What a motor feels of its load goes with the square of the speed that its gear leaves it.
         Some(Failed { is_speed: true, share, .. }) => {
@@ -152,7 +148,7 @@ pub(super) fn choose(
 const FAR: f64 = 10.0;
 
 /// From here on [`Failed::held`] means that the motor fits by speed and inertia.
-const MORE_THAN_SPEED: usize = 5;
+const MORE_THAN_SPEED: usize = 4;
 
 /// Why a motor with a gear does not do it.
 #[derive(Debug, Clone, PartialEq)]
@@ -198,15 +194,9 @@ impl Search<'_> {
             } else {
                 "far beyond".to_owned()
             };
-            let why = format!("{} with {gear}, would be {used} its {what}", candidate.name);
-            let is_speed = [
-                "speed",
-                "load inertia",
-                "hold of the weight",
-                "mechanical time constant",
-                "resolution",
-                "pulse rate",
-            ];
+            let why = format!("{} with {gear}: {what} would be {used} the limit", candidate.name);
+            let is_speed =
+                ["speed", "load inertia", "mechanical time constant", "resolution", "pulse rate"];
             Failed { held, share, is_speed: is_speed.contains(&what), why }
         };
         let speed = checks::speed(&candidate, self.need, self.options.margin);
@@ -220,7 +210,6 @@ impl Search<'_> {
             (speed.share, "speed"),
             (reserve, "reserve of speed"),
             (load, "load inertia"),
-            (self.weight(&candidate), "hold of the weight"),
             (self.slowness(&candidate), "mechanical time constant"),
         ];
         if let Some((held, (share, what))) =
@@ -246,16 +235,6 @@ impl Search<'_> {
         let inertia = motor.rotor_inertia + candidate.ratio * candidate.ratio * self.need.load;
         let constant = motor.torque_constant;
         inertia * motor.resistance / (constant * constant) / LONGEST
-    }
-
-    /// How far the loops give way to the weight when its brake opens, as a share of what they may.
-    fn weight(&self, candidate: &Candidate) -> f64 {
-        let Motor::Dc(motor) = &candidate.motor else { return 0.0 };
-        let torque =
-            self.worst.gravity * candidate.ratio - friction(&candidate.motor, candidate).coulomb;
-        let inertia = motor.rotor_inertia + candidate.ratio * candidate.ratio * self.need.load;
-        let push = torque / (inertia * LOOPS[0] * LOOPS[1]) * candidate.ratio * self.worst.lever;
-        push / (WEIGHT_TOLERANCES * TOLERANCE)
     }
 
     /// Ratios to try with `motor`: from the one that uses most of its speed down.

@@ -138,7 +138,7 @@ impl Asked {
             .filter(|(_, because)| !because.is_empty())
             .map(|(((name, unit, now), wished), because)| {
                 format!(
-                    "{name}: {} {unit} in place of {} {unit}: {because}",
+                    "{name} {} {unit} instead of {} {unit}, because {because}",
                     about(*now),
                     about(wished)
                 )
@@ -281,7 +281,7 @@ impl Draft {
         }
         text += "\n# Limits of the tool's motion: lengths of the vectors, along and across the path together.\n";
         for sentence in asked.lowered() {
-            text += &comment(&format!("Lowered, {sentence}."));
+            text += &comment(&format!("Lowered: {sentence}."));
         }
         text += "[path]\n";
         text += &line("speed", &quantity(asked.speed, "m/s"), "while marking");

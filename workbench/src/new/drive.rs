@@ -12,7 +12,7 @@ use core::f64::consts::TAU;
 use machine::{Friction, Motor, StepperMotor};
 
 /// Loops of position and velocity [1/s, rad/s]: those of the shipped files.
-pub(super) const LOOPS: [f64; 2] = [40.0, 160.0];
+const LOOPS: [f64; 2] = [40.0, 160.0];
 
 /// Counts or pulses that the tolerance of the path must hold.
 const COUNTS: f64 = 8.0;
@@ -63,7 +63,7 @@ impl Drive {
         }
         let friction = friction(&motor, candidate);
         let friction_why = match &motor {
-            Motor::Dc(_) => "the motor's own, and 5 % of what it gives for ever",
+            Motor::Dc(_) => "the motor's own, and 5 % of its continuous torque",
             Motor::Stepper(_) => "2 % of the holding torque",
         };
         let mut counts = 4096.0;
@@ -98,8 +98,8 @@ impl Drive {
             ),
         };
         let mut why = comment(&format!(
-            "{}{}: the lightest that does {joint} of load at the worst place of the area, half of the \
-             time; with {margin} of every need it uses {}.",
+            "{}{}: the lightest that meets {joint} of load, the worst of the whole area, at a duty cycle of \
+             50 %. With a margin of {margin}, use of its limits: {}.",
             candidate.name,
             candidate
                 .gear
@@ -185,6 +185,7 @@ impl Drive {
         text += &line("viscous", &quantity(self.friction.viscous, "N m s/rad"), tenth);
         if let Some((brake, why)) = &self.brake {
             text += &line("brake", &quantity(*brake * 1e3, "mN m"), why);
+            text += &line("brake_release", "\"20 ms\"", first("of the brake: see its data sheet"));
         }
         if self.motor.dc().is_some() {
             text += &format!("\n[axis.{name}.encoder]\n");
@@ -232,7 +233,7 @@ impl Drive {
                 text +=
                     &line("current", &exact(motor.current, "A"), first("limit of the power stage"));
                 if let Some(continuous) = motor.continuous_current {
-                    let what = first("what the winding bears for ever");
+                    let what = first("rated continuous current of the winding");
                     text += &line("continuous_current", &exact(continuous, "A"), what);
                 }
                 text += &line("resistance", &exact(motor.resistance, "ohm"), "");

@@ -68,7 +68,7 @@ impl Argument {
         Ok(value)
     }
 
-    /// Reads two of them, as in `300 x 200 mm`; the first has the unit of the second where it has none.
+    /// Reads two of them, as in `300 x 200 mm`; one without a unit has that of the other.
     ///
     /// # Errors
     /// As of [`Self::read`].
@@ -77,12 +77,14 @@ impl Argument {
             let Self { name, unit: (unit, _), .. } = self;
             return Err(format!("--{name} {text}: write two, such as \"300 x 200 {unit}\""));
         };
-        let unit = second.trim_start_matches(|it: char| it.is_ascii_digit() || " .".contains(it));
-        let first = match first.trim().parse::<f64>() {
-            Ok(_) => format!("{} {unit}", first.trim()),
-            Err(_) => first.to_owned(),
+        // A bare number is in the unit of the other.
+        let is_number = |text: &str| text.trim().parse::<f64>().is_ok();
+        let with = |text: &str, other: &str| {
+            let unit = other.char_indices().rev().find(|(at, _)| is_number(&other[..*at]));
+            let unit = unit.filter(|_| is_number(text)).map_or("", |(at, _)| &other[at..]);
+            format!("{} {}", text.trim(), unit.trim())
         };
-        Ok([self.read(&first)?, self.read(second)?])
+        Ok([self.read(&with(first, second))?, self.read(&with(second, first))?])
     }
 
     /// `value`, in SI units, as a person writes it.
@@ -169,6 +171,8 @@ mod tests {
         assert_eq!(Argument::HEAD.read("800 g"), Ok(0.8));
         assert_eq!(Argument::AREA.read_two("300x200"), Ok([0.3, 0.2]));
         assert_eq!(Argument::AREA.read_two("30 x 20 cm"), Ok([0.3, 0.2]));
+        assert_eq!(Argument::AREA.read_two("30 cm x 20"), Ok([0.3, 0.2]));
+        assert_eq!(Argument::AREA.read_two("3e2 x 2e2 mm"), Ok([0.3, 0.2]));
         assert_eq!(Argument::AREA.read_two("0.3 m x 200 mm"), Ok([0.3, 0.2]));
         assert_eq!(Argument::AREA.read_two("2000 mm x 20 mm"), Ok([2.0, 0.02]));
         assert_eq!(Argument::SPEED.written(0.25), "0.25 m/s");
