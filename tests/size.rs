@@ -68,7 +68,8 @@ fn what_size_cannot_do_it_says() {
     let out = out.to_str().unwrap();
     let ended = graver(&["--set", "machine.path.jerk=400 m/s^3", "--out", out]);
     assert_eq!(ended.code, Some(2));
-    assert!(ended.error.contains("--set"), "{}", ended.error);
+    let due = "--out does not write the changes that --set makes to the machine: change the machine file instead";
+    assert!(ended.error.contains(due), "{}", ended.error);
     // Where no motor does it, the limits that are broken are named and nothing is written.
     let ended = graver(&["--motors", "dc", "--margin", "50", "--json"]);
     let report = ended.json(1);

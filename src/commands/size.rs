@@ -22,8 +22,8 @@ pub fn run(arguments: &SizeArguments) -> Result<Exit, Failure> {
     let overrides = Overrides::sort(&arguments.machine.set)?.machine;
     if arguments.out.is_some() && !overrides.is_empty() {
         return Err(Failure::bad_input(
-            "--out writes the machine file, and what --set changes of the machine is not in it: \
-             change the file instead",
+            "--out does not write the changes that --set makes to the machine: change the machine file \
+             instead",
         ));
     }
     let request = inputs::job_request(
