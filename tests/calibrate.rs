@@ -12,6 +12,11 @@ use support::{Place, assert_valid, number, source};
 
 /// Poses of the shipped platform with these values of its legs and stator, measured to a micrometre.
 fn measurements(count: usize) -> String {
+    spread_measurements(count, 1.0)
+}
+
+/// The same, turned and lifted by this share only.
+fn spread_measurements(count: usize, spread: f64) -> String {
     let file = std::fs::read_to_string(source("machines/tri_planar.toml")).unwrap();
     let built = file.replace(
         "side = \"200 mm\"",
@@ -26,8 +31,9 @@ fn measurements(count: usize) -> String {
     let mut made = 0;
     while made < count {
         let mut even = |half: f64| random.between(-half, half);
-        let position = Vector3::new(even(0.06), even(0.06), 0.104 + even(0.02));
-        let rotation = Rotation3::from_euler_angles(even(0.25), even(0.25), even(0.4));
+        let position = Vector3::new(even(0.06), even(0.06), 0.104 + even(0.02) * spread);
+        let [roll, pitch, yaw] = [even(0.25), even(0.25), even(0.4)].map(|turn| turn * spread);
+        let rotation = Rotation3::from_euler_angles(roll, pitch, yaw);
         let pose = Pose { position, rotation: rotation.into_inner() };
         let Ok(feet) = mechanism.inverse(&pose, mechanism.branch(), &Joints::zeros()) else {
             continue;
@@ -99,4 +105,66 @@ fn what_calibrate_cannot_do_it_says() {
     assert_eq!(ended.code, Some(2), "{}", ended.error);
     let ended = place.graver(&["calibrate", poses, "--machine", machine, "--free", "wings"]);
     assert_eq!(ended.code, Some(2), "{}", ended.error);
+    let out = place.path("out.toml");
+    let out = out.to_str().unwrap();
+    let set = ["--set", "machine.path.jerk=400 m/s^3"];
+    let ended =
+        place.graver(&["calibrate", poses, "--machine", machine, "--out", out, set[0], set[1]]);
+    assert_eq!(ended.code, Some(2), "{}", ended.error);
+    assert!(
+        ended.error.contains(
+            "--out does not write the changes that --set makes to the machine: change the machine file instead"
+        ),
+        "{}",
+        ended.error
+    );
+}
+
+#[test]
+fn measurements_that_do_not_fit_write_no_machine_file() {
+    let place = Place::new();
+    // The quaternions from the machine's frame to the tool, and not back.
+    let mut conjugated = String::new();
+    for (number, line) in measurements(40).lines().enumerate() {
+        let cells = line.split(',').enumerate().map(|(column, cell)| {
+            if number > 0 && column > 9 {
+                (-cell.parse::<f64>().unwrap()).to_string()
+            } else {
+                cell.to_owned()
+            }
+        });
+        conjugated += &cells.collect::<Vec<_>>().join(",");
+        conjugated.push('\n');
+    }
+    let poses = place.file("conjugated.csv", &conjugated);
+    let machine = source("machines/tri_planar.toml");
+    let out = place.path("calibrated.toml");
+    let [poses, machine, path] = [&poses, &machine, &out].map(|path| path.to_str().unwrap());
+    let ended = place.graver(&["calibrate", poses, "--machine", machine, "--out", path]);
+    assert_eq!(ended.code, Some(2), "{}", ended.error);
+    for due in
+        ["conjugated.csv: the poses do not fit this machine", "mm rms", "in line ", "quaternion"]
+    {
+        assert!(ended.error.contains(due), "{}", ended.error);
+    }
+    assert!(!out.exists());
+}
+
+#[test]
+fn open_combinations_are_said_with_what_to_measure() {
+    let place = Place::new();
+    let poses = place.file("level.csv", &spread_measurements(30, 0.0));
+    let machine = source("machines/tri_planar.toml");
+    let [poses, machine] = [&poses, &machine].map(|path| path.to_str().unwrap());
+    let ended = place.graver(&["calibrate", poses, "--machine", machine]);
+    assert_eq!(ended.code, Some(0), "{}", ended.error);
+    for due in [
+        "of 18 numbers are determined\n",
+        "\nopen      ",
+        ": these poses do not determine it; the file's values are kept\n",
+        "\n          measure poses at other heights and other angles to determine it\n",
+        "(not determined by these poses)",
+    ] {
+        assert!(ended.error.contains(due), "{due}: {}", ended.error);
+    }
 }

@@ -16,8 +16,8 @@ pub fn run(arguments: &CalibrateArguments) -> Result<Exit, Failure> {
     let input = inputs::machine(&arguments.machine)?;
     if arguments.out.is_some() && !Overrides::sort(&arguments.machine.set)?.machine.is_empty() {
         return Err(Failure::bad_input(
-            "--out writes the machine file, and what --set changes of the machine is not in it: \
-             change the file instead",
+            "--out does not write the changes that --set makes to the machine: change the machine file \
+             instead",
         ));
     }
     let file = arguments.measurements.display().to_string();
@@ -61,7 +61,7 @@ fn parts(free: &[CalibratePart]) -> Vec<Part> {
 /// Prints it on standard error.
 fn print(report: &CalibrationReport) {
     say!(
-        "machine   {}, {} poses, {} of {} numbers are told by them",
+        "machine   {}, {} poses, {} of {} numbers are determined",
         report.machine,
         report.poses,
         report.rank,
@@ -70,13 +70,14 @@ fn print(report: &CalibrationReport) {
     fit("before", &report.before);
     fit("after", &report.after);
     report.numbers.iter().for_each(number);
-    for direction in &report.untold {
+    for direction in &report.open {
         let shares: Vec<String> =
             direction.iter().map(|share| format!("{:+.2} {}", share.part, share.name)).collect();
-        say!("untold    {}: the file's values stay along it", shares.join(" "));
-    }
-    if !report.untold.is_empty() {
-        say!("          measure poses at other heights, and turned otherwise, to tell it");
+        let combination = shares.join(" ");
+        say!(
+            "open      {combination}: these poses do not determine it; the file's values are kept"
+        );
+        say!("          measure poses at other heights and other angles to determine it");
     }
     if let Some(written) = &report.written {
         say!("written   {written}");
@@ -89,15 +90,15 @@ fn fit(name: &str, fit: &Fit) {
 }
 
 fn number(number: &Identified) {
-    let Identified { name, unit, before, value, deviation } = number;
+    let Identified { name, unit, value, deviation, .. } = number;
     let (scale, unit, small) = match *unit {
         "rad" => (1e3, "mrad", "µrad"),
         _ => (1e3, "mm", "µm"),
     };
-    let change = (value - before) * 1e6;
+    let change = number.change() * 1e6;
     let sure = match deviation {
         Some(deviation) => format!("± {:.2} {small}", deviation * 1e6),
-        None => "not told by these poses".to_owned(),
+        None => "not determined by these poses".to_owned(),
     };
     say!("{name:<13} {:>12.5} {unit}, {change:+.2} {small} ({sure})", value * scale);
 }

@@ -2,7 +2,7 @@
 
 use machine::Pose;
 use machine::mechanisms::tri_planar::{Mounting, TriPlanar};
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{DMatrix, Rotation3, Vector3};
 
 /// What of a platform may be identified, six numbers each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +76,51 @@ fn shifted(frame: &Pose, step: &[f64], side: f64) -> Pose {
         position: frame.position + frame.rotation * by(0),
         rotation: frame.rotation * Rotation3::new(by(3) / side).into_inner(),
     }
+}
+
+/// The six numbers of a part as they are printed: lengths, or a place and the turns about x, then y, then
+/// z [m, rad].
+pub(super) fn numbers(mechanism: &TriPlanar, part: Part) -> [f64; 6] {
+    let mounting = mounting(mechanism);
+    let frame = match part {
+        Part::Legs => {
+            return core::array::from_fn(|index| mechanism.struts[index / 2][index % 2]);
+        }
+        Part::Base => mounting.base,
+        Part::Tool => mounting.tool,
+    };
+    let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(frame.rotation).euler_angles();
+    [frame.position.x, frame.position.y, frame.position.z, roll, pitch, yaw]
+}
+
+/// How the printed numbers of all `free` parts change with a step of the unknowns, turns as lengths.
+pub(super) fn slopes(mechanism: &TriPlanar, free: &[Part]) -> DMatrix<f64> {
+    /// Half of the difference, in sides: what is left out and rounding are both far below 1e-6.
+    const HALF: f64 = 1e-5;
+    let half = HALF * mechanism.side;
+    let mut slopes = DMatrix::zeros(count(free), count(free));
+    for column in 0..count(free) {
+        let after = |by: f64| {
+            let mut step = vec![0.0; count(free)];
+            step[column] = by;
+            numbers(&moved(mechanism, free, &step), free[column / 6])
+        };
+        let [ahead, behind] = [half, -half].map(after);
+        let first = column - column % 6;
+        for (index, (ahead, behind)) in ahead.into_iter().zip(behind).enumerate() {
+            let is_turn = free[column / 6] != Part::Legs && index >= 3;
+            let difference =
+                if is_turn { turn(ahead - behind) * mechanism.side } else { ahead - behind };
+            slopes[(first + index, column)] = difference / (2.0 * half);
+        }
+    }
+    slopes
+}
+
+/// The difference of two angles, within half a turn to either side [rad].
+pub(super) fn turn(difference: f64) -> f64 {
+    use core::f64::consts::{PI, TAU};
+    PI - (PI - difference).rem_euclid(TAU)
 }
 
 /// How a strut's excess length over its leg changes with each unknown: `strut` from foot to corner, the

@@ -2,12 +2,11 @@
 
 use machine::Machine;
 use machine::mechanisms::tri_planar::TriPlanar;
-use nalgebra::Rotation3;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Measurement;
-use super::model::{Part, count, mounting};
+use super::model::{Part, count, numbers, turn};
 use super::solve::Solution;
 
 /// What was identified, and how well it agrees.
@@ -17,9 +16,9 @@ pub struct CalibrationReport {
     pub machine: String,
     /// How many poses were measured.
     pub poses: usize,
-    /// How many numbers were sought, and how many the poses tell.
+    /// How many numbers were sought.
     pub unknowns: usize,
-    /// How many of them the poses tell.
+    /// How many of them the poses determine.
     pub rank: usize,
     /// How much the struts are too long or too short with the machine file's numbers.
     pub before: Fit,
@@ -27,8 +26,8 @@ pub struct CalibrationReport {
     pub after: Fit,
     /// The numbers.
     pub numbers: Vec<Identified>,
-    /// Directions that the poses do not tell: along each, the machine file's values stay.
-    pub untold: Vec<Vec<Share>>,
+    /// Directions that the poses do not determine: along each, the machine file's values are kept.
+    pub open: Vec<Vec<Share>>,
     /// Where the machine file was written.
     pub written: Option<String>,
 }
@@ -55,8 +54,16 @@ pub struct Identified {
     pub before: f64,
     /// What was identified.
     pub value: f64,
-    /// Its standard deviation by the residuals; null where the poses do not tell it.
+    /// Its standard deviation by the residuals; null where the poses do not determine it.
     pub deviation: Option<f64>,
+}
+
+impl Identified {
+    /// How much it differs from what the machine file says [m or rad]; turns by half a turn at most.
+    pub fn change(&self) -> f64 {
+        let change = self.value - self.before;
+        if self.unit == "rad" { turn(change) } else { change }
+    }
 }
 
 /// The part of one number in a direction.
@@ -78,7 +85,7 @@ pub(super) fn of(
     /// What has a smaller part in a direction is not named.
     const NAMED: f64 = 0.05;
     let names: Vec<&'static str> = free.iter().flat_map(|part| part.unknowns()).collect();
-    let untold = solution.untold.iter().map(|direction| {
+    let open = solution.open.iter().map(|direction| {
         let mut shares: Vec<Share> = names
             .iter()
             .zip(direction)
@@ -107,27 +114,13 @@ pub(super) fn of(
         machine: machine.name.clone(),
         poses: measurements.len(),
         unknowns: count(free),
-        rank: count(free) - solution.untold.len(),
+        rank: count(free) - solution.open.len(),
         before: fit(&solution.before, measurements),
         after: fit(&solution.after, measurements),
         numbers: identified.collect(),
-        untold: untold.collect(),
+        open: open.collect(),
         written: None,
     }
-}
-
-/// The six numbers of a part: lengths, or place and turns about x, then y, then z.
-fn numbers(mechanism: &TriPlanar, part: Part) -> [f64; 6] {
-    let mounting = mounting(mechanism);
-    let frame = match part {
-        Part::Legs => {
-            return core::array::from_fn(|index| mechanism.struts[index / 2][index % 2]);
-        }
-        Part::Base => mounting.base,
-        Part::Tool => mounting.tool,
-    };
-    let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(frame.rotation).euler_angles();
-    [frame.position.x, frame.position.y, frame.position.z, roll, pitch, yaw]
 }
 
 fn fit(residuals: &[f64], measurements: &[Measurement]) -> Fit {

@@ -4,7 +4,8 @@ use machine::mechanisms::tri_planar::TriPlanar;
 use nalgebra::{DMatrix, DVector, SVD, Vector3};
 
 use super::Measurement;
-use super::model::{Part, count, moved, row};
+use super::model::{Part, count, moved, row, slopes};
+use super::start::start;
 
 /// Steps before it is given up; from drawn lengths four are usual.
 const STEPS: usize = 50;
@@ -15,8 +16,18 @@ const ROUNDING: f64 = 1e-12;
 /// Halvings of a step that makes the residuals larger.
 const HALVINGS: usize = 12;
 
-/// A direction whose singular value is below this share of the largest is not told by the poses.
-const TOLD: f64 = 1e-7;
+/// A step that changes no more than this share of the residuals has found the least.
+const SETTLED: f64 = 1e-6;
+
+/// A direction whose singular value is below this share of the largest is not determined by the poses: noise
+/// of an instrument must not pass for a spread of them.
+const DETERMINED: f64 = 1e-4;
+
+/// The same where the measurements have next to no noise.
+const FINELY_DETERMINED: f64 = 1e-7;
+
+/// Directions that are only finely determined count if they bring the residuals below this share.
+const EXPLAINED: f64 = 0.5;
 
 /// What was found.
 #[derive(Debug, Clone)]
@@ -26,9 +37,12 @@ pub(super) struct Solution {
     /// How much each strut is too long with the machine file's numbers, and with the identified ones [m].
     pub(super) before: Vec<f64>,
     pub(super) after: Vec<f64>,
-    /// Directions of the unknowns that the poses do not tell, unit vectors.
-    pub(super) untold: Vec<Vec<f64>>,
-    /// Standard deviation of each unknown, turns as lengths [m]; `None` where it is not told.
+    /// Whether no step makes the residuals smaller.
+    pub(super) is_settled: bool,
+    /// Directions of the printed numbers that the poses do not determine, unit vectors at right angles to
+    /// each other, turns as lengths.
+    pub(super) open: Vec<Vec<f64>>,
+    /// Standard deviation of each printed number, turns as lengths [m]; `None` where it is not determined.
     pub(super) deviations: Vec<Option<f64>>,
 }
 
@@ -82,27 +96,47 @@ pub(super) fn solve(
     measurements: &[Measurement],
     free: &[Part],
 ) -> Option<Solution> {
+    let coarse = within(STEPS, DETERMINED, mechanism, measurements, free)?;
+    let size = |solution: &Solution| DVector::from_column_slice(&solution.after).norm();
+    let fine = within(STEPS, FINELY_DETERMINED, mechanism, measurements, free)
+        .filter(|fine| fine.is_settled && size(fine) < EXPLAINED * size(&coarse));
+    Some(fine.unwrap_or(coarse))
+}
+
+/// The same in so many steps at most, determined directions having `least` as their least singular value, as
+/// a share of the largest.
+pub(super) fn within(
+    steps: usize,
+    least: f64,
+    mechanism: &TriPlanar,
+    measurements: &[Measurement],
+    free: &[Part],
+) -> Option<Solution> {
     let norm = |residuals: &[f64]| residuals.iter().map(|r| r * r).sum::<f64>();
     let before = residuals(mechanism, measurements);
-    let (mut here, mut left) = (*mechanism, before.clone());
-    for _ in 0..STEPS {
-        let (triangle, seen) = decomposed(jacobian(&here, measurements, free), &left)?;
-        let threshold = TOLD * triangle.singular_values.max();
+    let mut here = start(mechanism, measurements, free);
+    let mut left = residuals(&here, measurements);
+    let mut is_settled = false;
+    for _ in 0..steps {
+        let matrix = jacobian(&here, measurements, free);
+        let (triangle, seen) = decomposed(matrix.clone(), &left)?;
+        let threshold = least * triangle.singular_values.max();
         let step = -triangle.solve(&seen, threshold).ok()?;
-        let mut share = 1.0;
+        let rounding = ROUNDING * (left.len() as f64).sqrt();
+        is_settled = (matrix * &step).norm() <= SETTLED * norm(&left).sqrt() + rounding;
+        let mut part = 1.0;
         let mut found = None;
         for _ in 0..HALVINGS {
-            let step: Vec<f64> = step.iter().map(|part| part * share).collect();
+            let step: Vec<f64> = step.iter().map(|by| by * part).collect();
             let next = moved(&here, free, &step);
             let residuals = residuals(&next, measurements);
             if norm(&residuals) <= norm(&left) {
                 found = Some((next, residuals));
                 break;
             }
-            share /= 2.0;
+            part /= 2.0;
         }
         let is_there = step.amax() < ROUNDING;
-        // What no shorter step betters is the least.
         let Some((next, residuals)) = found else { break };
         (here, left) = (next, residuals);
         if is_there {
@@ -115,29 +149,33 @@ pub(super) fn solve(
     let (triangle, _) = decomposed(jacobian(&here, measurements, free), &left)?;
     let vectors = triangle.v_t.as_ref()?;
     let values = &triangle.singular_values;
-    let threshold = TOLD * values.max();
-    let told = |index: usize| values[index] > threshold;
-    let rank = (0..values.len()).filter(|index| told(*index)).count();
-    let untold: Vec<Vec<f64>> = (0..values.len())
-        .filter(|index| !told(*index))
-        .map(|index| vectors.row(index).iter().copied().collect())
-        .collect();
-    let freedom = (left.len() - rank).max(1) as f64;
+    let threshold = least * values.max();
+    let (seen, unseen): (Vec<usize>, Vec<usize>) =
+        (0..values.len()).partition(|index| values[*index] > threshold);
+    let freedom = (left.len() - seen.len()).max(1) as f64;
     let variance = norm(&left) / freedom;
-    /// A number that has more than this part in a direction that is not told is not told itself.
+    // From the steps, which are in each frame's own axes, to the numbers that are printed.
+    let slopes = slopes(&here, free);
+    let carried = |index: usize| &slopes * vectors.row(index).transpose();
+    let mut open = DMatrix::zeros(count(free), unseen.len());
+    for (column, index) in unseen.iter().enumerate() {
+        open.set_column(column, &carried(*index));
+    }
+    if !unseen.is_empty() {
+        open = open.qr().q();
+    }
+    /// A number that has more than this part in an open direction is not determined.
     const PART: f64 = 1e-3;
+    let squares = seen.iter().fold(DVector::zeros(count(free)), |sum: DVector<f64>, index| {
+        let part = carried(*index) / values[*index];
+        sum + part.component_mul(&part)
+    });
     let deviations = (0..count(free))
-        .map(|unknown| {
-            let is_told = untold.iter().all(|direction| direction[unknown].abs() < PART);
-            is_told.then(|| {
-                let sum: f64 = (0..values.len())
-                    .filter(|index| told(*index))
-                    .map(|index| vectors[(index, unknown)] / values[index])
-                    .map(|part| part * part)
-                    .sum();
-                (variance * sum).sqrt()
-            })
+        .map(|number| {
+            let is_determined = open.row(number).iter().all(|part| part.abs() < PART);
+            is_determined.then(|| (variance * squares[number]).sqrt())
         })
         .collect();
-    Some(Solution { mechanism: here, before, after: left, untold, deviations })
+    let open = open.column_iter().map(|direction| direction.iter().copied().collect()).collect();
+    Some(Solution { mechanism: here, before, after: left, is_settled, open, deviations })
 }
