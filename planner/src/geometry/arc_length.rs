@@ -7,7 +7,7 @@
 
 use nalgebra::Vector3;
 
-use crate::geometry::jet::Jet;
+use crate::geometry::jet::{Jet, larger};
 
 /// Largest error of the parameter anywhere in a table, as a distance along the curve [m].
 const PRECISION: f64 = 1e-12;
@@ -115,7 +115,7 @@ impl<C: Parametric> ByArcLength<C> {
 
 impl ByArcLength<()> {
     /// Largest distance along the curve between where the table says the middle of a step is, and
-    /// where it is.
+    /// where it is [m]; not a number where one of them is not.
     fn error<C: Parametric>(&self, curve: &C) -> f64 {
         let steps = self.nodes.len() - 1;
         let step = self.length / steps as f64;
@@ -123,7 +123,7 @@ impl ByArcLength<()> {
         for index in 0..steps {
             let middle = parameter_at(&self.nodes, self.length, step * (index as f64 + 0.5));
             let off = arc_length(curve, self.nodes[index][0], middle) - step / 2.0;
-            worst = worst.max(off.abs());
+            worst = larger(worst, off.abs());
         }
         worst
     }
@@ -158,4 +158,32 @@ fn arc_length<C: Parametric>(curve: &C, from: f64, to: f64) -> f64 {
         })
         .sum();
     sum * half
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A curve that stands still at its start.
+    struct Cusp;
+
+    impl Parametric for Cusp {
+        fn end(&self) -> f64 {
+            1.0
+        }
+
+        fn jet(&self, u: f64) -> Jet {
+            Jet {
+                point: Vector3::new(u * u, u * u * u, 0.0),
+                first: Vector3::new(2.0 * u, 3.0 * u * u, 0.0),
+                second: Vector3::new(2.0, 6.0 * u, 0.0),
+                third: Vector3::new(0.0, 6.0, 0.0),
+            }
+        }
+    }
+
+    #[test]
+    fn a_table_that_is_no_number_at_its_start_is_not_exact() {
+        assert!(ByArcLength::with_steps(&Cusp, 8).error(&Cusp).is_nan());
+    }
 }

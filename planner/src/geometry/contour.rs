@@ -130,7 +130,8 @@ impl Contour {
         // corner.
         let nearer = ((1.0 + cosine.max(REVERSAL)) / 2.0).sqrt().max(LEAST_NEARER);
         let blend = Blend::new(&before, &after, room, joining.tolerance / nearer, &joining.limits);
-        if cosine < CORNER {
+        // A direction that is no number goes on into nothing.
+        if cosine < CORNER || cosine.is_nan() {
             let passes = joining.rounds
                 && cosine > REVERSAL
                 && (self.policy == Policy::Proportional || self.is_even(&blend, demands, joining));

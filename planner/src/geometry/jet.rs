@@ -24,6 +24,11 @@ pub(crate) struct Progress {
     pub(crate) third: f64,
 }
 
+/// The larger of both, and not a number where one of them is not: [`f64::max`] takes the other one then.
+pub(crate) fn larger(one: f64, other: f64) -> f64 {
+    if one > other || one.is_nan() { one } else { other }
+}
+
 impl Jet {
     /// How the parameter that this jet is taken by goes on with arc length.
     pub(crate) fn progress(&self) -> Progress {

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use crate::drawing::Curve;
 use crate::geometry::arc_length::{ByArcLength, Parametric};
 use crate::geometry::cubic::Cubic;
-use crate::geometry::jet::Jet;
+use crate::geometry::jet::{Jet, larger};
 use crate::geometry::projected::Projected;
 use crate::geometry::spline::Spline;
 
@@ -312,12 +312,35 @@ impl Bend {
 
     /// The larger of both.
     pub(crate) fn or(self, other: Self) -> Self {
-        Self { curvature: self.curvature.max(other.curvature), third: self.third.max(other.third) }
+        Self {
+            curvature: larger(self.curvature, other.curvature),
+            third: larger(self.third, other.third),
+        }
     }
 
-    /// The largest constant speed within `acceleration` and `jerk`: V²κ ≤ A and V³|p‴| ≤ J.
+    /// The largest constant speed within `acceleration` and `jerk`: V²κ ≤ A and V³|p‴| ≤ J; 0 where it is
+    /// not known how sharply the curve bends.
     pub(crate) fn speed(&self, acceleration: f64, jerk: f64) -> f64 {
+        if self.curvature.is_nan() || self.third.is_nan() {
+            return 0.0;
+        }
         let lateral = (acceleration / self.curvature).sqrt();
         lateral.min(math::cbrt(jerk / self.third))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bend_that_is_no_number_allows_no_speed_whatever_is_beside_it() {
+        let known = Bend { curvature: 100.0, third: 1e4 };
+        assert!(known.speed(1.0, 10.0) > 0.0);
+        for unknown in [Bend { curvature: f64::NAN, ..known }, Bend { third: f64::NAN, ..known }] {
+            for bend in [known.or(unknown), unknown.or(known)] {
+                assert_eq!(bend.speed(1.0, 10.0), 0.0, "{bend:?}");
+            }
+        }
     }
 }
