@@ -205,8 +205,9 @@ impl Path {
             }
         }
         if let Turned::Along(turning, offset) = &self.turned {
-            let knots = turning.places().map(|place| place - offset);
-            borders.extend(knots.filter(|knot| *knot > 0.0 && (from..=to).contains(knot)));
+            let knots = turning.places(from + offset).map(|place| place - offset);
+            let inside = |knot: &f64| *knot > 0.0 && *knot >= from;
+            borders.extend(knots.take_while(|knot| *knot <= to).filter(inside));
         }
     }
 

@@ -81,11 +81,13 @@ impl Turning {
         moving(&product(&rows(&from.rotation), &product(&exponential(leaving), &turn)))
     }
 
-    /// The places of the knots and half way between them [m], growing.
-    pub(crate) fn places(&self) -> impl Iterator<Item = f64> + '_ {
-        let between = self.knots.windows(2).map(|pair| (pair[0].place + pair[1].place) / 2.0);
-        let ends = self.knots.iter().map(|knot| knot.place);
-        let last = self.knots.last().map(|knot| knot.place);
+    /// The places of the knots and half way between them [m], growing, from the last knot up to `start` on.
+    pub(crate) fn places(&self, start: f64) -> impl Iterator<Item = f64> + '_ {
+        let first = self.knots.partition_point(|knot| knot.place <= start).max(1) - 1;
+        let knots = &self.knots[first..];
+        let between = knots.windows(2).map(|pair| (pair[0].place + pair[1].place) / 2.0);
+        let ends = knots.iter().map(|knot| knot.place);
+        let last = knots.last().map(|knot| knot.place);
         ends.zip(between).flat_map(|(knot, middle)| [knot, middle]).chain(last)
     }
 }
@@ -232,6 +234,20 @@ mod tests {
             let found = turning.attitude(Taylor::new(place, 1.0, 0.0, 0.0), &mut 0);
             assert!((found.velocity - Vector3::z() * 10.0).amax() < 1e-9, "{}", found.velocity);
             assert!(found.acceleration.amax() < 1e-6, "{}", found.acceleration);
+        }
+    }
+
+    #[test]
+    fn places_are_looked_at_from_the_knot_before_on() {
+        let (knots, _, turning) = turning();
+        let all: Vec<f64> = turning.places(-1.0).collect();
+        assert_eq!(all.len(), 2 * knots.len() - 1);
+        assert!(all.windows(2).all(|pair| pair[0] < pair[1]));
+        for (index, knot) in knots.iter().enumerate() {
+            for start in [*knot, knot + 1e-3] {
+                let found: Vec<f64> = turning.places(start).collect();
+                assert_eq!(found, all[2 * index..], "{start}");
+            }
         }
     }
 
