@@ -77,7 +77,7 @@ pub(super) fn job(
         (Some(points), None, None) => {
             if points.len() < 2 {
                 let help = "write points such as [[\"0 mm\", \"0 mm\"], [\"10 mm\", \"5 mm\"]]";
-                let text = "a path has two points at least".to_owned();
+                let text = "a path needs at least two points".to_owned();
                 diagnostics.contradict(table.span, text, help);
             }
             let corners: Vec<Vector3<f64>> =
@@ -111,6 +111,12 @@ pub(super) fn job(
                     (PathPose { position, rotation, line }, pose.at.span)
                 })
                 .collect();
+            if poses.len() < 2 {
+                let help = "add poses such as { at = [\"10 mm\", \"0 mm\"] }";
+                let place = poses.first().map_or(table.span, |(_, span)| *span);
+                let text = "a path needs at least two poses".to_owned();
+                diagnostics.contradict(place, text, help);
+            }
             can_be_taken(&poses, machine, diagnostics);
             follow(&poses, between, diagnostics).map(|path| {
                 if path.is_turned() {
@@ -136,8 +142,9 @@ pub(super) fn job(
             Some(vec![mark(curve, power)])
         }
         _ => {
-            let help = "write one of `points`, `poses` and a table [path.circle]";
-            diagnostics.contradict(table.span, "which path is not clear".to_owned(), help);
+            let text =
+                "`[path]` needs exactly one of `points`, `poses` and `[path.circle]`".to_owned();
+            diagnostics.contradict(table.span, text, "write one of them and leave out the others");
             None
         }
     };
@@ -173,9 +180,7 @@ fn follow(
             is_sound = false;
             diagnostics.contradict(
                 *span,
-                format!(
-                    "places {one} and {other} of the path are one: the tool cannot turn on the spot"
-                ),
+                format!("points {one} and {other} of the path are at the same place"),
                 "leave one of them out, or move it by a micrometre at least",
             );
         }
@@ -185,8 +190,8 @@ fn follow(
             diagnostics.contradict(
                 *span,
                 format!(
-                    "from pose {one} to pose {other} the tool turns by {:.4} deg, and half a turn has no \
-                     one way",
+                    "from pose {one} to pose {other} the tool turns by {:.4} deg; at half a turn the \
+                     direction is not determined",
                     turn.to_degrees()
                 ),
                 "put a pose between them",
@@ -197,15 +202,10 @@ fn follow(
         .then(|| PosedPath::new(&poses.iter().map(|(pose, _)| *pose).collect::<Vec<_>>(), between))
 }
 
-/// That there are poses enough, and each is one that the machine can take: what no speed can do is told
-/// at its line.
+/// That each pose is one that the machine can take: what no speed can do is told at its line.
 fn can_be_taken(poses: &[(PathPose, Span)], machine: &Machine, diagnostics: &mut Diagnostics) {
     /// Rounding at the edge of the area [m].
     const ROUNDING: f64 = 1e-9;
-    if let [(_, span)] = poses {
-        let text = "a path has two poses at least".to_owned();
-        diagnostics.contradict(*span, text, "add a pose such as { at = [\"10 mm\", \"0 mm\"] }");
-    }
     let is_turned = |pose: &PathPose| pose.rotation != Matrix3::identity();
     for (index, (pose, span)) in poses.iter().enumerate() {
         let number = index + 1;
@@ -216,7 +216,8 @@ fn can_be_taken(poses: &[(PathPose, Span)], machine: &Machine, diagnostics: &mut
                     "pose {number} turns the tool, which the mechanism `{}` cannot",
                     machine.mechanism.name()
                 ),
-                "leave roll, pitch and yaw out, or take a machine that turns its tool, such as tri_planar",
+                "leave roll, pitch and yaw out, or use a machine that can turn its tool, such as \
+                 tri_planar, mcm or a serial arm",
             );
             return;
         }

@@ -282,8 +282,14 @@ fn poses_that_cannot_be_are_refused_at_their_line_with_what_would_be_right() {
     };
     let platform = platform();
     for (poses, due) in [
-        ("{ at = [\"0 mm\", \"0 mm\"], roll = \"3 deg\" }", "cannot turn on the spot"),
-        ("{ at = [\"5 mm\", \"0 mm\"], yaw = \"180 deg\" }", "turns by 180.0000 deg"),
+        (
+            "{ at = [\"0 mm\", \"0 mm\"], roll = \"3 deg\" }",
+            "points 1 and 2 of the path are at the same place",
+        ),
+        (
+            "{ at = [\"5 mm\", \"0 mm\"], yaw = \"180 deg\" }",
+            "turns by 180.0000 deg; at half a turn the direction is not",
+        ),
         ("{ at = [\"5 mm\", \"0 mm\"], roll = \"70 deg\" }", "cannot take pose 2"),
         ("{ at = [\"500 mm\", \"0 mm\"] }", "outside the area"),
         ("{ at = [\"5 mm\", \"0 mm\"], roll = \"nan deg\" }", "nan"),
@@ -295,13 +301,18 @@ fn poses_that_cannot_be_are_refused_at_their_line_with_what_would_be_right() {
     let leaning = "{ at = [\"5 mm\", \"0 mm\"], roll = \"3 deg\" }";
     let error = refused(leaning, "", &Machine::builtin());
     assert!(error.contains("which the mechanism `corexy` cannot"), "{error}");
-    assert!(error.contains("leave roll, pitch and yaw out"), "{error}");
+    assert!(error.contains("leave roll, pitch and yaw out, or use a machine that can"), "{error}");
+    assert!(error.contains("such as tri_planar, mcm or a serial arm"), "{error}");
     let error = refused(leaning, "[attitude]\nroll = \"3 deg\"\n", &platform);
     assert!(error.contains("both say how the tool is turned"), "{error}");
     let single = format!("[path]\nposes = [{level}]\n");
-    assert!(read(&single, &platform).unwrap_err().contains("two poses at least"));
+    assert!(read(&single, &platform).unwrap_err().contains("needs at least two poses"));
+    let none = read("[path]\nposes = []\n", &platform).unwrap_err();
+    assert!(none.starts_with("line 1:") && none.contains("needs at least two poses"), "{none}");
+    let none = read("[path]\npoints = []\n", &platform).unwrap_err();
+    assert!(none.contains("needs at least two points"), "{none}");
     let both = format!("[path]\npoints = [[\"0 mm\", \"0 mm\"]]\nposes = [{level}, {leaning}]\n");
-    assert!(read(&both, &platform).unwrap_err().contains("which path is not clear"));
+    assert!(read(&both, &platform).unwrap_err().contains("needs exactly one of"));
 }
 
 /// The platform with all legs folded below it, at a height at which more than one pose closes them.
