@@ -49,6 +49,26 @@ pub(crate) fn through(points: &[Vector3<f64>]) -> Vec<Cubic> {
         .collect()
 }
 
+/// The indices of the points at which the curve turns back on itself, growing: there or in a span beside it
+/// the curve all but stands still by its parameter, and has no direction.
+pub(crate) fn reversals(cubics: &[Cubic]) -> Vec<usize> {
+    /// The least |r′|; about 1 where the points lead on, cos ½φ where even spans turn by φ.
+    const LEAST: f64 = 0.05;
+    /// Looks along a span: |r′| changes by less than `LEAST` from one to the next.
+    const LOOKS: u32 = 256;
+    let mut points: Vec<usize> = Vec::new();
+    for (index, cubic) in cubics.iter().enumerate() {
+        for look in 0..=LOOKS {
+            let progress = cubic.velocity(cubic.span * f64::from(look) / f64::from(LOOKS)).norm();
+            if progress < LEAST || progress.is_nan() {
+                points.push(index + usize::from(look > LOOKS / 2));
+            }
+        }
+    }
+    points.dedup();
+    points
+}
+
 /// The second derivatives at the points, none at the ends, by elimination along the diagonal.
 fn bends(spans: &[f64], slopes: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let mut bends = vec![Vector3::zeros(); spans.len() + 1];
@@ -94,5 +114,22 @@ mod tests {
                 assert!((end.second - start.second).amax() < 1e-9);
             }
         }
+        assert!(reversals(&cubics).is_empty());
+    }
+
+    #[test]
+    fn a_curve_turns_back_on_itself_where_its_points_do() {
+        let found = |points: &[[f64; 2]]| {
+            let points: Vec<_> = points.iter().map(|[x, y]| Vector3::new(*x, *y, 0.0)).collect();
+            reversals(&through(&points))
+        };
+        assert_eq!(found(&[[0.0, 0.0], [0.01, 0.0], [0.0, 0.0]]), [1]);
+        // Within a span: the curve goes beyond the point that it turns at.
+        assert_eq!(found(&[[0.0, 0.0], [0.01, 0.0], [0.005, 0.0]]), [1]);
+        assert_eq!(found(&[[0.0, 0.0], [0.005, 0.0], [-0.005, 0.0]]), [1]);
+        assert_eq!(found(&[[0.0, 0.0], [0.01, 0.0], [0.0, 0.0], [0.01, 0.0]]), [1, 2]);
+        assert_eq!(found(&[[0.0, 0.0], [0.01, 0.0], [0.0, 0.0001]]), [1]);
+        assert_eq!(found(&[[0.0, 0.0], [0.01, 0.0], [0.0, 0.002]]), [0; 0]);
+        assert_eq!(found(&[[0.0, 0.0], [0.01, 0.0], [0.01, 0.001], [0.0, 0.001]]), [0; 0]);
     }
 }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::drawing::Curve;
 use crate::geometry::arc_length::ByArcLength;
 use crate::geometry::contour::CORNER;
-use crate::geometry::cubic::through;
+use crate::geometry::cubic::{reversals, through};
 use crate::geometry::track::Track;
 use crate::geometry::turning::Turning;
 
@@ -46,17 +46,27 @@ pub struct PosedPath {
 impl PosedPath {
     /// Through `poses`, two at least, each at another place than the one before and turned by less than
     /// half a turn against it.
-    pub(crate) fn new(poses: &[PathPose], between: Between) -> Self {
+    ///
+    /// # Errors
+    /// The indices of the poses at which a smooth curve turns back on itself, growing.
+    pub(crate) fn new(poses: &[PathPose], between: Between) -> Result<Self, Vec<usize>> {
         let places: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.position).collect();
         let tracks: Vec<Track> = match between {
             Between::Lines => places
                 .windows(2)
                 .map(|pair| Track::new(&Curve::Line { from: pair[0], to: pair[1] }))
                 .collect(),
-            Between::Curves => through(&places)
-                .into_iter()
-                .map(|cubic| Track::Cubic(Arc::new(ByArcLength::new(cubic, STEPS))))
-                .collect(),
+            Between::Curves => {
+                let cubics = through(&places);
+                let reversals = reversals(&cubics);
+                if !reversals.is_empty() {
+                    return Err(reversals);
+                }
+                cubics
+                    .into_iter()
+                    .map(|cubic| Track::Cubic(Arc::new(ByArcLength::new(cubic, STEPS))))
+                    .collect()
+            }
         };
         let mut way = 0.0;
         let ends = tracks.iter().map(|track| {
@@ -76,7 +86,7 @@ impl PosedPath {
         let turns = rotations.iter().any(|rotation| *rotation != Matrix3::identity());
         let turning = turns.then(|| Arc::new(Turning::new(&knots, &rotations, &rests)));
         let lines = poses.iter().skip(1).map(|pose| pose.line);
-        Self { tracks: tracks.into_iter().zip(lines).collect(), turning }
+        Ok(Self { tracks: tracks.into_iter().zip(lines).collect(), turning })
     }
 
     /// [m].

@@ -198,8 +198,20 @@ fn follow(
             );
         }
     }
-    is_sound
-        .then(|| PosedPath::new(&poses.iter().map(|(pose, _)| *pose).collect::<Vec<_>>(), between))
+    if !is_sound {
+        return None;
+    }
+    let all: Vec<PathPose> = poses.iter().map(|(pose, _)| *pose).collect();
+    let refuse = |reversals: Vec<usize>| {
+        for index in reversals {
+            diagnostics.contradict(
+                poses[index].1,
+                format!("the smooth curve turns back on itself at point {}", index + 1),
+                "leave out `smooth`, or put points beside it that lead round",
+            );
+        }
+    };
+    PosedPath::new(&all, between).map_err(refuse).ok()
 }
 
 /// That each pose is one that the machine can take: what no speed can do is told at its line.

@@ -315,6 +315,38 @@ fn poses_that_cannot_be_are_refused_at_their_line_with_what_would_be_right() {
     assert!(read(&both, &platform).unwrap_err().contains("needs exactly one of"));
 }
 
+#[test]
+fn a_smooth_curve_that_turns_back_on_itself_is_refused_where_it_does() {
+    let points = |points: &[[f64; 2]]| {
+        let line = |[x, y]: &[f64; 2]| format!("  [\"{x} mm\", \"{y} mm\"],\n");
+        format!("points = [\n{}]\n", points.iter().map(line).collect::<String>())
+    };
+    let poses = |points: &[[f64; 2]]| {
+        let line = |[x, y]: &[f64; 2]| format!("  {{ at = [\"{x} mm\", \"{y} mm\"] }},\n");
+        format!("poses = [\n{}]\n", points.iter().map(line).collect::<String>())
+    };
+    let there_and_back = [[0.0, 0.0], [10.0, 0.0], [0.0, 0.0]];
+    let farther_than_back = [[-5.0, 0.0], [0.0, 0.0], [10.0, 0.0], [5.0, 0.0]];
+    let machine = Machine::builtin();
+    for path in [points(&there_and_back), poses(&there_and_back)] {
+        let error = read(&format!("[path]\nsmooth = true\n{path}"), &machine).unwrap_err();
+        assert!(error.starts_with("line 5:"), "{error}");
+        assert!(error.contains("turns back on itself at point 2"), "{error}");
+        assert!(error.contains("leave out `smooth`"), "{error}");
+        // With straight lines the tool stops where it turns back.
+        let job = read(&format!("[path]\n{path}"), &machine).unwrap();
+        assert!(plan(&machine, &job).is_ok(), "{path}");
+    }
+    for path in [points(&farther_than_back), poses(&farther_than_back)] {
+        let error = read(&format!("[path]\nsmooth = true\n{path}"), &machine).unwrap_err();
+        assert!(error.starts_with("line 6:"), "{error}");
+    }
+    // Points that lead round are gone in one go.
+    let round = points(&[[0.0, 0.0], [10.0, 0.0], [10.0, 1.0], [0.0, 1.0]]);
+    let job = read(&format!("[path]\nsmooth = true\n{round}"), &machine).unwrap();
+    assert_eq!(plan(&machine, &job).unwrap().facts.strokes, 1);
+}
+
 /// The platform with all legs folded below it, at a height at which more than one pose closes them.
 fn folded() -> Machine {
     let text = std::fs::read_to_string(Path::new(ROOT).join("machines/tri_planar.toml")).unwrap();
