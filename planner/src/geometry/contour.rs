@@ -351,3 +351,26 @@ impl Contour {
         self.end().first.normalize()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::arc_length::ByArcLength;
+    use crate::geometry::cubic::through;
+
+    #[test]
+    fn a_curve_without_a_direction_at_its_start_does_not_go_on_from_the_one_before() {
+        let there_and_back = [Vector3::zeros(), Vector3::x() * 0.01, Vector3::zeros()];
+        let tracks: Vec<Track> = through(&there_and_back)
+            .into_iter()
+            .map(|cubic| Track::Cubic(Arc::new(ByArcLength::new(cubic, 8))))
+            .collect();
+        let demand = Demand { from: 0.0, power: 1.0, speed: None, line: 1 };
+        let tolerance = 5e-6;
+        let limits =
+            PathLimits { speed: 0.1, rapid: 0.2, acceleration: 5.0, jerk: 500.0, tolerance };
+        let joining = Joining { rounds: true, tolerance, limits };
+        let mut contour = Contour::new(tracks[0].clone(), &[demand], Policy::Proportional);
+        assert!(!contour.extend(&tracks[1], &[demand], &joining));
+    }
+}
