@@ -198,7 +198,7 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// step feels it: for that it is explicit, however exactly it solves a winding alone.
     ///
     /// A slow winding swings with its rotor at `k/√(L·J)`. Where the winding settles within the step, what is
-    /// left is the rotor's decay, `k²/(R·J)`, which counts [`SETTLING`] times. In between, the smaller of
+    /// left is the rotor's decay, `k²/(R·J)`, which counts three times. In between, the smaller of
     /// the two is enough: the product with a step that is just stable is nowhere below 2.8, by the
     /// eigenvalues of the step for `R·h/L` from 0.001 to 10,000.
     pub fn electrical(&self) -> f64 {

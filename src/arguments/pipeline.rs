@@ -1,0 +1,116 @@
+//! Arguments of what runs a job: as processes, in one process, and by services.
+
+use super::{InstanceArguments, MachineArguments};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// What the drives are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum DrivesKind {
+    /// The simulated plant.
+    Sim,
+}
+
+/// How the drives keep time.
+#[derive(Debug, Clone, Args)]
+pub struct DrivesArguments {
+    /// What to drive.
+    #[arg(long, value_enum, default_value = "sim")]
+    pub drives: DrivesKind,
+    /// Let no deadline slip, as on hardware: a command later than 0.3 ms closes the gate for that
+    /// cycle. Without it the simulated plant waits for up to 100 ms.
+    #[arg(long)]
+    pub strict: bool,
+    /// CPU for controller and drives; without it the last one if SCHED_FIFO is allowed, else any.
+    #[arg(long, value_name = "CPU")]
+    pub core: Option<usize>,
+    /// Ask for no real-time scheduling, even where it is allowed.
+    #[arg(long)]
+    pub no_realtime: bool,
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Clone, Args)]
+pub struct RunArguments {
+    /// Job: .ngc .nc .gcode .tap (G-code) or .toml; without it the machine's sample job.
+    pub job: Option<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub machine: MachineArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub drives: DrivesArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub instance: InstanceArguments,
+    /// Run folder; without it `runs/DATE-TIME-JOB`.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `simulate`.
+#[derive(Debug, Clone, Args)]
+pub struct SimulateArguments {
+    /// Job: .ngc .nc .gcode .tap (G-code) or .toml; without it the machine's sample job.
+    pub job: Option<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub machine: MachineArguments,
+    /// Run folder; without it nothing is written.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Where the encoders' counts lie: 0 puts the start on a count, other seeds between two.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `submit`.
+#[derive(Debug, Clone, Args)]
+pub struct SubmitArguments {
+    /// Job: .ngc .nc .gcode .tap (G-code) or .toml.
+    pub job: PathBuf,
+    /// Change a value of the job. Can be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Run folder; without it `runs/DATE-TIME-JOB`.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub instance: InstanceArguments,
+}
+
+/// Arguments of `override`.
+#[derive(Debug, Clone, Args)]
+pub struct OverrideArguments {
+    /// Rate: "50 %" or 0.5, from 10 % to 200 %; no limit of the machine is broken for it.
+    pub rate: String,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub instance: InstanceArguments,
+}
+
+/// Arguments of `domain`.
+#[derive(Debug, Clone, Args)]
+pub struct DomainArguments {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub machine: MachineArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub drives: DrivesArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub instance: InstanceArguments,
+}
+
+/// Arguments of one service; machine and drives are the domain's.
+#[derive(Debug, Clone, Args)]
+pub struct ServiceArguments {
+    /// Name of the pipeline.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    pub instance: String,
+}
