@@ -40,7 +40,7 @@ pub struct StrokeCheck {
     /// How far the tool strays between the setpoints of each millisecond, joined as the controller joins
     /// them.
     pub executed: Deviation,
-    /// By way of interpolating; `None` where [`MOST_KNOTS`] knots are not enough.
+    /// By way of interpolating; `None` where 4096 knots are not enough.
     pub interpolated: [Option<Subdivided>; 3],
 }
 
