@@ -81,7 +81,8 @@ impl Argument {
         let is_number = |text: &str| text.trim().parse::<f64>().is_ok();
         let with = |text: &str, other: &str| {
             let unit = other.char_indices().rev().find(|(at, _)| is_number(&other[..*at]));
-            let unit = unit.filter(|_| is_number(text)).map_or("", |(at, _)| &other[at..]);
+            let lends = is_number(text) && !is_number(other);
+            let unit = unit.filter(|_| lends).map_or("", |(at, _)| &other[at..]);
             format!("{} {}", text.trim(), unit.trim())
         };
         Ok([self.read(&with(first, second))?, self.read(&with(second, first))?])
