@@ -4,6 +4,7 @@
 //! grid and paper by those of a dark screen where the reader prefers one.
 
 use super::PictureError;
+use plotters::chart::MeshStyle;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::prelude::*;
@@ -44,6 +45,22 @@ pub fn colour(index: usize) -> RGBColor {
 /// Text of the usual size.
 pub fn text_style() -> TextStyle<'static> {
     ("sans-serif", (TEXT * FINE) as i32).into_font().color(&INK)
+}
+
+/// `mesh` with the look that axes, labels and grid have in every picture.
+pub fn styled<'s, 'a, 'b, X, Y, B>(
+    mesh: &'s mut MeshStyle<'a, 'b, X, Y, B>,
+) -> &'s mut MeshStyle<'a, 'b, X, Y, B>
+where
+    X: Ranged,
+    Y: Ranged,
+    B: DrawingBackend,
+{
+    mesh.label_style(text_style())
+        .axis_desc_style(text_style())
+        .axis_style(INK.stroke_width(FINE))
+        .bold_line_style(GRID.stroke_width(FINE))
+        .light_line_style(TRANSPARENT)
 }
 
 /// Text centred above what it names.
@@ -147,20 +164,17 @@ impl Chart<'_> {
     where
         Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
     {
-        chart
-            .configure_mesh()
-            .x_desc(self.across)
-            .y_desc(self.up)
-            .x_labels(11)
-            .y_labels(self.height as usize / 32)
-            .x_label_formatter(&label_x)
-            .y_label_formatter(&label_y)
-            .label_style(text_style())
-            .axis_desc_style(text_style())
-            .axis_style(INK.stroke_width(FINE))
-            .bold_line_style(GRID.stroke_width(FINE))
-            .light_line_style(TRANSPARENT)
-            .draw()?;
+        styled(
+            chart
+                .configure_mesh()
+                .x_desc(self.across)
+                .y_desc(self.up)
+                .x_labels(11)
+                .y_labels(self.height as usize / 32)
+                .x_label_formatter(&label_x)
+                .y_label_formatter(&label_y),
+        )
+        .draw()?;
         for curve in &self.curves {
             let style = curve.colour.stroke_width(FINE + 1);
             for line in &curve.lines {

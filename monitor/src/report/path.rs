@@ -1,8 +1,8 @@
 //! The picture of the path: what was to be marked, what was marked, and the way in the dark.
 
 use super::chart::{
-    CURVES, Canvas, FINE, Failure, GRID, INK, MARGINS, WIDTH, centred, draw, frame, legend, short,
-    span, text_style,
+    CURVES, Canvas, FINE, Failure, MARGINS, WIDTH, centred, draw, frame, legend, short, span,
+    styled,
 };
 use super::{PictureError, Report};
 use crate::trace::outline::OutlinePoint;
@@ -149,20 +149,17 @@ impl Sheet {
         chart: &mut ChartContext<'b, Canvas<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>,
         [across, up]: [&str; 2],
     ) -> Result<(), Failure<'b>> {
-        chart
-            .configure_mesh()
-            .x_desc(across)
-            .y_desc(up)
-            .x_labels(11)
-            .y_labels(((self.inner / 60.0) as usize).max(3))
-            .x_label_formatter(&|value| short(value))
-            .y_label_formatter(&|value| short(value))
-            .label_style(text_style())
-            .axis_desc_style(text_style())
-            .axis_style(INK.stroke_width(FINE))
-            .bold_line_style(GRID.stroke_width(FINE))
-            .light_line_style(TRANSPARENT)
-            .draw()?;
+        styled(
+            chart
+                .configure_mesh()
+                .x_desc(across)
+                .y_desc(up)
+                .x_labels(11)
+                .y_labels(((self.inner / 60.0) as usize).max(3))
+                .x_label_formatter(&|value| short(value))
+                .y_label_formatter(&|value| short(value)),
+        )
+        .draw()?;
         Ok(())
     }
 }

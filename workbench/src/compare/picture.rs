@@ -4,7 +4,7 @@ use machine::Machine;
 use machine::kinematics::KinematicsError;
 use messages::artwork::Artwork;
 use monitor::report::PictureError;
-use monitor::report::chart::{FINE, GRID, INK, colour, draw, frame, legend, short, text_style};
+use monitor::report::chart::{FINE, colour, draw, frame, legend, short, styled};
 use monitor::report::workspace::{Ground, Workspace};
 use plotters::prelude::*;
 use std::collections::BTreeSet;
@@ -92,18 +92,15 @@ impl Drawn {
         draw("motors", HEIGHT, |area| {
             let mut chart =
                 frame(area).build_cartesian_2d(0.0..1.05 * most.0, 0.0..1.08 * most.1)?;
-            chart
-                .configure_mesh()
-                .x_desc("speed [rpm]")
-                .y_desc("torque [mN·m]")
-                .x_label_formatter(&short)
-                .y_label_formatter(&short)
-                .label_style(text_style())
-                .axis_desc_style(text_style())
-                .axis_style(INK.stroke_width(FINE))
-                .bold_line_style(GRID.stroke_width(FINE))
-                .light_line_style(TRANSPARENT)
-                .draw()?;
+            styled(
+                chart
+                    .configure_mesh()
+                    .x_desc("speed [rpm]")
+                    .y_desc("torque [mN·m]")
+                    .x_label_formatter(&short)
+                    .y_label_formatter(&short),
+            )
+            .draw()?;
             for (index, motor) in self.motors.iter().enumerate() {
                 let dot = colour(index).mix(0.5).filled();
                 let points = thinned(motor.points.iter().map(|point| scaled(*point)), most);
@@ -149,19 +146,16 @@ fn bars(
     draw(title, HEIGHT, |area| {
         let mut chart =
             frame(area).build_cartesian_2d(0.0..groups.len() as f64, 0.0..1.08 * most)?;
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
-            .y_desc(up)
-            .x_labels(2 * groups.len() + 1)
-            .x_label_formatter(&name)
-            .y_label_formatter(&short)
-            .label_style(text_style())
-            .axis_desc_style(text_style())
-            .axis_style(INK.stroke_width(FINE))
-            .bold_line_style(GRID.stroke_width(FINE))
-            .light_line_style(TRANSPARENT)
-            .draw()?;
+        styled(
+            chart
+                .configure_mesh()
+                .disable_x_mesh()
+                .y_desc(up)
+                .x_labels(2 * groups.len() + 1)
+                .x_label_formatter(&name)
+                .y_label_formatter(&short),
+        )
+        .draw()?;
         let width = 0.8 / machines.len().max(1) as f64;
         for (index, machine) in machines.iter().enumerate() {
             for group in 0..groups.len() {
