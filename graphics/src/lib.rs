@@ -1,0 +1,14 @@
+//! Drawings that users bring: files of drawing programs, text, codes and images, read into curves and
+//! pixels, and what is done with them before they are a job: placing, filling, offsetting, ordering.
+//!
+//! Nothing here knows a machine or a motion. Lengths are metres, y points up and x to the right, angles are
+//! radians, counterclockwise. Curves stay curves: nothing is made of chords that was not drawn so.
+
+mod error;
+pub mod shape;
+
+pub use error::ReadError;
+pub use shape::{
+    Arc, Colour, Contour, FileMode, FileNote, FileRecipe, Fill, FillRule, Graphic, Raster, Segment,
+    Shape,
+};
