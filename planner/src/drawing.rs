@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 pub use messages::plan::Note;
 
 use crate::geometry::posed_path::PosedPath;
+use crate::geometry::track::Track;
 
 /// A job as geometry: what to mark and how to get there, in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +43,16 @@ pub enum Action {
     Mark {
         /// The line to mark.
         curve: Curve,
+        /// Speed while the laser is on [m/s]; `None` leaves it to the job's policy.
+        speed: Option<f64>,
+        /// The laser.
+        power: Power,
+    },
+    /// Mark along a cubic Bézier curve that starts where the tool is. It may have corners, where its
+    /// control points lie on each other.
+    Trace {
+        /// Its start, two control points and its end [m].
+        points: [Vector3<f64>; 4],
         /// Speed while the laser is on [m/s]; `None` leaves it to the job's policy.
         speed: Option<f64>,
         /// The laser.
@@ -156,6 +167,14 @@ impl Curve {
                 let (sine, cosine) = math::sin_cos(start + sweep * parameter);
                 centre + major * cosine + minor * sine + rise * parameter
             }
+        }
+    }
+
+    /// How long it is [m].
+    pub(crate) fn length(&self) -> f64 {
+        match self {
+            Self::Line { from, to } => (to - from).norm(),
+            Self::Arc { .. } => Track::new(self).length(),
         }
     }
 

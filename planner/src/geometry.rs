@@ -2,6 +2,7 @@
 
 pub(crate) mod arc_length;
 pub mod attitude;
+pub(crate) mod bezier;
 pub(crate) mod blend;
 pub(crate) mod contour;
 pub(crate) mod cubic;

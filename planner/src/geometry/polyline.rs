@@ -38,6 +38,8 @@ pub(crate) struct Polyline {
     vertices: Vec<Vector3<f64>>,
     chords: Vec<Chord>,
     policy: Option<Policy>,
+    /// Whether it is taken from curves, whose vertices have no digits to be rounded.
+    is_trace: bool,
     /// What fits a polyline that is long, and how many vertices it has taken of those that are still
     /// here.
     fitter: Option<(Fitter, usize)>,
@@ -63,6 +65,22 @@ impl Polyline {
         self.policy = chord.policy.or(self.policy);
         self.vertices.push(chord.to);
         self.chords.push(chord);
+    }
+
+    /// Goes on with a chord of a curve.
+    pub(crate) fn push_trace(&mut self, from: Vector3<f64>, chord: Chord) {
+        self.is_trace = true;
+        self.push(from, chord);
+    }
+
+    /// Whether it is taken from curves.
+    pub(crate) fn is_trace(&self) -> bool {
+        self.is_trace && !self.is_empty()
+    }
+
+    /// Whether it is drawn in straight moves.
+    pub(crate) fn is_of_chords(&self) -> bool {
+        !self.is_trace && !self.is_empty()
     }
 
     /// The last move.
@@ -105,12 +123,14 @@ impl Polyline {
         }
         self.look = 0;
         self.policy = None;
+        let is_trace = core::mem::take(&mut self.is_trace);
         let vertices = core::mem::take(&mut self.vertices);
         let chords = core::mem::take(&mut self.chords);
+        let digits = if is_trace { 0.0 } else { rounding(&vertices) };
         match tolerance {
             _ if chords.is_empty() => {}
             Some(tolerance) if chords.len() > 1 => {
-                for (part, covers) in fit(&vertices, tolerance + rounding(&vertices)) {
+                for (part, covers) in fit(&vertices, tolerance + digits) {
                     let (first, last) = (*covers.start(), *covers.end());
                     found.push(drawn(&part, &vertices[first..=last], &chords[first..last], first));
                 }
@@ -128,9 +148,9 @@ impl Polyline {
         }
         self.look = self.chords.len() + MORE;
         let Some(tolerance) = tolerance else { return self.certain_lines() };
-        let (fitter, fed) = self
-            .fitter
-            .get_or_insert_with(|| (Fitter::new(tolerance + rounding(&self.vertices)), 0));
+        let digits = if self.is_trace { 0.0 } else { rounding(&self.vertices) };
+        let (fitter, fed) =
+            self.fitter.get_or_insert_with(|| (Fitter::new(tolerance + digits), 0));
         // The last move may be taken off again.
         let known = self.vertices.len() - 1;
         self.vertices[*fed..known].iter().for_each(|vertex| fitter.push(*vertex));

@@ -3,8 +3,8 @@
 use machine::PathLimits;
 
 use super::Job;
-use crate::drawing::{Action, Curve};
-use crate::geometry::track::Track;
+use crate::drawing::Action;
+use crate::geometry::bezier;
 
 impl Job {
     /// How long the job takes at the speeds asked for, as if the tool started, stopped and turned in no
@@ -23,7 +23,11 @@ impl Job {
             time += match &step.action {
                 Action::Mark { curve, speed, .. } => {
                     place = curve.to();
-                    length(curve) / marking(*speed)
+                    curve.length() / marking(*speed)
+                }
+                Action::Trace { points, speed, .. } => {
+                    place = points[3];
+                    bezier::length(points) / marking(*speed)
                 }
                 Action::Follow { path, .. } => {
                     place = path.end().unwrap_or(place);
@@ -31,7 +35,7 @@ impl Job {
                 }
                 Action::Feed { curve, speed } => {
                     place = curve.to();
-                    length(curve) / speed.min(limits.rapid)
+                    curve.length() / speed.min(limits.rapid)
                 }
                 Action::Rapid { to } => {
                     let way = (to - place).norm();
@@ -43,12 +47,5 @@ impl Job {
             };
         }
         time
-    }
-}
-
-fn length(curve: &Curve) -> f64 {
-    match curve {
-        Curve::Line { from, to } => (to - from).norm(),
-        Curve::Arc { .. } => Track::new(curve).length(),
     }
 }

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use super::{Job, MarkingSpeed};
 use crate::drawing::{Action, Corners, Curve, Step};
 use crate::geometry::attitude::AttitudeLaw;
-use crate::geometry::track::Track;
+use crate::geometry::bezier;
 use crate::joint_space::configuration::branches;
 
 /// How far apart points of a path are looked at [m].
@@ -164,41 +164,49 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
             }
             Action::Mark { curve, .. } | Action::Feed { curve, .. } => *curve,
             Action::Rapid { to } => Curve::Line { from: extent.place, to: *to },
+            Action::Trace { points, .. } => {
+                let count = (bezier::length(points) / STEP).ceil().max(1.0) as usize;
+                let beyond = bezier::beyond_chords(points, count);
+                extent.place = points[3];
+                return bezier::samples(points, count)
+                    .all(|point| self.holds_around(&point, &beyond, extent));
+            }
             // Only planning tells what the tool's turns do.
             Action::Follow { .. } => return false,
             _ => return true,
         };
-        let to = curve.to();
-        let is_straight = matches!(curve, Curve::Line { .. });
-        let holds = if self.is_linear && is_straight {
-            extent.add(curve.from());
+        extent.place = curve.to();
+        if let (true, Curve::Line { from, to }) = (self.is_linear, curve) {
+            extent.add(from);
             extent.add(to);
-            true
-        } else {
-            let length = match curve {
-                Curve::Line { from, to } => (to - from).norm(),
-                Curve::Arc { .. } => Track::new(&curve).length(),
-            };
-            let count = (length / STEP).ceil().max(1.0) as u64;
-            // How far the curve may go beyond its points.
-            let beyond = match curve {
-                Curve::Line { .. } => 0.0,
-                Curve::Arc { major, minor, sweep, .. } => {
-                    let half = sweep / count as f64 / 2.0;
-                    major.norm().max(minor.norm()) * (1.0 - math::cos(half))
-                }
-            };
-            // A dense polyline's chords are looked at by their ends.
-            (1..=count).all(|index| {
-                let point = curve.point(index as f64 / count as f64);
-                let around = Vector3::repeat(beyond);
-                extent.add(point - around);
-                extent.add(point + around);
-                self.is_linear || self.holds_point(&point)
-            })
+            return true;
+        }
+        let count = (curve.length() / STEP).ceil().max(1.0) as u64;
+        // How far the curve may go beyond its points.
+        let beyond = match curve {
+            Curve::Line { .. } => Vector3::zeros(),
+            Curve::Arc { major, minor, sweep, .. } => {
+                let sagitta = 1.0 - math::cos(sweep / count as f64 / 2.0);
+                major.zip_map(&minor, |major, minor| (major * major + minor * minor).sqrt() * sagitta)
+            }
         };
-        extent.place = to;
-        holds
+        // A dense polyline's chords are looked at by their ends.
+        (1..=count).all(|index| {
+            let point = curve.point(index as f64 / count as f64);
+            self.holds_around(&point, &beyond, extent)
+        })
+    }
+
+    /// Whether it holds a point of a curve that goes `beyond` its points; takes it into the `extent`.
+    fn holds_around(
+        &mut self,
+        point: &Vector3<f64>,
+        beyond: &Vector3<f64>,
+        extent: &mut Extent,
+    ) -> bool {
+        extent.add(point - beyond);
+        extent.add(point + beyond);
+        self.is_linear || self.holds_point(point)
     }
 
     fn holds_point(&mut self, point: &Vector3<f64>) -> bool {

@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
-use crate::drawing::Action;
+use crate::drawing::{Action, Curve};
 use crate::error::PlanError;
+use crate::geometry::bezier;
 use crate::geometry::contour::{CORNER, GAP};
 use crate::geometry::jet::Jet;
 use crate::geometry::track::Track;
@@ -11,6 +12,9 @@ use crate::job::Job;
 
 /// Shorter moves are not made [m].
 pub(super) const NOTHING: f64 = 1e-12;
+
+/// How far the chords of a Bézier curve may be from it [m].
+const CHORD_ERROR: f64 = 1e-6;
 
 /// One thing to do.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,6 +97,14 @@ pub(super) fn items(job: &Job) -> Result<Vec<Item>, PlanError> {
             }
             Action::Feed { curve, speed } => {
                 add(&mut items, Stroke::new(Track::new(curve), Some(*speed), false, step.line));
+            }
+            Action::Trace { points, speed, .. } => {
+                let mut from = points[0];
+                for to in bezier::samples(points, bezier::chords(points, CHORD_ERROR)) {
+                    let chord = Track::new(&Curve::Line { from, to });
+                    add(&mut items, Stroke::new(chord, *speed, true, step.line));
+                    from = to;
+                }
             }
             Action::Follow { path, .. } => {
                 for (track, line) in &path.tracks {

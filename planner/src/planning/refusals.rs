@@ -5,6 +5,7 @@ use machine::Mechanism;
 use super::Planning;
 use crate::drawing::{Action, Step};
 use crate::error::{Place, PlanError};
+use crate::geometry::bezier;
 use crate::geometry::track::Track;
 use crate::job::Job;
 use crate::joint_space::configuration::Refused;
@@ -77,6 +78,10 @@ pub(super) fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
                 let mut points = vec![curve.from().into()];
                 Track::new(curve).sample(CHORD, &mut points);
                 points
+            }
+            Action::Trace { points, .. } => {
+                let chords = bezier::samples(points, bezier::chords(points, CHORD));
+                core::iter::once(points[0]).chain(chords).map(Into::into).collect()
             }
             Action::Follow { path, .. } => path.points(CHORD),
             Action::Rapid { to } => vec![(*to).into()],
