@@ -5,6 +5,7 @@
 //! radians, counterclockwise. Curves stay curves: nothing is made of chords that was not drawn so.
 
 mod error;
+mod extent;
 pub mod shape;
 
 pub use error::ReadError;

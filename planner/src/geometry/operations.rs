@@ -198,8 +198,8 @@ impl<'a> Operations<'a> {
         };
         self.let_free_move_go(&(from + ahead))?;
         if straight {
-            let is_other =
-                policy.is_some() && self.polyline.policy().is_some_and(|other| Some(other) != policy);
+            let is_other = policy.is_some()
+                && self.polyline.policy().is_some_and(|other| Some(other) != policy);
             if is_other || self.polyline.is_trace() {
                 self.flush_polyline()?;
             }
@@ -248,7 +248,8 @@ impl<'a> Operations<'a> {
         };
         for point in bezier::samples(points, count) {
             let to = self.placed(&point, demand.line)?;
-            self.polyline.push_trace(from, Chord { to, demand, policy: Some(policy), is_free: false });
+            self.polyline
+                .push_trace(from, Chord { to, demand, policy: Some(policy), is_free: false });
             from = to;
         }
         self.hand_on_what_is_certain();

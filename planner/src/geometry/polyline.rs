@@ -149,8 +149,7 @@ impl Polyline {
         self.look = self.chords.len() + MORE;
         let Some(tolerance) = tolerance else { return self.certain_lines() };
         let digits = if self.is_trace { 0.0 } else { rounding(&self.vertices) };
-        let (fitter, fed) =
-            self.fitter.get_or_insert_with(|| (Fitter::new(tolerance + digits), 0));
+        let (fitter, fed) = self.fitter.get_or_insert_with(|| (Fitter::new(tolerance + digits), 0));
         // The last move may be taken off again.
         let known = self.vertices.len() - 1;
         self.vertices[*fed..known].iter().for_each(|vertex| fitter.push(*vertex));

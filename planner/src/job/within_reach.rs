@@ -187,7 +187,9 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
             Curve::Line { .. } => Vector3::zeros(),
             Curve::Arc { major, minor, sweep, .. } => {
                 let sagitta = 1.0 - math::cos(sweep / count as f64 / 2.0);
-                major.zip_map(&minor, |major, minor| (major * major + minor * minor).sqrt() * sagitta)
+                major.zip_map(&minor, |major, minor| {
+                    (major * major + minor * minor).sqrt() * sagitta
+                })
             }
         };
         // A dense polyline's chords are looked at by their ends.

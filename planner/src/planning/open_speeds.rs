@@ -12,7 +12,9 @@ use crate::light::Policy;
 pub(super) fn leaves_speeds_open(job: &Job) -> bool {
     let is_open = |step: &Step| {
         let (speed, power) = match &step.action {
-            Action::Mark { speed, power, .. } | Action::Trace { speed, power, .. } => (*speed, power),
+            Action::Mark { speed, power, .. } | Action::Trace { speed, power, .. } => {
+                (*speed, power)
+            }
             Action::Follow { power, .. } => (None, power),
             _ => return false,
         };
