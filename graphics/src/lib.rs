@@ -4,8 +4,12 @@
 //! Nothing here knows a machine or a motion. Lengths are metres, y points up and x to the right, angles are
 //! radians, counterclockwise. Curves stay curves: nothing is made of chords that was not drawn so.
 
+mod curve;
 mod error;
 mod extent;
+pub mod order;
+#[cfg(test)]
+mod random;
 pub mod shape;
 
 pub use error::ReadError;
