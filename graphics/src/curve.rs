@@ -36,6 +36,48 @@ impl Segment {
         }
     }
 
+    /// The part from the fraction `from` to the fraction `to`, with where it begins; gone along backwards
+    /// where `to` is less.
+    pub(crate) fn part(&self, start: Point, from: f64, to: f64) -> (Point, Self) {
+        let (begin, end) = (self.point(start, from), self.point(start, to));
+        let part = match *self {
+            Self::Line(_) => Self::Line(end),
+            Self::Cubic(first, second, last) => {
+                // The polar form of the cubic: its arguments are two of one end and one of the other.
+                let polar = |a: f64, b: f64, c: f64| {
+                    let step = |t: f64, p: [Point; 4]| {
+                        [p[0].lerp(p[1], t), p[1].lerp(p[2], t), p[2].lerp(p[3], t), p[3]]
+                    };
+                    step(c, step(b, step(a, [start, first, second, last])))[0]
+                };
+                Self::Cubic(polar(from, from, to), polar(from, to, to), end)
+            }
+            Self::Arc(arc) => Self::Arc(Arc {
+                start: arc.start + arc.sweep * from,
+                sweep: arc.sweep * (to - from),
+                ..arc
+            }),
+        };
+        (begin, part)
+    }
+
+    /// Whether every number in it is finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        match self {
+            Self::Line(end) => end.is_finite(),
+            Self::Cubic(first, second, end) => {
+                first.is_finite() && second.is_finite() && end.is_finite()
+            }
+            Self::Arc(arc) => {
+                arc.centre.is_finite()
+                    && arc.major.is_finite()
+                    && arc.minor.is_finite()
+                    && arc.start.is_finite()
+                    && arc.sweep.is_finite()
+            }
+        }
+    }
+
     /// How many chords of equal parameter leave the curve nowhere farther than `tolerance` [m].
     pub(crate) fn chords(&self, start: Point, tolerance: f64) -> usize {
         // A chord over a step h of the parameter errs by at most h²·max|p″|/8.
@@ -96,6 +138,11 @@ impl Contour {
             points.push(segment.end());
         }
         points
+    }
+
+    /// Whether every number in it is finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.start.is_finite() && self.segments.iter().all(Segment::is_finite)
     }
 }
 
@@ -191,6 +238,19 @@ mod tests {
         assert!((begun.end() - begun.start).hypot() < 1e-12);
         assert_eq!(begun.segments.len(), 3);
         assert_eq!(wavy().begun_at(3), wavy());
+    }
+
+    #[test]
+    fn a_part_passes_through_the_points_of_the_whole() {
+        for (start, segment) in wavy().pieces() {
+            for (from, to) in [(0.2, 0.7), (0.9, 0.1), (0.0, 1.0)] {
+                let (begin, part) = segment.part(start, from, to);
+                for t in [0.0, 0.4, 1.0] {
+                    let off = part.point(begin, t) - segment.point(start, from + (to - from) * t);
+                    assert!(off.hypot() < 1e-12, "{off:?} of {segment:?}");
+                }
+            }
+        }
     }
 
     #[test]

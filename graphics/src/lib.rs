@@ -7,6 +7,7 @@
 mod curve;
 mod error;
 mod extent;
+pub mod hatch;
 pub mod order;
 #[cfg(test)]
 mod random;
