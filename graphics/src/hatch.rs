@@ -40,13 +40,15 @@ pub enum Travel {
     Connected,
 }
 
-/// What is filled: a point is inside where it is inside of any area.
+/// What is filled: a point is inside where the last of all areas that it is inside of is dark.
 #[derive(Debug, Clone, Copy)]
 pub struct Area<'a> {
     /// Its edges; open ones are closed by a straight line.
     pub contours: &'a [Contour],
     /// What is inside of them.
     pub rule: FillRule,
+    /// Whether it is filled; a light one covers those before it.
+    pub is_dark: bool,
 }
 
 /// Why an area is not filled.

@@ -1,5 +1,7 @@
 //! Rows from below to above, and the parts of each that lie inside.
 
+use std::collections::BTreeSet;
+
 use kurbo::Affine;
 
 use super::pieces::{Piece, cut};
@@ -39,6 +41,7 @@ pub(super) struct Row {
 pub(super) struct Rows {
     pieces: Vec<Piece>,
     rules: Vec<FillRule>,
+    are_dark: Vec<bool>,
     spacing: f64,
     /// Pieces by the first row that they may cross, the rows that they may cross, ahead of the sweep.
     waiting: Vec<(i64, i64, u32)>,
@@ -84,6 +87,7 @@ impl Rows {
         Ok(Self {
             pieces,
             rules: areas.iter().map(|area| area.rule).collect(),
+            are_dark: areas.iter().map(|area| area.is_dark).collect(),
             spacing,
             waiting,
             next_waiting: 0,
@@ -134,7 +138,8 @@ impl Rows {
 
     fn find_spans(&mut self) {
         self.spans.clear();
-        let mut inside = 0;
+        // The areas that the sweep along the row is in.
+        let mut inside = BTreeSet::new();
         let mut first = None;
         for crossing in &self.crossings {
             let piece = &self.pieces[crossing.piece as usize];
@@ -144,12 +149,16 @@ impl Rows {
                 FillRule::NonZero => winding != 0,
                 FillRule::EvenOdd => winding % 2 != 0,
             };
-            let was_in = is_in(*winding);
             *winding += if piece.first() < piece.last() { 1 } else { -1 };
-            inside += i32::from(is_in(*winding)) - i32::from(was_in);
+            if is_in(*winding) {
+                inside.insert(piece.area);
+            } else {
+                inside.remove(&piece.area);
+            }
+            let is_dark = inside.last().is_some_and(|area| self.are_dark[*area as usize]);
             match first {
-                None if inside > 0 => first = Some(*crossing),
-                Some(begin) if inside == 0 => {
+                None if is_dark => first = Some(*crossing),
+                Some(begin) if !is_dark => {
                     first = None;
                     let span = Span { first: begin, last: *crossing };
                     match self.spans.last_mut() {

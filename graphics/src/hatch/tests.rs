@@ -8,7 +8,7 @@ use crate::random::Random;
 const LEVEL: Hatch = Hatch { angle: 0.0, spacing: 1.0, is_cross: false, travel: Travel::OneWay };
 
 fn filled(contours: &[Contour], rule: FillRule, how: Hatch) -> Vec<Contour> {
-    hatch(&[Area { contours, rule }], &how).expect("valid areas")
+    hatch(&[Area { contours, rule, is_dark: true }], &how).expect("valid areas")
 }
 
 /// Lines as (x from, x to, y).
@@ -80,9 +80,31 @@ fn an_outline_that_crosses_itself_is_filled_by_the_rule() {
 #[test]
 fn areas_that_overlap_are_filled_once_whatever_way_they_are_drawn() {
     let (one, other) = ([square(0.0, 2.0)], [square(1.0, 3.0).reversed()]);
-    let area = |contours| Area { contours, rule: FillRule::NonZero };
+    let area = |contours| Area { contours, rule: FillRule::NonZero, is_dark: true };
     let lines = hatch(&[area(&one), area(&other)], &LEVEL).expect("valid areas");
     assert_eq!(level(&lines), [(0.0, 2.0, 0.5), (0.0, 3.0, 1.5), (1.0, 3.0, 2.5)]);
+}
+
+#[test]
+fn a_light_area_covers_those_before_it_alone() {
+    let (low, middle, high) = ([square(0.0, 5.0)], [square(1.0, 4.0)], [square(2.0, 3.0)]);
+    let area = |contours, is_dark| Area { contours, rule: FillRule::NonZero, is_dark };
+    let areas = [area(&low, true), area(&middle, false), area(&high, true)];
+    let lines = hatch(&areas, &LEVEL).expect("valid areas");
+    let right = [
+        (0.0, 5.0, 0.5),
+        (0.0, 1.0, 1.5),
+        (4.0, 5.0, 1.5),
+        (0.0, 1.0, 2.5),
+        (2.0, 3.0, 2.5),
+        (4.0, 5.0, 2.5),
+        (0.0, 1.0, 3.5),
+        (4.0, 5.0, 3.5),
+        (0.0, 5.0, 4.5),
+    ];
+    assert_eq!(level(&lines), right);
+    let covered = [area(&middle, false), area(&low, true)];
+    assert_eq!(hatch(&covered, &LEVEL).expect("valid areas").len(), 5);
 }
 
 #[test]
@@ -188,7 +210,7 @@ fn connected_lines_divide_where_the_area_does() {
 #[test]
 fn what_cannot_be_filled_is_named() {
     let check = |contours: &[Contour], how: Hatch, expected: &str| {
-        let error = hatch(&[Area { contours, rule: FillRule::EvenOdd }], &how);
+        let error = hatch(&[Area { contours, rule: FillRule::EvenOdd, is_dark: true }], &how);
         assert_eq!(error.expect_err("refused").to_string(), expected);
     };
     let square = [square(0.0, 1.0)];
