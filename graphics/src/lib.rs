@@ -9,6 +9,7 @@ mod error;
 mod extent;
 pub mod hatch;
 pub mod order;
+pub mod points;
 #[cfg(test)]
 mod random;
 pub mod shape;
