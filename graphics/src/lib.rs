@@ -12,7 +12,10 @@ pub mod order;
 pub mod points;
 #[cfg(test)]
 mod random;
+pub mod read;
 pub mod shape;
+#[cfg(feature = "svg")]
+pub mod svg;
 
 pub use error::ReadError;
 pub use shape::{
