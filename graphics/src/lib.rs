@@ -8,6 +8,7 @@ mod curve;
 mod error;
 mod extent;
 pub mod hatch;
+pub mod offset;
 pub mod order;
 pub mod points;
 #[cfg(test)]

@@ -196,6 +196,26 @@ pub fn arrange(strokes: &[Stroke], from: Point) -> Result<Arrangement, OrderErro
     Ok(Arrangement { visits, travel_before, travel_after })
 }
 
+/// How many closed contours lie around each contour.
+pub(crate) fn depths(contours: &[Contour]) -> Vec<usize> {
+    let strokes: Vec<Stroke> =
+        contours.iter().map(|contour| Stroke::of_contour(contour, 0)).collect();
+    let containers = containment::containers(&strokes.iter().collect::<Vec<_>>());
+    let mut met = vec![usize::MAX; contours.len()];
+    let mut depth = |index: usize| {
+        let mut open: Vec<u32> = containers[index].clone();
+        let mut depth = 0;
+        while let Some(outer) = open.pop() {
+            if core::mem::replace(&mut met[outer as usize], index) != index {
+                depth += 1;
+                open.extend(&containers[outer as usize]);
+            }
+        }
+        depth
+    };
+    (0..contours.len()).map(&mut depth).collect()
+}
+
 /// Dark travel of a sequence from a point on [m].
 fn travel(strokes: &[Stroke], visits: &[Visit], from: Point) -> f64 {
     let mut at = from;
