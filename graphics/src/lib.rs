@@ -5,6 +5,8 @@
 //! radians, counterclockwise. Curves stay curves: nothing is made of chords that was not drawn so.
 
 mod curve;
+#[cfg(feature = "dxf")]
+pub mod dxf;
 mod error;
 mod extent;
 pub mod hatch;

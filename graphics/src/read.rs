@@ -2,14 +2,18 @@
 
 pub(crate) mod arcs;
 pub(crate) mod bounds;
+#[cfg(feature = "dxf")]
+pub(crate) mod join;
 #[cfg(test)]
 pub(crate) mod mutations;
 pub(crate) mod notes;
 pub(crate) mod pen;
+pub(crate) mod text;
 #[cfg(feature = "svg")]
 pub(crate) mod xml;
 
 pub(crate) use bounds::bounds;
+pub(crate) use text::text;
 
 /// Bytes of a file, and of what a compressed one holds: 64 MiB. A drawing of this size has some two million
 /// curves.

@@ -50,9 +50,9 @@ const STYLE: &str = "*{mask:none!important;filter:none!important;marker-start:no
 /// Where it is no SVG file, or exceeds a bound of [`crate::read`].
 pub fn read(bytes: &[u8]) -> Result<Graphic, ReadError> {
     if bytes.starts_with(&[0x1f, 0x8b]) {
-        return read_text(&xml::text(&inflate(bytes)?)?);
+        return read_text(&crate::read::text(&inflate(bytes)?)?);
     }
-    read_text(&xml::text(bytes)?)
+    read_text(&crate::read::text(bytes)?)
 }
 
 /// What a compressed file holds, up to [`MOST_BYTES`].

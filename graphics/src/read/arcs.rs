@@ -7,11 +7,29 @@ use messages::math;
 
 use crate::shape::Arc;
 
-#[cfg(test)]
 /// An arc of a circle: angles counterclockwise from x [rad].
 pub(crate) fn circular(centre: Point, radius: f64, start: f64, sweep: f64) -> Arc {
     let (major, minor) = (Vec2::new(radius, 0.0), Vec2::new(0.0, radius));
     Arc { centre, major, minor, start, sweep: sweep.clamp(-TAU, TAU) }
+}
+
+/// The arc of a circle from one point to another with a bulge, the tangent of a quarter of its sweep:
+/// positive is counterclockwise. `None` where it is straight.
+pub(crate) fn bulged(from: Point, to: Point, bulge: f64) -> Option<Arc> {
+    let chord = to - from;
+    let length = chord.hypot();
+    // Where the arc's height over its chord is below rounding, it is a line.
+    if !(bulge.abs() > 1e-12 && bulge.abs() < 1e9 && length > 0.0) {
+        return None;
+    }
+    let sweep = 4.0 * math::atan(bulge);
+    let radius = length * (1.0 + bulge * bulge) / (4.0 * bulge.abs());
+    // From the middle of the chord to the centre, positive to the left of the chord.
+    let height = length * (1.0 - bulge * bulge) / (4.0 * bulge);
+    let left = Vec2::new(-chord.y, chord.x) / length;
+    let centre = from.midpoint(to) + left * height;
+    let out = from - centre;
+    Some(circular(centre, radius, math::atan2(out.y, out.x), sweep))
 }
 
 /// Flags and radii of an arc in SVG path data.
@@ -74,11 +92,39 @@ mod tests {
     use kurbo::{Point, Vec2};
     use messages::random::SplitMix64;
 
-    use super::{EndpointArc, between, circular, holds};
+    use super::{EndpointArc, between, bulged, circular, holds};
 
     fn near(found: Point, expected: Point, tolerance: f64) {
         let off = (found - expected).hypot();
         assert!(off <= tolerance, "{found:?} and not {expected:?}");
+    }
+
+    #[test]
+    fn a_bulge_of_one_is_half_a_circle_to_the_right_of_its_chord() {
+        let arc = bulged(Point::new(0.0, 0.0), Point::new(2.0, 0.0), 1.0).expect("an arc");
+        near(arc.centre, Point::new(1.0, 0.0), 1e-15);
+        assert_eq!(arc.sweep, PI);
+        near(arc.point(arc.start + arc.sweep / 2.0), Point::new(1.0, -1.0), 1e-15);
+    }
+
+    #[test]
+    fn bulged_arcs_begin_and_end_where_they_should_and_rise_by_their_bulge() {
+        let mut random = SplitMix64::new(7);
+        for _ in 0..1000 {
+            let mut point = || Point::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0));
+            let (from, to) = (point(), point());
+            let bulge = random.between(-3.0, 3.0);
+            let arc = bulged(from, to, bulge).expect("an arc");
+            near(arc.point(arc.start), from, 1e-9);
+            near(arc.point(arc.start + arc.sweep), to, 1e-9);
+            let chord = to - from;
+            let right = Vec2::new(chord.y, -chord.x);
+            let top = from.midpoint(to) + right * (bulge / 2.0);
+            near(arc.point(arc.start + arc.sweep / 2.0), top, 1e-9);
+        }
+        assert!(bulged(Point::ORIGIN, Point::ORIGIN, 1.0).is_none());
+        assert!(bulged(Point::ORIGIN, Point::new(1.0, 0.0), 0.0).is_none());
+        assert!(bulged(Point::ORIGIN, Point::new(1.0, 0.0), f64::NAN).is_none());
     }
 
     #[test]
