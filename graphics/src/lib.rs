@@ -15,6 +15,8 @@ pub mod order;
 pub mod points;
 #[cfg(test)]
 mod random;
+#[cfg(feature = "lightburn")]
+pub mod lightburn;
 pub mod read;
 pub mod shape;
 #[cfg(feature = "svg")]

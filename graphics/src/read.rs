@@ -9,7 +9,7 @@ pub(crate) mod mutations;
 pub(crate) mod notes;
 pub(crate) mod pen;
 pub(crate) mod text;
-#[cfg(feature = "svg")]
+#[cfg(any(feature = "svg", feature = "lightburn"))]
 pub(crate) mod xml;
 
 pub(crate) use bounds::bounds;

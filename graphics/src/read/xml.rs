@@ -68,6 +68,13 @@ pub(crate) fn parse(text: &str) -> Result<Document<'_>, ReadError> {
     Ok(document)
 }
 
+/// The number in an attribute; `None` where it is none, or not finite.
+#[cfg(feature = "lightburn")]
+pub(crate) fn number(node: roxmltree::Node<'_, '_>, name: &str) -> Option<f64> {
+    let value: f64 = node.attribute(name)?.trim().parse().ok()?;
+    value.is_finite().then_some(value)
+}
+
 pub(crate) fn too_many() -> ReadError {
     ReadError::new(
         format!("the drawing has more than {MOST_ELEMENTS} elements"),
