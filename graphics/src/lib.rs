@@ -15,6 +15,7 @@ pub mod order;
 pub mod points;
 #[cfg(test)]
 mod random;
+pub mod hpgl;
 #[cfg(feature = "lightburn")]
 pub mod lightburn;
 pub mod read;
