@@ -4,6 +4,7 @@
 //! one by one match, and an edge on a multiple of the spacing has no line on it. Where a line ends is solved
 //! on the curve itself: ends lie on it within 1e-9 m, at any coarseness of drawing.
 
+mod inset;
 mod pieces;
 mod rows;
 
@@ -12,6 +13,7 @@ use std::collections::BTreeMap;
 use kurbo::{Affine, Point};
 
 use crate::{Contour, FillRule, Segment};
+pub use inset::{inset, rings};
 use rows::{Crossing, Row, Rows};
 
 /// How an area is filled.
@@ -62,6 +64,16 @@ pub enum HatchError {
         /// Index of the contour in it.
         contour: usize,
     },
+    /// A contour is too far away for insets.
+    #[error("area {area}, contour {contour} (from 0) is farther than {farthest} m from the origin")]
+    TooFar {
+        /// Index of the area.
+        area: usize,
+        /// Index of the contour in it.
+        contour: usize,
+        /// The limit [m].
+        farthest: f64,
+    },
     /// Spacing or angle are of no use.
     #[error("{name} is {value}; it must be {range}")]
     Setting {
@@ -102,23 +114,34 @@ pub const MOST_LINES: usize = 20_000_000;
 ///
 /// Where a setting is out of its range, a coordinate is not finite, or the lines are too many.
 pub fn hatch(areas: &[Area<'_>], how: &Hatch) -> Result<Vec<Contour>, HatchError> {
-    let check = |name, value: f64, is_right: bool, range| {
-        if is_right { Ok(()) } else { Err(HatchError::Setting { name, value, range }) }
-    };
-    check("angle", how.angle, how.angle.is_finite(), "a finite number of radians")?;
+    check_setting("angle", how.angle, how.angle.is_finite(), "a finite number of radians")?;
     let is_positive = how.spacing.is_finite() && how.spacing > 0.0;
-    check("spacing", how.spacing, is_positive, "more than 0 m")?;
-    for (area, one) in areas.iter().enumerate() {
-        if let Some(contour) = one.contours.iter().position(|contour| !contour.is_finite()) {
-            return Err(HatchError::NotFinite { area, contour });
-        }
-    }
+    check_setting("spacing", how.spacing, is_positive, "more than 0 m")?;
+    check_areas(areas)?;
     let mut lines = Vec::new();
     fill(areas, how.angle, how, &mut lines)?;
     if how.is_cross {
         fill(areas, how.angle + messages::math::TURN / 4.0, how, &mut lines)?;
     }
     Ok(lines)
+}
+
+fn check_setting(
+    name: &'static str,
+    value: f64,
+    is_right: bool,
+    range: &'static str,
+) -> Result<(), HatchError> {
+    if is_right { Ok(()) } else { Err(HatchError::Setting { name, value, range }) }
+}
+
+fn check_areas(areas: &[Area<'_>]) -> Result<(), HatchError> {
+    for (area, one) in areas.iter().enumerate() {
+        if let Some(contour) = one.contours.iter().position(|contour| !contour.is_finite()) {
+            return Err(HatchError::NotFinite { area, contour });
+        }
+    }
+    Ok(())
 }
 
 /// Fills with lines of one direction.
