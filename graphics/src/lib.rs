@@ -7,9 +7,12 @@
 mod curve;
 #[cfg(feature = "dxf")]
 pub mod dxf;
+pub mod dither;
 mod error;
 mod extent;
 pub mod hatch;
+#[cfg(feature = "image")]
+pub mod image;
 pub mod offset;
 pub mod order;
 pub mod points;
