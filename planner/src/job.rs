@@ -109,7 +109,7 @@ pub enum JobError {
     /// The file cannot be read.
     #[error("{}: cannot be read: {cause}", path.display())]
     #[diagnostic(help(
-        "give the path of a job file (.toml) or a G-code program (.ngc, .nc, .gcode, .tap)"
+        "give the path of a job file (.toml) or a G-code program (.ngc, .nc, .gcode, .tap, .gc, .cnc, .g)"
     ))]
     Unreadable {
         /// The file.
@@ -136,8 +136,8 @@ pub enum JobError {
     Gcode(#[from] Box<GcodeError>),
 }
 
-/// Extensions of G-code programs.
-const GCODE: [&str; 4] = ["ngc", "nc", "gcode", "tap"];
+/// Extensions of G-code programs. Another file is one too if it begins like one.
+const GCODE: [&str; 7] = ["ngc", "nc", "gcode", "tap", "gc", "cnc", "g"];
 
 /// Extension of job files.
 const JOB_FILE: &str = "toml";
@@ -189,12 +189,18 @@ impl Job {
             return file::program(path, overrides, machine, most);
         }
         if extension != JOB_FILE {
+            if gcode::is_program(path) {
+                return file::program(path, overrides, machine, most);
+            }
             let known = || GCODE.into_iter().chain([JOB_FILE]);
             let help = match nearest(&extension, known()) {
                 Some(near) => format!("did you mean `.{near}`?"),
                 None => {
                     let names: Vec<String> = known().map(|name| format!(".{name}")).collect();
-                    format!("known are {}", names.join(", "))
+                    format!(
+                        "known are {}; another file is taken for G-code if its first lines are",
+                        names.join(", ")
+                    )
                 }
             };
             return Err(JobError::UnknownExtension { path: path.to_owned(), help });

@@ -148,6 +148,33 @@ fn what_is_no_job_is_named() {
     assert!(matches!(error, JobError::UnknownExtension { .. }));
 }
 
+/// A program is one by its extension in either case, and else by its first lines.
+#[test]
+fn a_program_has_many_names() {
+    let machine = Machine::builtin();
+    let folder = Folder::new("names");
+    let text = "G21 G90\nG0 X1\nM3 S100\nG1 X2 F600\n";
+    let marked = |path: &Path| Job::read(path, &[], &machine).unwrap().program.unwrap().mark_length;
+    for extension in
+        ["ngc", "nc", "gcode", "tap", "gc", "cnc", "g", "GC", "Nc", "txt", "out", "TXT"]
+    {
+        let path = folder.write(&format!("program.{extension}"), text);
+        assert!((marked(&path) - 1e-3).abs() < 1e-12, "{extension}");
+    }
+    assert!((marked(&folder.write("program", text)) - 1e-3).abs() < 1e-12);
+    let letter = folder.write("letter.txt", "Dear Sir,\nplease mark this.\n");
+    let error = Job::read(&letter, &[], &machine).unwrap_err();
+    assert!(matches!(error, JobError::UnknownExtension { .. }), "{error}");
+    // Editors on Windows save UTF-16.
+    for (name, order) in [("le", u16::to_le_bytes as fn(u16) -> [u8; 2]), ("be", u16::to_be_bytes)]
+    {
+        let wide: Vec<u8> = format!("\u{feff}{text}").encode_utf16().flat_map(order).collect();
+        let path = folder.write(&format!("wide_{name}.nc"), wide);
+
+        assert!((marked(&path) - 1e-3).abs() < 1e-12, "{name}");
+    }
+}
+
 /// Every key of every kind of job file deleted, misspelt, given another unit, type, no number, too
 /// much or nothing: an error at that line, or a job that plans or is refused by the checker.
 #[test]

@@ -32,7 +32,7 @@ pub struct DrivesArguments {
 /// Arguments of `run`.
 #[derive(Debug, Clone, Args)]
 pub struct RunArguments {
-    /// Job: .ngc .nc .gcode .tap (G-code) or .toml; without it the machine's sample job.
+    /// Job: .ngc .nc .gcode .tap .gc .cnc .g (G-code) or .toml; without it the machine's sample job.
     pub job: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -51,7 +51,7 @@ pub struct RunArguments {
 /// Arguments of `simulate`.
 #[derive(Debug, Clone, Args)]
 pub struct SimulateArguments {
-    /// Job: .ngc .nc .gcode .tap (G-code) or .toml; without it the machine's sample job.
+    /// Job: .ngc .nc .gcode .tap .gc .cnc .g (G-code) or .toml; without it the machine's sample job.
     pub job: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -70,7 +70,7 @@ pub struct SimulateArguments {
 /// Arguments of `submit`.
 #[derive(Debug, Clone, Args)]
 pub struct SubmitArguments {
-    /// Job: .ngc .nc .gcode .tap (G-code) or .toml.
+    /// Job: .ngc .nc .gcode .tap .gc .cnc .g (G-code) or .toml.
     pub job: PathBuf,
     /// Change a value of the job. Can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]

@@ -11,11 +11,14 @@
 
 mod arc;
 mod block;
+mod characters;
 mod codes;
+mod encoding;
 mod error;
 mod interpreter;
 mod lexer;
 mod lines;
+mod recognise;
 mod settings;
 mod steps;
 mod survey;
@@ -26,6 +29,7 @@ mod tracer;
 use machine::Machine;
 
 pub use error::GcodeError;
+pub(super) use recognise::is_program;
 pub use steps::Steps;
 pub use survey::{FileSteps, ProgramFacts, ProgramFile, Survey, survey};
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use miette::{Diagnostic, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
 
-use super::lines::decode;
+use super::lines::{Around, decode};
 
 /// A G-code program that cannot be marked as it stands.
 #[derive(Debug, Clone, thiserror::Error, Diagnostic)]
@@ -54,13 +54,12 @@ impl Refusal {
 }
 
 impl GcodeError {
-    /// Of a `refusal` in the line `number`, from 1, of `file`. `around` is that line with those before
-    /// and after it, as far as there are any.
+    /// Of a `refusal` in the line `number`, from 1, of `file`.
     pub(super) fn new(
         file: &str,
         number: u64,
         line: &[u8],
-        around: &[String],
+        around: &Around,
         refusal: Refusal,
     ) -> Self {
         let Refusal { span, message, found, help } = refusal;
@@ -73,8 +72,8 @@ impl GcodeError {
             std::borrow::Cow::Owned(_) => line[..byte].iter().map(|&byte| width(byte)).sum(),
         };
         let (start, end) = (place(span.start), place(span.end));
-        let is_second = number > 1 && !around.is_empty();
-        let offset = if is_second { around[0].len() + 1 } else { 0 };
+        let before = around.lines.first().filter(|_| around.has_before);
+        let offset = before.map_or(0, |before| before.len() + 1);
         Self {
             file: file.to_owned(),
             line: number,
@@ -85,8 +84,8 @@ impl GcodeError {
             others: Vec::new(),
             excerpt: Excerpt {
                 file: file.to_owned(),
-                text: around.join("\n"),
-                first: number.saturating_sub(1 + u64::from(is_second)) as usize,
+                text: around.lines.join("\n"),
+                first: number.saturating_sub(1 + u64::from(before.is_some())) as usize,
             },
             span: (offset + start, end.saturating_sub(start)).into(),
         }
@@ -134,7 +133,8 @@ mod tests {
 
     #[test]
     fn an_excerpt_keeps_the_numbers_of_its_lines() {
-        let around = ["G21", "G0 X1 \u{e9}", "M2"].map(str::to_owned);
+        let lines = ["G21", "G0 X1 \u{e9}", "M2"].map(str::to_owned).to_vec();
+        let around = Around { lines, has_before: true };
         let refusal = *Refusal::new(6..7, "wrong", "here", "better");
         let error = GcodeError::new("a.nc", 700, b"G0 X1 \xe9", &around, refusal);
         assert_eq!((error.line, error.column), (700, 7));

@@ -57,6 +57,7 @@ pub(super) enum Remark {
     Height,
     Folded,
     NoPower,
+    TapeMark,
 }
 
 /// Where the program zero was at its moves, machine frame [m].
@@ -125,8 +126,13 @@ impl Interpreter {
         }
     }
 
-    /// Makes a note unless it was made before.
+    /// Makes a note of the present line unless it was made before.
     pub(super) fn remark(&mut self, remark: Remark) {
+        self.remark_at(self.tracer.line, remark);
+    }
+
+    /// Makes a note of `line` unless it was made before.
+    pub(super) fn remark_at(&mut self, line: u64, remark: Remark) {
         let bit = 1 << remark as u32;
         if self.said & bit != 0 {
             return;
@@ -139,9 +145,10 @@ impl Interpreter {
             Remark::NoAirAssist => "M7 and M8 have no effect: this machine has no air assist",
             Remark::Height => "moves along Z are left out: this machine ignores Z",
             Remark::Folded => "an arc in an upright plane is marked as seen along Z, to and fro",
+            Remark::TapeMark => "% is passed over: no % has begun the program, so none ends it",
             Remark::NoPower => "the laser is on without S: it stays dark until S says its power",
         };
-        self.notes.push(Note { line: self.tracer.line, text: text.to_owned() });
+        self.notes.push(Note { line, text: text.to_owned() });
     }
 
     /// Does what `block` says, which was gathered from `line`. Gives back whether it ends the program.

@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use super::characters;
 use super::error::Refusal;
 use super::lines::character;
 
@@ -214,6 +215,15 @@ impl<'a> Words<'a> {
                 "expression",
                 wanted,
             ),
+            Some(byte) if !(b' '..=b'~').contains(byte) && *byte != b'\t' => {
+                let (character, length) = character(self.line, digits);
+                Refusal::new(
+                    digits..digits + length,
+                    format!("{name} has no number, but {}", characters::name(character)),
+                    "not a number",
+                    characters::instead(character).map_or(wanted, str::to_owned),
+                )
+            }
             _ => Refusal::new(
                 start..self.at.max(start + 1),
                 format!("{name} has no number"),
@@ -260,9 +270,19 @@ impl<'a> Words<'a> {
             '0'..='9' | '.' | '+' | '-' => {
                 ("a number without a letter".to_owned(), "a word is a letter and a number: X10")
             }
+            '$' | '?' | '!' | '~' | '\u{18}' => {
+                return Refusal::new(
+                    span,
+                    format!("{} is a sender's command, not a program's", characters::command(character)),
+                    "not a word",
+                    characters::command_advice(character),
+                );
+            }
             _ => (
-                format!("unexpected character {character:?}"),
-                "a line consists of words such as G1, X10 or F600, and of comments in ( ) or after ;",
+                format!("unexpected {}", characters::name(character)),
+                characters::instead(character).unwrap_or(
+                    "a line consists of words such as G1, X10 or F600, and of comments in ( ) or after ;",
+                ),
             ),
         };
         Refusal::new(span, message, "not a word", help)
@@ -342,7 +362,12 @@ mod tests {
         check("X1 (a", 3, "a comment is not closed on its line");
         check("(a (b) c)", 3, "a comment begins inside a comment");
         check("X1 )", 3, "a comment is closed that was not opened");
-        check("X1 é", 3, "unexpected character 'é'");
+        check("X1 é", 3, "unexpected character 'é' (U+00E9)");
+        check("G1\u{a0}X1", 2, "unexpected no-break space (U+00A0)");
+        check("G1 X\u{2013}20", 4, "X has no number, but en dash (U+2013)");
+        check("$H", 0, "$ is a sender's command, not a program's");
+        check("G0 X1 !", 6, "! is a sender's command, not a program's");
+        check("\u{18}", 0, "ctrl-X is a sender's command, not a program's");
         check("X1*71", 2, "checksums (*) are not supported");
         check("X1 / Y", 3, "/ stands inside a line");
     }

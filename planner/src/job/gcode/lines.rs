@@ -4,12 +4,17 @@ use std::borrow::Cow;
 use std::io::{self, ErrorKind, Read};
 use std::ops::Range;
 
+use super::encoding::Text;
+
 /// What is read of a file at a time [bytes].
 const CHUNK: usize = 1 << 16;
 
 /// The longest line [bytes]. No program that a machine can follow has one; a file without line feeds
 /// is something else, and is not worth the memory.
 pub(super) const LONGEST_LINE: usize = 1 << 20;
+
+/// What is held of a program that goes back to earlier lines [bytes].
+pub(super) const MOST_HELD: usize = 64 << 20;
 
 /// Why there is no next line.
 #[derive(Debug)]
@@ -18,18 +23,45 @@ pub(super) enum NoLine {
     Unreadable(io::Error),
     /// It is longer than [`LONGEST_LINE`].
     TooLong,
+    /// More than [`MOST_HELD`] would have to be held.
+    TooMuchHeld,
 }
 
-/// The lines of a program, with the one before at hand for messages.
+/// A place in a program to come back to: that of the line after the present one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Place {
+    /// Bytes of text before it.
+    offset: u64,
+    /// Lines before it.
+    number: u64,
+}
+
+/// The present line for a message, with those around it.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Around {
+    /// The line before, the present one and the one after, as far as there are any.
+    pub(super) lines: Vec<String>,
+    /// Whether the first of them is the line before.
+    pub(super) has_before: bool,
+}
+
+/// The lines of a program, with the one before at hand for messages. A line ends with a line feed, a
+/// carriage return, or both.
 #[derive(Debug)]
 pub(super) struct Lines<R> {
-    source: R,
+    source: Text<R>,
     buffer: Vec<u8>,
+    /// Bytes of text before the buffer.
+    dropped: u64,
+    /// Whether all text from here on is held, so that [`Self::go_to`] finds it.
+    holds: bool,
+    /// Number of the present line, from 1; 0 before the first.
+    number: u64,
     /// How much of the buffer holds text.
     filled: usize,
-    /// Where the line before the present one is, empty at the first.
-    before: Range<usize>,
-    /// Where the present line is, without its line feed.
+    /// Where the line before the present one is, `None` at the first.
+    before: Option<Range<usize>>,
+    /// Where the present line is, without its end.
     line: Range<usize>,
     /// Where the next line begins.
     next: usize,
@@ -40,10 +72,13 @@ pub(super) struct Lines<R> {
 impl<R: Read> Lines<R> {
     pub(super) fn new(source: R) -> Self {
         Self {
-            source,
+            source: Text::new(source),
             buffer: vec![0; CHUNK],
+            dropped: 0,
+            holds: false,
+            number: 0,
             filled: 0,
-            before: 0..0,
+            before: None,
             line: 0..0,
             next: 0,
             ended: false,
@@ -52,61 +87,118 @@ impl<R: Read> Lines<R> {
 
     /// Goes to the next line. Gives back whether there is one.
     pub(super) fn advance(&mut self) -> Result<bool, NoLine> {
-        let Some(end) = self.end_of_next()? else { return Ok(false) };
-        self.before = std::mem::replace(&mut self.line, self.next..end);
-        self.next = (end + 1).min(self.filled);
+        let Some((end, next)) = self.end_of_next()? else { return Ok(false) };
+        let line = std::mem::replace(&mut self.line, self.next..end);
+        self.before = (self.number > 0).then_some(line);
+        self.next = next;
+        self.number += 1;
         Ok(true)
     }
 
-    /// The present line, without its line feed.
+    /// The present line, without its end.
     pub(super) fn line(&self) -> &[u8] {
         &self.buffer[self.line.clone()]
     }
 
-    /// The present line, `number` from 1, as text between those before and after it, for a message.
-    pub(super) fn around(&mut self, number: u64) -> Vec<String> {
+    /// Number of the present line, from 1; 0 before the first.
+    #[cfg_attr(not(test), expect(dead_code, reason = "for subroutines and loops"))]
+    pub(super) fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Holds all text from the present line on.
+    #[cfg_attr(not(test), expect(dead_code, reason = "for subroutines and loops"))]
+    pub(super) fn hold(&mut self) {
+        self.holds = true;
+    }
+
+    /// The place after the present line.
+    #[cfg_attr(not(test), expect(dead_code, reason = "for subroutines and loops"))]
+    pub(super) fn place(&self) -> Place {
+        Place { offset: self.dropped + self.next as u64, number: self.number }
+    }
+
+    /// Goes to `place`: the next line is the one there. Its text must be held since it was passed.
+    #[cfg_attr(not(test), expect(dead_code, reason = "for subroutines and loops"))]
+    pub(super) fn go_to(&mut self, place: Place) {
+        self.next = (place.offset.saturating_sub(self.dropped) as usize).min(self.filled);
+        self.number = place.number;
+        // The line before it, as far as it is held.
+        let text = &self.buffer[..self.next];
+        let text = text.strip_suffix(b"\n").unwrap_or(text);
+        let text = text.strip_suffix(b"\r").unwrap_or(text);
+        let start = text.iter().rposition(|&byte| is_end(byte)).map_or(0, |at| at + 1);
+        self.line = start..text.len();
+    }
+
+    /// The present line as text, with those before and after it, for a message.
+    pub(super) fn around(&mut self) -> Around {
         // What cannot be read any more is left out of the message, which is about another line.
-        let after = self.end_of_next().ok().flatten().map(|end| self.next..end);
-        let before = (number > 1).then(|| self.before.clone());
-        [before, Some(self.line.clone()), after]
+        let after = self.end_of_next().ok().flatten().map(|(end, _)| self.next..end);
+        let lines = [self.before.clone(), Some(self.line.clone()), after]
             .into_iter()
             .flatten()
             .map(|range| decode(&self.buffer[range]).into_owned())
-            .collect()
+            .collect();
+        Around { lines, has_before: self.before.is_some() }
     }
 
-    /// Where the next line ends; `None` after the last.
-    fn end_of_next(&mut self) -> Result<Option<usize>, NoLine> {
+    /// Where the next line ends, and where the one after it begins; `None` after the last.
+    fn end_of_next(&mut self) -> Result<Option<(usize, usize)>, NoLine> {
         let mut searched = self.next;
         loop {
             let fresh = &self.buffer[searched..self.filled];
-            if let Some(length) = fresh.iter().position(|&byte| byte == b'\n') {
-                return Ok(Some(searched + length));
-            }
-            if self.ended {
-                return Ok((self.next < self.filled).then_some(self.filled));
+            if let Some(length) = fresh.iter().position(|&byte| is_end(byte)) {
+                let end = searched + length;
+                if self.buffer[end] == b'\n' {
+                    return Ok(Some((end, end + 1)));
+                }
+                // A carriage return may have its line feed in what is read next.
+                if end + 1 < self.filled || self.ended {
+                    let has_feed = end + 1 < self.filled && self.buffer[end + 1] == b'\n';
+                    return Ok(Some((end, end + 1 + usize::from(has_feed))));
+                }
+                searched = end;
+            } else {
+                if self.ended {
+                    return Ok((self.next < self.filled).then_some((self.filled, self.filled)));
+                }
+                searched = self.filled;
             }
             let begun = self.filled - self.next;
             if begun > LONGEST_LINE {
                 return Err(NoLine::TooLong);
             }
-            self.fill().map_err(NoLine::Unreadable)?;
-            searched = self.next + begun;
+            let offset = searched - self.next;
+            self.fill()?;
+            searched = self.next + offset;
         }
     }
 
-    /// Reads on, and lets go of all text before the two lines that are still wanted.
-    fn fill(&mut self) -> io::Result<()> {
-        let kept = if self.before.is_empty() { self.line.start } else { self.before.start };
-        self.buffer.copy_within(kept..self.filled, 0);
-        for place in [&mut self.before, &mut self.line] {
-            *place = place.start.saturating_sub(kept)..place.end.saturating_sub(kept);
+    /// Reads on, and lets go of all text before the two lines that are still wanted, unless it is held.
+    fn fill(&mut self) -> Result<(), NoLine> {
+        if self.holds {
+            if self.filled > MOST_HELD {
+                return Err(NoLine::TooMuchHeld);
+            }
+        } else {
+            let kept = self.before.as_ref().map_or(self.line.start, |before| before.start);
+            self.buffer.copy_within(kept..self.filled, 0);
+            self.line = self.line.start - kept..self.line.end - kept;
+            self.before = self.before.take().map(|line| line.start - kept..line.end - kept);
+            self.filled -= kept;
+            self.next -= kept;
+            self.dropped += kept as u64;
         }
-        self.filled -= kept;
-        self.next -= kept;
         if self.buffer.len() < self.filled + CHUNK {
-            self.buffer.resize(self.filled + CHUNK, 0);
+            // Held text doubles its room, so that it is seldom moved.
+            let room = if self.holds { 2 * self.filled } else { self.filled };
+            self.buffer.resize(room + CHUNK, 0);
         }
+        self.read().map_err(NoLine::Unreadable)
+    }
+
+    fn read(&mut self) -> io::Result<()> {
         loop {
             match self.source.read(&mut self.buffer[self.filled..]) {
                 Ok(length) => {
@@ -119,6 +211,11 @@ impl<R: Read> Lines<R> {
             }
         }
     }
+}
+
+/// Whether a line ends with `byte`.
+fn is_end(byte: u8) -> bool {
+    byte == b'\n' || byte == b'\r'
 }
 
 /// A line as text. Many editors of G-code write comments in Latin-1: a line that is not UTF-8 is taken
@@ -179,6 +276,47 @@ mod tests {
     }
 
     #[test]
+    fn a_carriage_return_ends_a_line_alone_and_before_a_line_feed() {
+        for (text, expected) in [
+            ("a\rb\rc", vec!["a", "b", "c"]),
+            ("a\r\nb\r\n", vec!["a", "b"]),
+            ("a\r\rb\r", vec!["a", "", "b"]),
+            ("\r\n\r\n", vec!["", ""]),
+        ] {
+            for piece in [1, 2, 3, usize::MAX] {
+                assert_eq!(read(text, piece), expected, "{text:?} {piece}");
+            }
+        }
+    }
+
+    #[test]
+    fn held_lines_can_be_read_again() {
+        let text = (1..=40_000).map(|number| format!("N{number}\r\n")).collect::<String>();
+        let mut lines = Lines::new(Pieces(text.as_bytes(), 1000));
+        let mut place = None;
+        for number in 1..=40_000_u64 {
+            assert!(lines.advance().unwrap());
+            if number == 20_000 {
+                lines.hold();
+                place = Some(lines.place());
+            }
+        }
+        lines.go_to(place.unwrap());
+        for number in 20_001..=40_000_u64 {
+            assert!(lines.advance().unwrap());
+            assert_eq!(lines.number(), number);
+            let around = lines.around();
+            assert!(around.has_before);
+            assert_eq!(around.lines[..2], [format!("N{}", number - 1), format!("N{number}")]);
+        }
+        assert!(!lines.advance().unwrap());
+        let mut lines = Lines::new(io::repeat(b'\n'));
+        lines.hold();
+        while let Ok(true) = lines.advance() {}
+        assert!(matches!(lines.advance(), Err(NoLine::TooMuchHeld)));
+    }
+
+    #[test]
     fn the_lines_around_the_present_one_are_at_hand() {
         let text = (1..=40_000).map(|number| format!("N{number}\n")).collect::<String>();
         let mut lines = Lines::new(Pieces(text.as_bytes(), 1000));
@@ -187,7 +325,7 @@ mod tests {
             let around: Vec<String> = (number.max(2) - 1..=(number + 1).min(40_000))
                 .map(|number| format!("N{number}"))
                 .collect();
-            assert_eq!(lines.around(number), around);
+            assert_eq!(lines.around(), Around { lines: around, has_before: number > 1 });
         }
         assert!(!lines.advance().unwrap());
         assert!(lines.buffer.len() < 3 * CHUNK, "{}", lines.buffer.len());

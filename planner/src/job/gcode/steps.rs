@@ -7,10 +7,10 @@ use super::block::Block;
 use super::error::{GcodeError, Refusal};
 use super::interpreter::{Interpreter, Remark};
 use super::lexer::{Token, Words};
-use super::lines::{LONGEST_LINE, Lines, NoLine};
+use super::lines::{Around, LONGEST_LINE, Lines, MOST_HELD, NoLine};
 use super::settings::ReaderSettings;
 use super::survey::Survey;
-use crate::drawing::Step;
+use crate::drawing::{Note, Step};
 
 /// Steps that are read ahead.
 const BATCH: usize = 256;
@@ -35,6 +35,8 @@ pub struct Steps<R> {
     error: Option<Box<GcodeError>>,
     /// Whether a tape mark has begun the program.
     tape: bool,
+    /// A tape mark inside a program that none has begun, before any words after it.
+    stray_mark: Option<u64>,
 }
 
 /// What a line turned out to be.
@@ -65,6 +67,7 @@ impl<R: Read> Steps<R> {
             ended: false,
             error: None,
             tape: false,
+            stray_mark: None,
         }
     }
 
@@ -86,6 +89,7 @@ impl<R: Read> Steps<R> {
                 tracer.steps.shrink_to(BATCH);
             }
         }
+        self.note_rest();
         let Interpreter { tracer, notes, zeros, .. } = self.interpreter;
         let survey = Survey {
             facts: tracer.facts,
@@ -112,6 +116,9 @@ impl<R: Read> Steps<R> {
         let done = match self.gather() {
             Ok(Gathered::Mark) => Ok(self.is_end_mark()),
             Ok(Gathered::Block) if self.block.begun => {
+                if let Some(line) = self.stray_mark.take() {
+                    self.interpreter.remark_at(line, Remark::TapeMark);
+                }
                 self.interpreter.execute(self.lines.line(), &mut self.block)
             }
             Ok(Gathered::Block) => Ok(false),
@@ -156,9 +163,33 @@ impl<R: Read> Steps<R> {
         Ok(Gathered::Block)
     }
 
-    /// Whether the tape mark that was read ends the program; another begins it.
+    /// Whether the tape mark that was read ends the program: one that a tape mark has begun. Inside
+    /// another program it is passed over, as Grbl does.
     fn is_end_mark(&mut self) -> bool {
-        std::mem::replace(&mut self.tape, true) || self.interpreter.tracer.facts.blocks > 0
+        if self.tape {
+            return true;
+        }
+        if self.interpreter.tracer.facts.blocks == 0 {
+            self.tape = true;
+        } else {
+            self.stray_mark = Some(self.interpreter.tracer.line);
+        }
+        false
+    }
+
+    /// Notes how many lines after the program's end have words, which are not read.
+    fn note_rest(&mut self) {
+        let mut rest = 0_u64;
+        while let Ok(true) = self.lines.advance() {
+            let first = self.lines.line().trim_ascii_start().first();
+            rest += u64::from(first.is_some_and(u8::is_ascii_alphabetic));
+        }
+        if rest > 0 {
+            let lines = if rest == 1 { "one line" } else { &format!("{rest} lines") };
+            let line = self.interpreter.tracer.line;
+            let text = format!("the program ends here: {lines} with words after it, not read");
+            self.interpreter.notes.push(Note { line, text });
+        }
     }
 
     fn end(&mut self) {
@@ -195,7 +226,7 @@ impl<R: Read> Steps<R> {
     fn refuse(&mut self, refusal: Refusal) -> Box<GcodeError> {
         self.ended = true;
         let number = self.interpreter.tracer.line;
-        let around = self.lines.around(number);
+        let around = self.lines.around();
         Box::new(GcodeError::new(&self.name, number, self.lines.line(), &around, refusal))
     }
 
@@ -216,8 +247,15 @@ impl<R: Read> Steps<R> {
                 "too long",
                 "is this a G-code program? Its lines end with a line feed",
             ),
+            NoLine::TooMuchHeld => Refusal::new(
+                0..0,
+                format!("the program goes on for more than {} MiB", MOST_HELD >> 20),
+                "too long",
+                "a program with subroutines or loops is held in memory: write it shorter, or write the \
+                 moves out",
+            ),
         };
-        Box::new(GcodeError::new(&self.name, number, &[], &[], *refusal))
+        Box::new(GcodeError::new(&self.name, number, &[], &Around::default(), *refusal))
     }
 }
 

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod arcs;
+mod files;
 mod mutations;
 mod refusals;
 mod samples;

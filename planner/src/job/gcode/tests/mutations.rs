@@ -17,7 +17,10 @@ fn try_read(text: &str) -> Option<u64> {
             }
             Err(error) => {
                 assert!(error.line >= 1 && error.column >= 1, "{error}\n{text}");
-                assert!(error.line <= 1 + text.matches('\n').count() as u64, "{error}\n{text}");
+                assert!(
+                    error.line <= 1 + text.matches(['\n', '\r']).count() as u64,
+                    "{error}\n{text}"
+                );
                 assert!(!error.message.is_empty() && !error.help.is_empty(), "{error}\n{text}");
                 line = Some(error.line);
             }

@@ -61,6 +61,7 @@ fn preamble_and_forms_of_arcs() {
         [
             (4, "T has no effect: a marking head has no tools"),
             (8, "lines that begin with / are left out (block delete)"),
+            (22, "the program ends here: one line with words after it, not read"),
         ]
     );
     let steps = &program.drawing.steps;
