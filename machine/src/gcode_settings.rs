@@ -1,5 +1,7 @@
 //! How a machine reads G-code: the meaning of words that differ from machine to machine.
 
+use crate::document::{Number, Positive, Spanned};
+
 /// What Z means in a G-code program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ZMeaning {
@@ -9,11 +11,170 @@ pub enum ZMeaning {
     Focus,
 }
 
+/// For which controller a program is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dialect {
+    /// RS-274 as laser users write it.
+    Standard,
+    /// LinuxCNC.
+    Linuxcnc,
+    /// Grbl in its laser mode, and what follows it.
+    Grbl,
+    /// Marlin.
+    Marlin,
+    /// Smoothieware.
+    Smoothie,
+    /// Mach3.
+    Mach3,
+    /// Fanuc.
+    Fanuc,
+}
+
+/// In what P of G4 is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DwellUnit {
+    /// Seconds.
+    Seconds,
+    /// Milliseconds.
+    Milliseconds,
+}
+
+/// How the power goes with the speed after M3 or M4.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LaserMode {
+    /// The power of S, whatever the speed.
+    Constant,
+    /// In proportion to the speed.
+    Proportional,
+}
+
+/// What the words of a program mean where dialects differ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WordMeanings {
+    /// The S word that means full power, positive.
+    pub full_scale: f64,
+    /// In what P of G4 is.
+    pub dwell_unit: DwellUnit,
+    /// The letter that gives G4 a time in seconds instead of P, if any.
+    pub dwell_seconds: Option<u8>,
+    /// What M3 is.
+    pub m3: LaserMode,
+    /// What M4 is.
+    pub m4: LaserMode,
+    /// Whether a comment in parentheses may have others in it.
+    pub nested_comments: bool,
+    /// Whether M106 and M107 switch the laser.
+    pub fan_is_laser: bool,
+    /// Whether G70 and G71 are inch and millimetre.
+    pub inch_by_g70: bool,
+    /// Whether the words of 3D printers are known: I of M3, M4 and M5, M82, M83, M400.
+    pub printer_words: bool,
+}
+
+impl Dialect {
+    /// What words mean in it.
+    pub fn meanings(self) -> WordMeanings {
+        use LaserMode::{Constant, Proportional};
+        let standard = WordMeanings {
+            full_scale: 1000.0,
+            dwell_unit: DwellUnit::Seconds,
+            dwell_seconds: None,
+            m3: Constant,
+            m4: Proportional,
+            nested_comments: false,
+            fan_is_laser: false,
+            inch_by_g70: false,
+            printer_words: false,
+        };
+        match self {
+            Self::Standard | Self::Grbl => standard,
+            // M3 and M4 are the directions of a spindle.
+            Self::Linuxcnc => WordMeanings { m4: Constant, ..standard },
+            Self::Mach3 => WordMeanings { m4: Constant, inch_by_g70: true, ..standard },
+            Self::Fanuc => WordMeanings {
+                m4: Constant,
+                dwell_unit: DwellUnit::Milliseconds,
+                dwell_seconds: Some(b'X'),
+                ..standard
+            },
+            Self::Marlin => WordMeanings {
+                full_scale: 255.0,
+                dwell_unit: DwellUnit::Milliseconds,
+                dwell_seconds: Some(b'S'),
+                fan_is_laser: true,
+                printer_words: true,
+                ..standard
+            },
+            // Its power always follows the speed.
+            Self::Smoothie => WordMeanings {
+                full_scale: 1.0,
+                dwell_unit: DwellUnit::Milliseconds,
+                dwell_seconds: Some(b'S'),
+                m3: Proportional,
+                ..standard
+            },
+        }
+    }
+}
+
+/// What a machine file or a job says of its dialect; what is `None` stays as it was.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct DialectChoices {
+    /// All meanings at once.
+    pub dialect: Option<Spanned<Dialect>>,
+    /// [`WordMeanings::full_scale`].
+    pub full_scale: Option<Number<Positive>>,
+    /// [`WordMeanings::dwell_unit`].
+    pub dwell_unit: Option<Spanned<DwellUnit>>,
+    /// [`WordMeanings::m3`].
+    pub m3: Option<Spanned<LaserMode>>,
+    /// [`WordMeanings::m4`].
+    pub m4: Option<Spanned<LaserMode>>,
+    /// [`WordMeanings::nested_comments`].
+    pub nested_comments: Option<Spanned<bool>>,
+    /// [`WordMeanings::fan_is_laser`].
+    pub fan_is_laser: Option<Spanned<bool>>,
+}
+
+impl DialectChoices {
+    /// These choices instead of those of `meanings`: a dialect replaces all of them, and what is
+    /// chosen beside it holds before it.
+    #[must_use]
+    pub fn over(&self, meanings: WordMeanings) -> WordMeanings {
+        let base = self.dialect.map_or(meanings, |dialect| dialect.value.meanings());
+        WordMeanings {
+            full_scale: self.full_scale.map_or(base.full_scale, |number| number.value),
+            dwell_unit: self.dwell_unit.map_or(base.dwell_unit, |unit| unit.value),
+            m3: self.m3.map_or(base.m3, |mode| mode.value),
+            m4: self.m4.map_or(base.m4, |mode| mode.value),
+            nested_comments: self.nested_comments.map_or(base.nested_comments, |is| is.value),
+            fan_is_laser: self.fan_is_laser.map_or(base.fan_is_laser, |is| is.value),
+            ..base
+        }
+    }
+}
+
+/// The [`DialectChoices`] of a table with the keys of a dialect.
+#[macro_export]
+macro_rules! dialect_choices {
+    ($table:expr) => {
+        $crate::gcode_settings::DialectChoices {
+            dialect: $table.dialect,
+            full_scale: $table.full_scale,
+            dwell_unit: $table.dwell_unit,
+            m3: $table.m3,
+            m4: $table.m4,
+            nested_comments: $table.nested_comments,
+            fan_is_laser: $table.fan_is_laser,
+        }
+    };
+}
+
 /// How this machine reads G-code.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GcodeSettings {
-    /// The S word that means full power, positive.
-    pub full_scale: f64,
+    /// What words mean.
+    pub words: WordMeanings,
     /// What Z means.
     pub z: ZMeaning,
     /// Origins of the work coordinate systems G54 to G59, then G59.1 to G59.3, in the machine
@@ -21,4 +182,27 @@ pub struct GcodeSettings {
     pub origins: [[f64; 3]; 9],
     /// Whether M7 and M8 switch an air assist (bit 0 of the outputs).
     pub air_assist: bool,
+}
+
+crate::keyword! {
+    Dialect, "a dialect",
+    "standard" => Self::Standard,
+    "linuxcnc" => Self::Linuxcnc,
+    "grbl" => Self::Grbl,
+    "marlin" => Self::Marlin,
+    "smoothie" => Self::Smoothie,
+    "mach3" => Self::Mach3,
+    "fanuc" => Self::Fanuc,
+}
+
+crate::keyword! {
+    DwellUnit, "a unit of dwells",
+    "s" => Self::Seconds,
+    "ms" => Self::Milliseconds,
+}
+
+crate::keyword! {
+    LaserMode, "a mode of the laser",
+    "constant" => Self::Constant,
+    "proportional" => Self::Proportional,
 }

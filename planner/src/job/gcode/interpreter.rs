@@ -2,20 +2,24 @@
 
 mod arc_words;
 mod laser_words;
+mod origin_words;
+mod remarks;
 
 use std::ops::Range;
 
-use machine::gcode_settings::{GcodeSettings, ZMeaning};
+use machine::gcode_settings::{LaserMode, WordMeanings, ZMeaning};
 use nalgebra::Vector3;
 
 use super::block::Block;
 use super::codes::{
-    Chosen, FeedMode, Laser, MILLIMETRE, Motion, Once, PathControl, Plane, Reference, Stop, spell,
+    Chosen, FeedMode, MILLIMETRE, Motion, Once, PathControl, Plane, Reference, Stop, spell,
 };
 use super::error::Refusal;
 use super::settings::ReaderSettings;
 use super::tracer::{Feed, Pace, Tracer};
 use crate::drawing::{Action, Corners, Note};
+
+pub(super) use self::remarks::Remark;
 
 /// Seconds in a minute.
 const MINUTE: f64 = 60.0;
@@ -32,7 +36,11 @@ struct Modal {
     feed_mode: FeedMode,
     /// Metres per unit.
     unit: f64,
-    /// Program zero of the work coordinate system, machine frame [m].
+    /// Index of the work coordinate system.
+    system: usize,
+    /// Program zeros of all of them, machine frame [m].
+    origins: [[f64; 3]; 9],
+    /// That of the one in force [m].
     origin: Vector3<f64>,
     /// What G92 adds to it [m].
     shift: Vector3<f64>,
@@ -40,24 +48,13 @@ struct Modal {
     kept_shift: Vector3<f64>,
     /// Feed of G94 [m/s], `None` before any.
     feed: Option<f64>,
-    laser: Laser,
+    /// `None` while it is off.
+    laser: Option<LaserMode>,
     /// Fraction of full scale, `None` before any S.
     level: Option<f64>,
-    air_assist: bool,
+    /// Outputs that are on, a bit for each.
+    outputs: u64,
     corners: Corners,
-}
-
-/// Notes, each made once.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Remark {
-    BlockDelete,
-    Tool,
-    OptionalStop,
-    NoAirAssist,
-    Height,
-    Folded,
-    NoPower,
-    TapeMark,
 }
 
 /// Where the program zero was at its moves, machine frame [m].
@@ -89,7 +86,10 @@ impl Zeros {
 /// Runs a program line by line.
 #[derive(Debug)]
 pub(super) struct Interpreter {
-    settings: GcodeSettings,
+    /// What words mean.
+    pub(super) words: WordMeanings,
+    z: ZMeaning,
+    has_air_assist: bool,
     home: Vector3<f64>,
     modal: Modal,
     said: u32,
@@ -101,7 +101,9 @@ pub(super) struct Interpreter {
 impl Interpreter {
     pub(super) fn new(settings: &ReaderSettings) -> Self {
         Self {
-            settings: settings.gcode,
+            words: settings.gcode.words,
+            z: settings.gcode.z,
+            has_air_assist: settings.gcode.air_assist,
             home: settings.home,
             modal: Modal {
                 motion: None,
@@ -110,13 +112,15 @@ impl Interpreter {
                 arc_distance: Reference::Incremental,
                 feed_mode: FeedMode::PerMinute,
                 unit: MILLIMETRE,
+                system: 0,
+                origins: settings.gcode.origins,
                 origin: Vector3::from(settings.gcode.origins[0]),
                 shift: Vector3::zeros(),
                 kept_shift: Vector3::zeros(),
                 feed: None,
-                laser: Laser::Off,
+                laser: None,
                 level: None,
-                air_assist: false,
+                outputs: 0,
                 corners: Corners::AsMachine,
             },
             said: 0,
@@ -126,40 +130,17 @@ impl Interpreter {
         }
     }
 
-    /// Makes a note of the present line unless it was made before.
-    pub(super) fn remark(&mut self, remark: Remark) {
-        self.remark_at(self.tracer.line, remark);
-    }
-
-    /// Makes a note of `line` unless it was made before.
-    pub(super) fn remark_at(&mut self, line: u64, remark: Remark) {
-        let bit = 1 << remark as u32;
-        if self.said & bit != 0 {
-            return;
-        }
-        self.said |= bit;
-        let text = match remark {
-            Remark::BlockDelete => "lines that begin with / are left out (block delete)",
-            Remark::Tool => "T has no effect: a marking head has no tools",
-            Remark::OptionalStop => "M1 has no effect: there is no optional stop; M0 waits",
-            Remark::NoAirAssist => "M7 and M8 have no effect: this machine has no air assist",
-            Remark::Height => "moves along Z are left out: this machine ignores Z",
-            Remark::Folded => "an arc in an upright plane is marked as seen along Z, to and fro",
-            Remark::TapeMark => "% is passed over: no % has begun the program, so none ends it",
-            Remark::NoPower => "the laser is on without S: it stays dark until S says its power",
-        };
-        self.notes.push(Note { line, text: text.to_owned() });
-    }
-
     /// Does what `block` says, which was gathered from `line`. Gives back whether it ends the program.
     pub(super) fn execute(&mut self, line: &[u8], block: &mut Block) -> Result<bool, Box<Refusal>> {
         self.tracer.facts.blocks += 1;
         self.settle_feed(block)?;
         self.settle_laser(block)?;
+        self.without_effect(line, block)?;
         let codes = &block.codes;
         self.modal.plane = codes.plane.as_ref().map_or(self.modal.plane, |chosen| chosen.code);
         if let Some(chosen) = &codes.origin {
-            self.modal.origin = Vector3::from(self.settings.origins[chosen.code]);
+            self.modal.system = chosen.code;
+            self.modal.origin = Vector3::from(self.modal.origins[chosen.code]);
         }
         let once = codes.once.clone();
         if let Some(Chosen { code: Once::Dwell, span }) = &once {
@@ -185,9 +166,10 @@ impl Interpreter {
 
     /// Puts what a program left on out, and completes its facts.
     pub(super) fn finish(&mut self) {
-        if std::mem::take(&mut self.modal.air_assist) {
-            self.tracer.push(Action::Output { bit: AIR_ASSIST, on: false });
+        for bit in 0..u64::BITS {
+            self.switch(bit, false);
         }
+        self.note_powers();
         let end = self.tracer.position - self.modal.origin - self.modal.shift;
         self.tracer.facts.end = end.into();
     }
@@ -270,7 +252,7 @@ impl Interpreter {
         motion: Option<&Chosen<Motion>>,
     ) -> Result<(), Box<Refusal>> {
         let Some(Chosen { code, span }) = once else { return Ok(()) };
-        if !matches!(code, Once::Home | Once::Shift) {
+        if !matches!(code, Once::Home | Once::Shift | Once::SetOrigin) {
             match code {
                 Once::ClearShift => {
                     self.modal.shift = Vector3::zeros();
@@ -297,6 +279,9 @@ impl Interpreter {
             ));
         }
         let given = [b'X', b'Y', b'Z'].map(|letter| block.has(letter));
+        if *code == Once::SetOrigin {
+            return self.set_origin(block, span.clone());
+        }
         if *code == Once::Home {
             let through = self.target(block, false);
             let mut home = self.home;
@@ -337,7 +322,9 @@ impl Interpreter {
         motion: Option<&Chosen<Motion>>,
     ) -> Result<(), Box<Refusal>> {
         let frame = once.filter(|once| once.code == Once::MachineFrame);
-        let taken = once.is_some_and(|once| matches!(once.code, Once::Home | Once::Shift));
+        let taken = once
+            .is_some_and(|once| matches!(once.code, Once::Home | Once::Shift | Once::SetOrigin))
+            || block.axes_taken;
         let now = self.modal.motion;
         if let Some(frame) = frame {
             let straight = matches!(now, Some(Motion::Rapid | Motion::Line));
@@ -370,8 +357,11 @@ impl Interpreter {
                 let feed = self.feed(block, motion)?;
                 let to = self.target(block, frame.is_some());
                 self.note_height(to);
-                self.tracer.line(to, feed);
-                Ok(())
+                if block.cluster.is_empty() {
+                    self.tracer.line(to, feed);
+                    return Ok(());
+                }
+                self.cluster(block, to, feed)
             }
             Some(Motion::Clockwise) => self.arc(block, motion, false),
             Some(Motion::Counterclockwise) => self.arc(block, motion, true),
@@ -405,7 +395,7 @@ impl Interpreter {
                 help,
             ));
         };
-        if self.modal.level.is_none() && self.modal.laser != Laser::Off {
+        if self.modal.level.is_none() && self.modal.laser.is_some() {
             self.remark(Remark::NoPower);
         }
         Ok(Feed { pace, power: self.power() })
@@ -430,7 +420,7 @@ impl Interpreter {
 
     /// Notes the first move along an ignored Z.
     fn note_height(&mut self, to: Vector3<f64>) {
-        if self.settings.z == ZMeaning::Ignored && to.z != self.tracer.position.z {
+        if self.z == ZMeaning::Ignored && to.z != self.tracer.position.z {
             self.remark(Remark::Height);
         }
     }

@@ -5,6 +5,8 @@
 
 use std::ops::Range;
 
+use machine::gcode_settings::WordMeanings;
+
 use super::characters;
 use super::error::Refusal;
 use super::lines::character;
@@ -36,6 +38,10 @@ pub(super) struct Word {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Token {
     Word(Word),
+    /// A further power of a cluster, `:2` of `S1:2`.
+    Further(f64, Range<usize>),
+    /// `O` or `:` where a program's number begins a line, with its place.
+    Program(usize),
     /// `/` as the first thing of a line.
     Delete,
     /// `%`, with its place.
@@ -48,21 +54,26 @@ pub(super) struct Words<'a> {
     at: usize,
     /// Whether anything but blanks and comments has been read.
     begun: bool,
+    /// Whether that was a line number and nothing else.
+    numbered: bool,
+    /// Whether the last word was S.
+    after_power: bool,
+    words: &'a WordMeanings,
 }
 
 impl<'a> Words<'a> {
     /// Over the bytes of one `line`, without its line feed.
-    pub(super) fn new(line: &'a [u8]) -> Self {
-        Self { line, at: 0, begun: false }
+    pub(super) fn new(line: &'a [u8], words: &'a WordMeanings) -> Self {
+        Self { line, at: 0, begun: false, numbered: false, after_power: false, words }
     }
 
     /// Over the first line of a program: some editors begin a file with a byte order mark.
-    pub(super) fn first(line: &'a [u8]) -> Self {
+    pub(super) fn first(line: &'a [u8], words: &'a WordMeanings) -> Self {
         let mut at = 0;
         while line[at..].starts_with(BYTE_ORDER_MARK) {
             at += BYTE_ORDER_MARK.len();
         }
-        Self { line, at, begun: false }
+        Self { at, ..Self::new(line, words) }
     }
 
     /// The next token, `None` at the end of the line.
@@ -83,11 +94,21 @@ impl<'a> Words<'a> {
                     self.at += 1;
                     return Ok(Some(Token::Tape(self.at - 1)));
                 }
-                _ if byte.is_ascii_alphabetic() => {
+                b'O' | b'o' | b':' if first || self.numbered => {
                     self.begun = true;
-                    return self
-                        .word(byte.to_ascii_uppercase())
-                        .map(|word| Some(Token::Word(word)));
+                    self.at += 1;
+                    return Ok(Some(Token::Program(self.at - 1)));
+                }
+                _ if byte.is_ascii_alphabetic() => {
+                    let letter = byte.to_ascii_uppercase();
+                    self.begun = true;
+                    self.numbered = first && letter == b'N';
+                    self.after_power = letter == b'S';
+                    return self.word(letter).map(|word| Some(Token::Word(word)));
+                }
+                b':' if self.after_power => {
+                    let Word { number, span, .. } = self.word(b':')?;
+                    return Ok(Some(Token::Further(number, span)));
                 }
                 _ => return Err(self.stray()),
             }
@@ -104,22 +125,35 @@ impl<'a> Words<'a> {
         }
     }
 
+    /// The rest of the line, from here.
+    pub(super) fn rest(&self) -> Range<usize> {
+        self.at..self.line.len()
+    }
+
     /// Passes over `( … )`.
     fn comment(&mut self) -> Result<(), Box<Refusal>> {
         let start = self.at;
+        let mut depth = 1_u32;
         self.at += 1;
         while let Some(byte) = self.peek() {
             match byte {
                 b')' => {
                     self.at += 1;
-                    return Ok(());
+                    depth -= 1;
+                    if depth == 0 {
+                        return Ok(());
+                    }
+                }
+                b'(' if self.words.nested_comments => {
+                    self.at += 1;
+                    depth += 1;
                 }
                 b'(' => {
                     return Err(Refusal::new(
                         self.at..self.at + 1,
                         "a comment begins inside a comment",
                         "second (",
-                        "close the first comment with ) before, or use square brackets inside it",
+                        "close the first comment with ) before, or set gcode.nested_comments = true",
                     ));
                 }
                 _ => self.at += 1,
@@ -138,15 +172,11 @@ impl<'a> Words<'a> {
         self.at += 1;
         self.blanks();
         let name = char::from(letter);
-        if letter == b'O' {
-            return Err(Refusal::new(
-                start..self.at,
-                "O words (subroutines, loops, conditions, program numbers) are not supported",
-                "O word",
-                "write the moves out, or delete a mere program number",
-            ));
-        }
         let digits = self.at;
+        let is_bare = !matches!(self.peek(), Some(b'0'..=b'9' | b'.' | b'+' | b'-'));
+        if letter == b'I' && is_bare && self.words.printer_words {
+            return Ok(Word { letter, number: 0.0, span: start..start + 1 });
+        }
         let negative = self.peek() == Some(b'-');
         if negative || self.peek() == Some(b'+') {
             self.at += 1;
@@ -228,7 +258,10 @@ impl<'a> Words<'a> {
                 start..self.at.max(start + 1),
                 format!("{name} has no number"),
                 "no number",
-                wanted,
+                match name {
+                    'I' => format!("{wanted}; M3 I is Marlin's: set gcode.dialect = \"marlin\""),
+                    _ => wanted,
+                },
             ),
         }
     }
@@ -260,6 +293,7 @@ impl<'a> Words<'a> {
         let span = self.at..self.at + length;
         let (message, help) = match character {
             '#' => ("parameters (#) are not supported".to_owned(), "write the numbers out"),
+            ':' => ("a : stands where no power is before it".to_owned(), "a cluster is S1:2:3"),
             '[' | ']' => ("expressions ([ ]) are not supported".to_owned(), "write the number out"),
             '*' => ("checksums (*) are not supported".to_owned(), "save the program without them"),
             '/' => (
@@ -294,13 +328,17 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
+    use machine::gcode_settings::Dialect;
 
     fn words(line: &str) -> Result<Vec<(char, f64)>, Box<Refusal>> {
-        let mut words = Words::new(line.as_bytes());
+        let meanings = Dialect::Standard.meanings();
+        let mut words = Words::new(line.as_bytes(), &meanings);
         let mut read = Vec::new();
         while let Some(token) = words.next()? {
             match token {
                 Token::Word(word) => read.push((char::from(word.letter), word.number)),
+                Token::Further(number, _) => read.push((':', number)),
+                Token::Program(_) => read.push(('O', 0.0)),
                 other => panic!("{other:?}"),
             }
         }
@@ -313,6 +351,10 @@ mod tests {
         assert_eq!(
             words("N10 G01 X-.5 Y+5. Z - 0.25;end").unwrap(),
             [('N', 10.0), ('G', 1.0), ('X', -0.5), ('Y', 5.0), ('Z', -0.25)]
+        );
+        assert_eq!(
+            words("S1:0.5: 0 X1").unwrap(),
+            [('S', 1.0), (':', 0.5), (':', 0.0), ('X', 1.0)]
         );
         assert_eq!(words("(a) X1 (b;c) Y2 (d)\r").unwrap(), [('X', 1.0), ('Y', 2.0)]);
     }
@@ -348,11 +390,7 @@ mod tests {
         check("X#1", 1, "parameters (#) are not supported");
         check("X[1+2]", 1, "expressions ([ ]) are not supported");
         check("#1=5", 0, "parameters (#) are not supported");
-        check(
-            "O100 sub",
-            0,
-            "O words (subroutines, loops, conditions, program numbers) are not supported",
-        );
+        check("X1:2", 2, "a : stands where no power is before it");
         check("X1 2", 3, "X has more than one number");
         check("X1.2.3", 4, "X has more than one number");
         check("X1,5", 2, "a comma cannot stand in a number");

@@ -2,6 +2,7 @@
 //! program's length.
 
 use std::io::Read;
+use std::ops::Range;
 
 use super::block::Block;
 use super::error::{GcodeError, Refusal};
@@ -138,10 +139,17 @@ impl<R: Read> Steps<R> {
         block.clear();
         let line = lines.line();
         let is_first = interpreter.tracer.line == 1;
-        let mut words = if is_first { Words::first(line) } else { Words::new(line) };
+        let meanings = &interpreter.words;
+        let mut words =
+            if is_first { Words::first(line, meanings) } else { Words::new(line, meanings) };
         while let Some(token) = words.next().map_err(Fault::Illegible)? {
             match token {
-                Token::Word(word) => block.take(line, word).map_err(Fault::Word)?,
+                Token::Word(word) => block.take(line, word, meanings).map_err(Fault::Word)?,
+                Token::Further(number, span) => block.cluster.push((number, span)),
+                Token::Program(at) => {
+                    program_number(line, at, words.rest()).map_err(Fault::Word)?;
+                    return Ok(Gathered::Block);
+                }
                 Token::Delete => {
                     interpreter.remark(Remark::BlockDelete);
                     return Ok(Gathered::Block);
@@ -257,6 +265,22 @@ impl<R: Read> Steps<R> {
         };
         Box::new(GcodeError::new(&self.name, number, &[], &Around::default(), *refusal))
     }
+}
+
+/// Takes the number of a program, whose `O` or `:` is at `at` and whose digits stand in `rest`.
+fn program_number(line: &[u8], at: usize, rest: Range<usize>) -> Result<(), Box<Refusal>> {
+    let text = line[rest].trim_ascii_start();
+    let digits = text.iter().take_while(|byte| byte.is_ascii_digit()).count();
+    let after = text[digits..].trim_ascii_start();
+    if digits > 0 && matches!(after.first(), None | Some(b'(' | b';')) {
+        return Ok(());
+    }
+    Err(Refusal::new(
+        at..at + 1,
+        "O words (subroutines, loops, conditions) are not supported",
+        "O word",
+        "write the moves out",
+    ))
 }
 
 impl<R: Read> Iterator for Steps<R> {

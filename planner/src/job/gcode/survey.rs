@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use machine::Machine;
+use machine::gcode_settings::DialectChoices;
 
 use super::settings::ReaderSettings;
 use super::steps::Steps;
@@ -24,6 +25,9 @@ pub struct ProgramFacts {
     pub rapid_length: f64,
     /// The part of `feed_length` with the laser on [m].
     pub mark_length: f64,
+    /// Least and largest power of marks and of dwells with the laser on, fractions of full power; null
+    /// where nothing is lit.
+    pub power: Option<[f64; 2]>,
     /// The last point, in the work coordinates in force at the end [m].
     pub end: [f64; 3],
     /// Lower corner of the box around start and all moves, machine frame [m].
@@ -59,7 +63,7 @@ pub struct Survey {
 /// Where it cannot be read; the first thing that is not G-code, not supported here, or contradicts
 /// itself, and with it what else is not supported further down.
 pub fn survey(path: &Path, machine: &Machine) -> Result<Survey, JobError> {
-    let (program, _) = ProgramFile::open(path, machine, 0)?;
+    let (program, _) = ProgramFile::open(path, &DialectChoices::default(), machine, 0)?;
     Ok(program.survey)
 }
 
@@ -77,17 +81,19 @@ pub struct ProgramFile {
 pub type FileSteps = Steps<Watched>;
 
 impl ProgramFile {
-    /// Reads the program at `path` through. Gives back its steps too if it has no more than `most`
+    /// Reads the program at `path` through, in the dialect of the machine or what is chosen over it. Gives back its steps too if it has no more than `most`
     /// lines, and always if it is no regular file, which can be read only once.
     ///
     /// # Errors
     /// As of [`survey`].
     pub(in crate::job) fn open(
         path: &Path,
+        dialect: &DialectChoices,
         machine: &Machine,
         most: u64,
     ) -> Result<(Self, Option<Vec<Step>>), JobError> {
-        let settings = ReaderSettings::of(machine);
+        let mut settings = ReaderSettings::of(machine);
+        settings.gcode.words = dialect.over(settings.gcode.words);
         let watched = Watched::open(path)?;
         let stamp = watched.stamp;
         let most = if stamp.is_some() { most } else { u64::MAX };

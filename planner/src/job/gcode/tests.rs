@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod arcs;
+mod dialects;
 mod files;
 mod mutations;
 mod refusals;
@@ -23,7 +24,7 @@ fn machine(z: ZMeaning) -> Machine {
     let mut machine = Machine::builtin();
     machine.home = [0.0; 3];
     machine.gcode.origins = [[0.0; 3]; 9];
-    machine.gcode.full_scale = 1000.0;
+    machine.gcode.words.full_scale = 1000.0;
     machine.gcode.z = z;
     machine.gcode.air_assist = true;
     machine

@@ -65,6 +65,7 @@ impl Tracer {
                 feed_length: 0.0,
                 rapid_length: 0.0,
                 mark_length: 0.0,
+                power: None,
                 end: [0.0; 3],
                 lower: start,
                 upper: start,
@@ -84,6 +85,9 @@ impl Tracer {
     pub(super) fn dwell(&mut self, time: f64, lit: Option<f64>) {
         if time > 0.0 {
             self.time += time;
+            if let Some(level) = lit {
+                self.light(level);
+            }
             self.push(Action::Dwell { time, lit });
         }
     }
@@ -206,8 +210,11 @@ impl Tracer {
 
     fn count(&mut self, length: f64, feed: Feed) {
         self.facts.feed_length += length;
-        let fastest = if feed.power.is_some() {
+        let fastest = if let Some(power) = feed.power {
             self.facts.mark_length += length;
+            if length > 0.0 {
+                self.light(power.level);
+            }
             self.fastest[0]
         } else {
             self.fastest[1]
@@ -216,6 +223,11 @@ impl Tracer {
             Pace::Speed(speed) => length / speed.min(fastest),
             Pace::Time(time) => time.max(length / fastest),
         };
+    }
+
+    fn light(&mut self, level: f64) {
+        let [least, most] = self.facts.power.unwrap_or([level; 2]);
+        self.facts.power = Some([least.min(level), most.max(level)]);
     }
 
     fn reach(&mut self, point: Vector3<f64>) {

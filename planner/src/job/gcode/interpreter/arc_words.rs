@@ -35,7 +35,7 @@ impl Interpreter {
         let arc = Arc::new(plane, counterclockwise, start, to, form, turns, rounding(unit))
             .map_err(refuse)?;
         self.note_height(to);
-        if self.modal.plane != Plane::Xy && self.settings.z == ZMeaning::Ignored {
+        if self.modal.plane != Plane::Xy && self.z == ZMeaning::Ignored {
             self.remark(Remark::Height);
         }
         if self.tracer.arc(&arc, to, feed) {

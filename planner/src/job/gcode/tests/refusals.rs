@@ -16,15 +16,39 @@ fn check(text: &str, line: u64, column: u64, message: &str, help: &str) {
 
 #[test]
 fn codes_that_are_not_there() {
-    check("G0 X1\nG43 H1", 2, 1, "G43 is not supported", "no tool lengths");
-    check("T1 m 6", 1, 4, "M6 is not supported", "no tool to change");
+    check("G0 X1\nG43.2 H1", 2, 1, "G43.2 is not supported", "no tool lengths");
+    check("G43.1 Z5", 1, 7, "Z5 of G43.1 is not 0", "G92 or G10");
+    check("T1 m 66", 1, 4, "M66 is not supported", "no inputs");
+    check("G16", 1, 1, "G16 is not supported", "polar");
+    check("G51 X2", 1, 1, "G51 is not supported", "scaling");
+    check("G68 X0 Y0 R30", 1, 1, "G68 is not supported", "rotation");
+    check("G41 D1", 1, 1, "G41 is not supported", "width of the line");
+    check("G71", 1, 1, "G71 is not supported", "gcode.dialect");
+    check("G50 X1", 1, 5, "G50 with coordinates", "G92 or G10");
+    check("G38.2 Z-5 F100", 1, 1, "G38.2 is not supported", "no probe");
+    check("M3 I S0", 1, 4, "I has no number", "gcode.dialect = \"marlin\"");
+    check("M62", 1, 1, "the digital output has no P", "M64 P0");
+    check("M64 P63", 1, 5, "there is no digital output P63", "0 to 62");
+    check("M64 P0 G4 P1", 1, 11, "P is on this line twice", "line break");
+    check("M64 G4 P1", 1, 8, "two codes of this line use P", "lines of their own");
+    check("G10 P1 X0", 1, 1, "G10 has no L", "G10 L20 P1");
+    check("G10 L2 X0", 1, 1, "G10 has no P", "G10 L20 P1");
+    check("G10 L2 P10 X0", 1, 8, "there is no work coordinate system P10", "P0 is");
+    check("G10 L1 P1 X0", 1, 5, "G10 L1 is not supported", "G10 L20 P1");
+    check("G10 L2 P1 R5", 1, 11, "a rotation of the coordinates", "G10 L20 P1");
+    check("G10 L2 P1 G1 X0", 1, 11, "G10 and G1 both take", "lines of their own");
+    check("G1 F9 S1:2", 1, 9, "a cluster of powers needs a G1 move", "three equal parts");
+    check("G0 X1 S1:2", 1, 9, "a cluster of powers needs a G1 move", "three equal parts");
+    check("G1 F9 X1 M3 S1:2:1001", 1, 17, "S1001 is outside 0 to 1000", "S1000");
+    check("F9 G1 X1 S1:1:1:1:1:1:1:1:1:1:1:1:1:1:1:1:1", 1, 42, "more than 16 powers", "rest");
     check("G81 X1", 1, 1, "G81 is not supported", "canned cycles");
     check("g 59.4", 1, 1, "G59.4 is not supported", "G59.1-G59.3");
     check("G1.05", 1, 1, "G1.05 is not supported", "supported are G0 G1");
     check("G-1", 1, 1, "G-1 is not supported", "supported are");
-    check("M48", 1, 1, "M48 is not supported", "override");
+    check("M50", 1, 1, "M50 is not supported", "override");
     check("M106 S255", 1, 1, "M106 is not supported", "M3 or M4");
-    check("(é) A1", 1, 5, "A is not an axis", "X, Y and Z");
+    check("(é) A1", 1, 5, "no rotary axis", "X, Y and Z");
+    check("U1", 1, 1, "U is not an axis", "X, Y and Z");
     check("X1e4", 1, 3, "E words are not supported", "no exponent");
     check("G1 X1e1 Y2e1", 1, 6, "E words are not supported", "no exponent");
     check("M67 E1 Q5", 1, 5, "there is no analog output E1", "M67 E0 Q50");
@@ -34,7 +58,6 @@ fn codes_that_are_not_there() {
     check("M67 M68 E0 Q1", 1, 5, "M67 and M68 are both of the analog output group", "lines");
     check("M67 E0 Q1 G64 P1", 1, 8, "two codes of this line use Q", "lines of their own");
     check("G0 X1 Q5", 1, 7, "nothing on this line uses Q", "M67");
-    check("M62 P0", 1, 1, "M62 is not supported", "M8 and M9");
     check("D1", 1, 1, "D words are not supported", "words begin with");
     check("o100 sub", 1, 1, "O words", "write the moves out");
     check("G0 X#5", 1, 5, "parameters (#)", "decimal number");
@@ -99,25 +122,26 @@ fn all(text: &str) -> Vec<(u64, String)> {
 
 #[test]
 fn what_is_not_supported_is_found_at_once() {
-    let found = all("G21 G90 G50\nT1 M6\nG43 H1 Z5\nM48\nG0 X10\nM3 S500\nM6\nG1 X2\nM18\nM2\nM19");
+    let found =
+        all("G21 G90 G51\nT1 M66\nG43.2 H1 Z5\nM50\nG0 X10\nM3 S500\nM66\nG1 X2\nM19\nM2\nM20");
     let unsupported = |line, code| (line, format!("{code} is not supported"));
-    let expected = [(1, "G50"), (2, "M6"), (3, "G43"), (4, "M48"), (9, "M18")];
+    let expected = [(1, "G51"), (2, "M66"), (3, "G43.2"), (4, "M50"), (9, "M19")];
     assert_eq!(found, expected.map(|(line, code)| unsupported(line, code)));
     // The feed that is missing below follows from the line that was refused, the marks that are no
     // words say nothing more, and the program ends with its tape mark.
-    let found = all("%\nF600 M6\nG1 X1\nX\u{2212}5\nM48\n%\nM18");
-    assert_eq!(found, [unsupported(2, "M6"), unsupported(5, "M48")]);
+    let found = all("%\nF600 M66\nG1 X1\nX\u{2212}5\nM50\n%\nM19");
+    assert_eq!(found, [unsupported(2, "M66"), unsupported(5, "M50")]);
     let many: String = (200..300).map(|code| format!("M{code}\n")).collect();
     assert_eq!(all(&many).len(), 10);
 }
 
 #[test]
 fn all_errors_are_shown_with_their_places() {
-    let error = refused("G21 G50\nG0 X1\nM6\n");
+    let error = refused("G21 G51\nG0 X1\nM66\n");
     let mut text = String::new();
     let theme = miette::GraphicalTheme::unicode_nocolor();
     miette::GraphicalReportHandler::new_themed(theme).render_report(&mut text, &error).unwrap();
-    for expected in ["job.ngc:1:5", "G50 is not supported", "job.ngc:3:1", "M6 is not supported"] {
+    for expected in ["job.ngc:1:5", "G51 is not supported", "job.ngc:3:1", "M66 is not supported"] {
         assert!(text.contains(expected), "{expected}\n{text}");
     }
 }

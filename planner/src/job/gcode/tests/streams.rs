@@ -72,9 +72,9 @@ fn a_stream_ends_with_the_error_of_the_whole_behind_the_steps_before_it() {
     for length in [0, 1, 3000] {
         let text = random_program(length, 3);
         let before = flat(&text).drawing.steps;
-        let broken = format!("{text}G0 X1 M6\nG0 X2\n");
+        let broken = format!("{text}G0 X1 M66\nG0 X2\n");
         let message = refused(&broken).to_string();
-        assert!(message.starts_with(&format!("job.ngc:{}:7: M6", length + 2)), "{message}");
+        assert!(message.starts_with(&format!("job.ngc:{}:7: M66", length + 2)), "{message}");
         let (steps, error) = stream(&broken, 100);
         assert_eq!(error, Some(message));
         // The end of the program would have switched the air off.
