@@ -27,7 +27,7 @@ fn springs(damping: f64) -> [Elasticity; 2] {
 }
 
 fn carriages(damping: f64) -> Cartesian<2> {
-    Cartesian { mass: [0.33, 1.06], elasticity: Some(springs(damping)) }
+    Cartesian { elasticity: Some(springs(damping)), ..Cartesian::rigid([0.33, 1.06]) }
 }
 
 fn dynamics<M: Mechanism<2, ChainState = Vector2<f64>>>(
@@ -135,6 +135,6 @@ fn a_gap_neither_gives_nor_takes_energy() {
     assert!(carriages < 1e-4, "{carriages:e}");
     let mut belts = springs(0.0);
     belts[1].stiffness = 3e4;
-    let crossed = bounce(CoreXy { mass: [0.33, 1.06], elasticity: Some(belts) });
+    let crossed = bounce(CoreXy { elasticity: Some(belts), ..CoreXy::rigid([0.33, 1.06]) });
     assert!(crossed < 1e-4, "{crossed:e}");
 }

@@ -378,7 +378,7 @@ fn an_elastic_lift_holds_its_height_on_the_brake() {
     let spring = Elasticity { stiffness: 1e6, damping: 500.0 };
     axis.gains.inertia = 2e-6 + 5.0 * axis.ratio * axis.ratio;
     let axes = [axis.clone(), axis.clone(), axis];
-    let lift = Cartesian::<3> { mass, elasticity: Some([spring; 3]) };
+    let lift = Cartesian { elasticity: Some([spring; 3]), ..Cartesian::rigid(mass) };
     let mut plant =
         Plant::new(lift, &axes, &DARK, &[0.1, 0.1, 0.05], PlantOptions::default()).unwrap();
     let mut measurement = Measurement::default();

@@ -33,8 +33,8 @@ fn cartesian() -> Machine {
     let lead = 0.015 / core::f64::consts::TAU;
     let mass = [1.93, 0.33];
     machine.mechanism = MechanismKind::Cartesian(Cartesian {
-        mass,
         elasticity: Some(mass.map(|mass| Elasticity::damped(at_nut(600.0, lead), mass, 0.9))),
+        ..Cartesian::rigid(mass)
     });
     for axis in &mut machine.axes {
         axis.ratio = lead / 3.0;

@@ -115,13 +115,8 @@ fn measure<const N: usize, M: Mechanism<N>>(
 }
 
 fn planar(criterion: &mut Criterion) {
-    measure(
-        criterion,
-        "cartesian",
-        Cartesian { mass: [1.93, 0.33], elasticity: None },
-        [0.01, 0.02],
-    );
-    measure(criterion, "corexy", CoreXy { mass: [0.33, 1.06], elasticity: None }, [0.01, 0.02]);
+    measure(criterion, "cartesian", Cartesian::rigid([1.93, 0.33]), [0.01, 0.02]);
+    measure(criterion, "corexy", CoreXy::rigid([0.33, 1.06]), [0.01, 0.02]);
     let five_bar = FiveBar {
         half_base: 0.05,
         proximal: 0.2,

@@ -4,10 +4,12 @@
 
 mod axes;
 pub mod bounds;
+pub mod frame;
 pub mod mechanism;
 pub mod motors;
 mod relations;
 pub mod tables;
+mod unused;
 mod validate;
 mod warnings;
 

@@ -3,6 +3,7 @@
 pub mod cartesian;
 pub mod corexy;
 pub mod five_bar;
+pub mod galvo;
 pub mod mcm;
 mod plane;
 pub mod polar;
@@ -16,6 +17,7 @@ pub mod twin_actuator;
 pub use cartesian::Cartesian;
 pub use corexy::CoreXy;
 pub use five_bar::{FiveBar, FiveBarBranch};
+pub use galvo::Galvo;
 pub use mcm::Mcm;
 pub use polar::Polar;
 pub use prrrp::{Prrrp, PrrrpBranch};
@@ -24,38 +26,81 @@ pub use tri_planar::TriPlanar;
 pub use twin_actuator::{ActuatorBodies, TwinActuator, TwinBranch};
 
 use crate::kinematics::{Mechanism, TaskSpace};
+use scaled::Scale;
 
-/// The mechanism of a machine file, matched once when a stage starts.
-#[derive(Debug, Clone, PartialEq)]
-pub enum MechanismKind {
-    /// Ball screws in x and y.
-    Cartesian(Cartesian<2>),
-    /// Ball screws in x and y, and one that moves the head up and down.
-    CartesianLift(Cartesian<3>),
+/// The one list of the mechanisms: the choice among them, and what is asked of whichever it is.
+macro_rules! mechanisms {
+    ($( $(#[doc = $about:expr])* $variant:ident($held:ty): $mechanism:ty; )*) => {
+        /// The mechanism of a machine file, matched once when a stage starts.
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum MechanismKind {
+            $( $(#[doc = $about])* $variant($held), )*
+        }
+
+        $( impl From<$mechanism> for MechanismKind {
+            fn from(mechanism: $mechanism) -> Self {
+                Self::$variant(mechanism.into())
+            }
+        } )*
+
+        impl MechanismKind {
+            /// Hands the mechanism to `visitor` as its own type.
+            pub fn visit<V: MechanismVisitor>(&self, visitor: V) -> V::Output {
+                match self {
+                    $( Self::$variant(mechanism) => {
+                        visitor.visit(<$mechanism as Clone>::clone(mechanism))
+                    } )*
+                }
+            }
+
+            /// The same with all masses and inertias `mass` times as large, and all springs `stiffness`
+            /// times as stiff, at the same damping ratio of a given load. What balances a weight stays as
+            /// it is.
+            #[must_use]
+            pub fn scaled(&self, mass: f64, stiffness: f64) -> Self {
+                let mut kind = self.clone();
+                match &mut kind {
+                    $( Self::$variant(mechanism) => mechanism.scale(mass, stiffness), )*
+                }
+                kind
+            }
+        }
+    };
+}
+
+mechanisms! {
+    /// Carriages in x and y, or one of them over a chuck.
+    Cartesian(Cartesian<2>): Cartesian<2>;
+    /// The same, and a carriage that moves the head up and down.
+    CartesianLift(Cartesian<3>): Cartesian<3>;
     /// Two belts that move the head in x and y together.
-    CoreXy(CoreXy),
+    CoreXy(CoreXy<2>): CoreXy<2>;
+    /// The same, and a carriage that moves the head up and down.
+    CoreXyLift(CoreXy<3>): CoreXy<3>;
+    /// Two mirrors that turn the beam over a flat field.
+    Galvo(Galvo): Galvo;
     /// Two linear axes, a rotary table, and a head that tilts and turns.
-    Mcm(Mcm),
+    Mcm(Mcm): Mcm;
     /// A rotary arm over a rotary table, with a vertical axis.
-    Polar(Polar),
+    Polar(Polar): Polar;
     /// A platform on three legs with planar motors as feet.
-    TriPlanar(Box<TriPlanar>),
+    TriPlanar(Box<TriPlanar>): TriPlanar;
     /// Two arms whose forearms meet in the tool.
-    FiveBar(FiveBar),
+    FiveBar(FiveBar): FiveBar;
     /// Two carts on one rail, with a link each to the tool.
-    Prrrp(Prrrp),
+    Prrrp(Prrrp): Prrrp;
     /// Two actuators of variable length that meet in one joint.
-    TwinActuator(TwinActuator),
+    TwinActuator(TwinActuator): TwinActuator;
     /// An open chain of two joints.
-    Serial2(Box<Serial<2>>),
+    Serial2(Box<Serial<2>>): Serial<2>;
     /// An open chain of three joints.
-    Serial3(Box<Serial<3>>),
+    Serial3(Box<Serial<3>>): Serial<3>;
     /// An open chain of four joints.
-    Serial4(Box<Serial<4>>),
+    Serial4(Box<Serial<4>>): Serial<4>;
     /// An open chain of five joints.
-    Serial5(Box<Serial<5>>),
+    Serial5(Box<Serial<5>>): Serial<5>;
     /// An open chain of six joints.
-    Serial6(Box<Serial<6>>),
+    Serial6(Box<Serial<6>>): Serial<6>;
 }
 
 /// Work that is generic over the mechanism, such as a sampler or a plant.
@@ -81,44 +126,16 @@ pub trait MechanismVisitor {
 }
 
 impl MechanismKind {
-    /// Hands the mechanism to `visitor` as its own type.
-    pub fn visit<V: MechanismVisitor>(&self, visitor: V) -> V::Output {
-        match self {
-            Self::Cartesian(mechanism) => visitor.visit(*mechanism),
-            Self::CartesianLift(mechanism) => visitor.visit(*mechanism),
-            Self::CoreXy(mechanism) => visitor.visit(*mechanism),
-            Self::Mcm(mechanism) => visitor.visit(*mechanism),
-            Self::Polar(mechanism) => visitor.visit(*mechanism),
-            Self::TriPlanar(mechanism) => visitor.visit(**mechanism),
-            Self::FiveBar(mechanism) => visitor.visit(*mechanism),
-            Self::Prrrp(mechanism) => visitor.visit(*mechanism),
-            Self::TwinActuator(mechanism) => visitor.visit(*mechanism),
-            Self::Serial2(mechanism) => visitor.visit(**mechanism),
-            Self::Serial3(mechanism) => visitor.visit(**mechanism),
-            Self::Serial4(mechanism) => visitor.visit(**mechanism),
-            Self::Serial5(mechanism) => visitor.visit(**mechanism),
-            Self::Serial6(mechanism) => visitor.visit(**mechanism),
-        }
-    }
-
     /// The name in machine files and summaries.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Cartesian(_) => Cartesian::<2>::NAME,
-            Self::CartesianLift(_) => Cartesian::<3>::NAME,
-            Self::CoreXy(_) => CoreXy::NAME,
-            Self::Mcm(_) => Mcm::NAME,
-            Self::Polar(_) => Polar::NAME,
-            Self::TriPlanar(_) => TriPlanar::NAME,
-            Self::FiveBar(_) => FiveBar::NAME,
-            Self::Prrrp(_) => Prrrp::NAME,
-            Self::TwinActuator(_) => TwinActuator::NAME,
-            Self::Serial2(_)
-            | Self::Serial3(_)
-            | Self::Serial4(_)
-            | Self::Serial5(_)
-            | Self::Serial6(_) => Serial::<2>::NAME,
+        struct Name;
+        impl MechanismVisitor for Name {
+            type Output = &'static str;
+            fn visit<const N: usize, M: Mechanism<N>>(self, _mechanism: M) -> &'static str {
+                M::NAME
+            }
         }
+        self.visit(Name)
     }
 
     /// Whether it moves its tool in z.

@@ -381,7 +381,9 @@ fn all_that_moves_is_counted() {
     }
     for machine in machines() {
         let place = Place::home(&machine).unwrap();
-        assert!(place.bodies.moving_mass > 0.0, "{}", machine.name);
+        // Mirrors turn about their own centres of mass.
+        let turns_only = machine.mechanism.name() == "galvo";
+        assert_eq!(place.bodies.moving_mass > 0.0, !turns_only, "{}", machine.name);
         assert!(!place.bodies.points.is_empty(), "{}", machine.name);
         for point in &place.bodies.points {
             assert!(point.iter().all(|value| value.is_finite()), "{}", machine.name);

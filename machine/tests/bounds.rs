@@ -146,6 +146,23 @@ fn what_is_not_possible_is_an_error_and_what_is_unusual_a_warning() {
     assert!(warning.text.starts_with(told), "{}", warning.text);
 }
 
+/// Slips of a unit: 54 g cm² written as kg m², 2 mm in a turn as in a degree, a pulley's diameter in metres.
+#[test]
+fn slips_of_a_unit_are_errors() {
+    let cartesian = include_str!("../../machines/cartesian.toml");
+    let refused = |text: &str, setting: &str| {
+        let error = Machine::parse("x.toml", text, &[setting.parse().unwrap()]).unwrap_err();
+        let problem = error.problems().next().unwrap();
+        assert_eq!(problem.kind, ProblemKind::OutOfRange, "{setting}: {error}");
+    };
+    refused(COREXY, "axis.a.motor.dc.rotor_inertia=54 kg m^2");
+    refused(cartesian, "mechanism.cartesian.x.lead=2 mm/deg");
+    refused(COREXY, "mechanism.corexy.pulley_radius=12.73 m");
+    refused(COREXY, "mechanism.corexy.mass_x=330000 kg");
+    refused(COREXY, "frame.skew=0.4 rev");
+    refused(COREXY, "frame.scale_x=20");
+}
+
 #[test]
 fn a_joint_has_bounds_of_its_own_unit() {
     // 5 cm are no following error, 0.05 rad are.
@@ -179,5 +196,5 @@ fn the_shipped_files_are_usual() {
             .collect();
         assert!(warnings.is_empty(), "{}: {warnings:#?}", path.display());
     }
-    assert_eq!(files, 11);
+    assert_eq!(files, 15);
 }

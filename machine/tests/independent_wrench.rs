@@ -89,17 +89,17 @@ fn pair(value: &Value) -> Vector2<f64> {
 #[test]
 fn carriages_on_screws_leave_moments_to_their_guides() {
     for case in cases("cartesian") {
-        check(&Cartesian::<2> { mass: array(&case["params"]["mass"]), elasticity: None }, &case);
+        check(&Cartesian::<2>::rigid(array(&case["params"]["mass"])), &case);
     }
     for case in cases("cartesian_lift") {
-        check(&Cartesian::<3> { mass: array(&case["params"]["mass"]), elasticity: None }, &case);
+        check(&Cartesian::<3>::rigid(array(&case["params"]["mass"])), &case);
     }
 }
 
 #[test]
 fn crossed_belts_leave_moments_to_their_guides() {
     for case in cases("corexy") {
-        check(&CoreXy { mass: array(&case["params"]["mass"]), elasticity: None }, &case);
+        check(&CoreXy::<2>::rigid(array(&case["params"]["mass"])), &case);
     }
 }
 

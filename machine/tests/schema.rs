@@ -43,7 +43,7 @@ fn the_shipped_files_fit_the_schema() {
 fn the_page_of_mechanisms_names_every_key() {
     let schema: Value = serde_json::from_str(&machine::file::schema()).unwrap();
     let kinds = resolved(&schema, "/properties/mechanism", &schema)["properties"].clone();
-    assert_eq!(kinds.as_object().unwrap().len(), 9);
+    assert_eq!(kinds.as_object().unwrap().len(), 10);
     for (kind, table) in kinds.as_object().unwrap() {
         let (_, rest) =
             PAGE.split_once(&format!("\n## {kind}\n")).unwrap_or_else(|| panic!("{kind}"));

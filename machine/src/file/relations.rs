@@ -8,6 +8,7 @@ use messages::time::CYCLE_TIME;
 use nalgebra::{DMatrix, SMatrix};
 
 use super::axes::Joint;
+use super::mechanism::travel_place;
 use super::tables::{AxisTable, MachineTable, PathTable};
 use crate::actuator::{Axis, JointUnit};
 use crate::document::{Diagnostics, Span};
@@ -354,7 +355,7 @@ impl Subject<'_> {
         let [lower, upper] = axis.limits.position;
         let turn = joint.travel * core::f64::consts::TAU;
         if joint.unit == JointUnit::Length && turn > upper - lower {
-            let span = lead_place(table, self.table, joint.name);
+            let span = travel_place(table, joint.name);
             let text = format!(
                 "one turn of the gear's output moves the joint by {turn:.4} m, and its whole travel is \
                  {:.4} m: is the lead or the radius right?",
@@ -523,22 +524,4 @@ fn rotor_line(table: &AxisTable, diagnostics: &Diagnostics) -> String {
     let dc = table.motor.dc.as_ref().map(|motor| motor.rotor_inertia.span);
     let stepper = table.motor.stepper.as_ref().map(|motor| motor.rotor_inertia.span);
     dc.or(stepper).map_or_else(String::new, |span| at_line(span, diagnostics))
-}
-
-/// Where the travel of the axis `name` per turn of its gear is said.
-fn lead_place(machine: &MachineTable, axis: &AxisTable, name: &str) -> Option<Span> {
-    let cartesian = machine.mechanism.cartesian.as_ref();
-    let screw = cartesian.and_then(|cartesian| match name {
-        "x" => Some(&cartesian.x),
-        "y" => Some(&cartesian.y),
-        _ => cartesian.z.as_ref(),
-    });
-    let corexy = machine.mechanism.corexy.as_ref();
-    let transmission = &axis.transmission;
-    screw
-        .map(|screw| screw.lead.span)
-        .or(corexy.map(|corexy| corexy.pulley_radius.span))
-        .or(transmission.screw.as_ref().map(|screw| screw.lead.span))
-        .or(transmission.belt.as_ref().map(|belt| belt.pulley_radius.span))
-        .or(transmission.planar.as_ref().map(|planar| planar.pitch.span))
 }

@@ -1,14 +1,12 @@
-//! The tables of a machine file, with every default that is a value; those of most mechanisms are in
+//! The tables of a machine file, with every default that is a value; those of the mechanisms are in
 //! [`super::mechanism`]. A default that follows from other values is said here in words, and stands
 //! where these meet: the following error, largest speed and range of an axis in `axes`, home and the
 //! origins of programs in `validate`.
 //!
 //! Their documentation becomes the schema's, so it speaks to whoever writes a machine file.
 
-use super::mechanism::{
-    five_bar::FiveBarTable, mcm::McmTable, polar::PolarTable, prrrp::PrrrpTable,
-    serial::SerialTable, tri_planar::TriPlanarTable, twin_actuator::TwinActuatorTable,
-};
+use super::frame::MachineFrameTable;
+use super::mechanism::MechanismTable;
 use crate::document::{Either, Fraction, Named, NonNegative, Number, Point, Positive, Spanned};
 use crate::gcode_settings::{Dialect, DwellUnit, LaserMode, ZMeaning};
 use crate::limits::CornerMode;
@@ -40,6 +38,8 @@ table! {
         pub path: PathTable,
         /// How the axes move the tool: one table, named by the kind of mechanism.
         pub mechanism: MechanismTable,
+        /// How the machine frame lies over the axes of a cartesian, a corexy or a galvo.
+        pub frame: Option<MachineFrameTable>,
         /// One table for each axis, named as the mechanism names them: `x` and `y` (and `z`) of a
         /// cartesian, `a` and `b` of a corexy, `th1`, `th2` and `d` of a polar.
         pub axis: Named<AxisTable>,
@@ -87,61 +87,6 @@ table! {
 }
 
 table! {
-    /// How the axes move the tool: exactly one of these.
-    pub struct MechanismTable {
-        /// A ball screw for each direction.
-        pub cartesian: Option<CartesianTable>,
-        /// Two crossed belts that move one head.
-        pub corexy: Option<CoreXyTable>,
-        /// Two arms whose forearms meet in the tool (5R).
-        pub five_bar: Option<FiveBarTable>,
-        /// Two carts on one rail with a link each to the tool.
-        pub prrrp: Option<PrrrpTable>,
-        /// An arm over a rotary table.
-        pub polar: Option<PolarTable>,
-        /// A platform on three planar motors, six degrees of freedom.
-        pub tri_planar: Option<TriPlanarTable>,
-        /// A head that turns and tilts over a rotary table.
-        pub mcm: Option<McmTable>,
-        /// Two actuators of variable length that meet in one joint.
-        pub twin_actuator: Option<TwinActuatorTable>,
-        /// Any open chain of turning and sliding joints.
-        pub serial: Option<SerialTable>,
-    }
-}
-
-table! {
-    /// A ball screw for each direction.
-    pub struct CartesianTable {
-        /// Carriage and screw of x.
-        pub x: ScrewTable,
-        /// Carriage and screw of y.
-        pub y: ScrewTable,
-        /// Carriage and screw of z, where the head moves up and down.
-        pub z: Option<ScrewTable>,
-    }
-}
-
-table! {
-    /// A carriage and its screw.
-    pub struct ScrewTable {
-        /// Everything that moves with the carriage.
-        pub mass: Above<unit::Mass>,
-        /// Travel per turn of the screw.
-        pub lead: Above<unit::Lead>,
-        /// Moment of inertia of the screw, without the carriage; it turns with the motor.
-        pub inertia: AtLeastZero<unit::Inertia> = "0 kg m^2",
-        /// Torsional stiffness from gear to nut, the axial one in series; rigid when this and
-        /// `shaft` are left out.
-        pub stiffness: Option<Above<unit::TorsionalStiffness>>,
-        /// The shaft that it follows from, instead of `stiffness`.
-        pub shaft: Option<ShaftTable>,
-        /// Damping of that spring, as a share of critical damping under the carriage.
-        pub damping_ratio: Number<Positive> = 0.9,
-    }
-}
-
-table! {
     /// The loaded part of a screw, from its fixed bearing to the nut.
     pub struct ShaftTable {
         /// Diameter of its core, under the thread of the balls.
@@ -162,32 +107,6 @@ table! {
 }
 
 table! {
-    /// Two crossed belts that move one head.
-    pub struct CoreXyTable {
-        /// Mass that moves in x: the head.
-        pub mass_x: Above<unit::Mass>,
-        /// Mass that moves in y: the head with its bridge.
-        pub mass_y: Above<unit::Mass>,
-        /// Pitch radius of the driving pulleys.
-        pub pulley_radius: Above<unit::Length>,
-        /// The belts' elasticity; rigid when left out.
-        pub belt: Option<BeltTable>,
-    }
-}
-
-table! {
-    /// Elasticity of both belts together, in each direction of the tool.
-    pub struct BeltTable {
-        /// Stiffness in x and in y, both belts together.
-        pub stiffness: Option<Above<unit::Stiffness>>,
-        /// The belts that it follows from, instead of `stiffness`.
-        pub section: Option<SectionTable>,
-        /// Damping between motor and tool, as a share of critical damping in each direction.
-        pub damping_ratio: Number<Positive> = 0.9,
-    }
-}
-
-table! {
     /// A belt between its pulley and what it pulls.
     pub struct SectionTable {
         /// Modulus of elasticity.
@@ -204,8 +123,8 @@ table! {
     pub struct AxisTable {
         /// Turns of the motor per turn of the screw, pulley or arm.
         pub gear: Number<Positive> = 1.0,
-        /// What stands between gear and joint; of a cartesian and a corexy the mechanism's own
-        /// table says it.
+        /// What stands between gear and joint. The belts of a corexy, and a screw of a cartesian that
+        /// has a `lead` there, stand in the mechanism's own table instead.
         pub transmission: TransmissionTable,
         /// How far the joint moves freely while the motor stands, from stop to stop: the play of
         /// gear, coupling and nut. It needs an elastic transmission.
@@ -444,6 +363,8 @@ table! {
         pub screw: Option<AxisScrewTable>,
         /// A belt on a pulley.
         pub belt: Option<AxisBeltTable>,
+        /// A pinion on a rack.
+        pub rack: Option<RackTable>,
         /// The gear alone, with its elasticity.
         pub direct: Option<DirectTable>,
         /// An arm that bends, on the gear.
@@ -481,6 +402,20 @@ table! {
         pub stiffness: Option<Above<unit::Stiffness>>,
         /// The belt that it follows from, instead of `stiffness`.
         pub section: Option<SectionTable>,
+        /// Damping of that spring, as a share of critical damping.
+        pub damping_ratio: Number<Positive> = 0.9,
+    }
+}
+
+table! {
+    /// A pinion on a rack.
+    pub struct RackTable {
+        /// Pitch radius of the pinion.
+        pub pinion_radius: Above<unit::Length>,
+        /// Moment of inertia of the pinion; it turns with the gear.
+        pub inertia: AtLeastZero<unit::Inertia> = "0 kg m^2",
+        /// Stiffness of teeth, pinion and shaft together, seen at the rack; rigid when left out.
+        pub stiffness: Option<Above<unit::Stiffness>>,
         /// Damping of that spring, as a share of critical damping.
         pub damping_ratio: Number<Positive> = 0.9,
     }

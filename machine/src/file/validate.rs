@@ -10,7 +10,7 @@ use super::relations;
 use super::tables::{
     AreaTable, AxisTable, LaserTable, MachineTable, OriginsTable, PathTable, RealtimeTable,
 };
-use super::warnings;
+use super::{unused, warnings};
 use crate::actuator::Axis;
 use crate::document::{
     Diagnostics, Document, DocumentError, Named, Point, ProblemKind, Span, Spanned, nearest,
@@ -24,6 +24,7 @@ use messages::Nanoseconds;
 
 pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let (table, mut diagnostics) = document.decode_within::<MachineTable>(BOUNDS)?;
+    unused::check(&table, &mut diagnostics);
     let area = area(&table.area, &mut diagnostics);
     let home = home(table.home, &area, &mut diagnostics);
     let Some(Built { mechanism, joints, home }) =

@@ -1,11 +1,16 @@
-//! Carriages on ball screws, one for each direction (source 003 ch. 3).
+//! Carriages, one for each direction (source 003 ch. 3, where they are on ball screws).
 //!
-//! The joint is the carriage's position [m]. Screw and gear are in the axis's ratio, so the
-//! equations here are those of masses on springs.
+//! The joint is the carriage's position [m]. Screw, belt or rack and the gear are in the axis's ratio, so
+//! the equations here are those of masses on springs. In the place of a carriage a chuck may turn the
+//! workpiece under the tool: its joint is an angle, and y the way around the workpiece.
+
+use std::sync::Arc;
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
+use super::scaled::{self, Scale};
 use crate::analysis::Bodies;
+use crate::frame::Frame;
 use crate::kinematics::{
     Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, STANDARD_GRAVITY,
     TaskSpace, ToolMotion, finite, in_plane,
@@ -13,22 +18,44 @@ use crate::kinematics::{
 use crate::transmission::{self, Elasticity};
 
 /// Carriages in x, y and, with `N` = 3, z.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Cartesian<const N: usize> {
-    /// Mass that each axis moves [kg].
+    /// What each axis moves [kg], or turns [kg·m²].
     pub mass: [f64; N],
-    /// Spring and damper of each screw, seen at its nut; `None` when they are taken as rigid.
+    /// Way of the tool per joint unit: 1 of a carriage, the radius of the workpiece in a chuck [m/rad].
+    pub travel: [f64; N],
+    /// Spring and damper of each transmission, seen at the joint; `None` when they are taken as rigid.
     pub elasticity: Option<[Elasticity; N]>,
+    /// How the machine frame lies over the axes; `None` where they are one.
+    pub frame: Option<Arc<Frame>>,
 }
 
 impl<const N: usize> Cartesian<N> {
-    /// The joints that belong to the first `N` directions of `vector`.
-    fn joints(vector: &Vector3<f64>) -> Joints<N> {
-        SVector::from_fn(|row, _| vector[row])
+    /// Carriages of `mass` [kg] on rigid transmissions, along the machine frame.
+    pub fn rigid(mass: [f64; N]) -> Self {
+        Self { mass, travel: [1.0; N], elasticity: None, frame: None }
+    }
+
+    /// The joints for the first `N` directions of `vector`.
+    fn joints(&self, vector: &Vector3<f64>) -> Joints<N> {
+        SVector::from_fn(|row, _| vector[row] / self.travel[row])
+    }
+
+    /// The carriages' places with the joints at `q` [m].
+    fn carriages(&self, q: &Joints<N>) -> Vector3<f64> {
+        // Source 003 eq. 3.1, X = p·θ with p per radian and gear included.
+        Vector3::from_fn(|row, _| if row < N { q[row] * self.travel[row] } else { 0.0 })
     }
 
     fn check(position: &Vector3<f64>) -> Result<(), KinematicsError> {
         if N < 3 { in_plane(position) } else { finite(position) }
+    }
+}
+
+impl<const N: usize> Scale for Cartesian<N> {
+    fn scale(&mut self, mass: f64, stiffness: f64) {
+        scaled::all(&mut self.mass, mass);
+        scaled::soften(&mut self.elasticity, stiffness);
     }
 }
 
@@ -56,8 +83,8 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
     }
 
     fn pose(&self, q: &Joints<N>) -> Pose {
-        // Source 003 eq. 3.1, X = p·θ with p per radian and gear included.
-        Pose::at(Vector3::from_fn(|row, _| if row < N { q[row] } else { 0.0 }))
+        let carriages = self.carriages(q);
+        Pose::at(self.frame.as_ref().map_or(carriages, |frame| frame.tool(&carriages)))
     }
 
     fn margins(&self, _q: &Joints<N>) -> Vec<Margin> {
@@ -69,7 +96,7 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
     }
 
     fn is_linear(&self) -> bool {
-        true
+        self.frame.as_ref().is_none_or(|frame| frame.is_linear())
     }
 
     fn inverse(
@@ -79,11 +106,26 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
         _previous: &Joints<N>,
     ) -> Result<Joints<N>, KinematicsError> {
         Self::check(&pose.position)?;
-        Ok(Self::joints(&pose.position))
+        Ok(match &self.frame {
+            None => self.joints(&pose.position),
+            Some(frame) => self.joints(&frame.axes(&pose.position)?),
+        })
     }
 
-    fn jacobian(&self, _q: &Joints<N>) -> Jacobian<N> {
-        Jacobian::from_fn(|row, column| if row == column { 1.0 } else { 0.0 })
+    fn jacobian(&self, q: &Joints<N>) -> Jacobian<N> {
+        match &self.frame {
+            None => Jacobian::from_fn(
+                |row, column| {
+                    if row == column { self.travel[column] } else { 0.0 }
+                },
+            ),
+            Some(frame) => {
+                let frame = frame.jacobian(&self.carriages(q));
+                Jacobian::from_fn(|row, column| {
+                    if row < N { frame[(row, column)] * self.travel[column] } else { 0.0 }
+                })
+            }
+        }
     }
 
     fn joint_motion(
@@ -93,11 +135,19 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
         _previous: &Joints<N>,
     ) -> Result<JointMotion<N>, KinematicsError> {
         Self::check(&tool.position)?;
+        let along_axes;
+        let axes = match &self.frame {
+            None => tool,
+            Some(frame) => {
+                along_axes = frame.axes_motion(tool)?;
+                &along_axes
+            }
+        };
         Ok(JointMotion {
-            position: Self::joints(&tool.position),
-            velocity: Self::joints(&tool.velocity),
-            acceleration: Self::joints(&tool.acceleration),
-            jerk: Self::joints(&tool.jerk),
+            position: self.joints(&axes.position),
+            velocity: self.joints(&axes.velocity),
+            acceleration: self.joints(&axes.acceleration),
+            jerk: self.joints(&axes.jerk),
         })
     }
 
@@ -110,12 +160,18 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
     }
 
     fn gravity(&self, _q: &Joints<N>) -> Joints<N> {
-        SVector::from_fn(|row, _| if row == 2 { self.mass[row] * STANDARD_GRAVITY } else { 0.0 })
+        // Up is where the tool goes up: a mirrored axis runs down.
+        let up = self.frame.as_ref().map_or(1.0, |frame| frame.lift());
+        SVector::from_fn(|row, _| {
+            if row == 2 { self.mass[row] * STANDARD_GRAVITY * up * self.travel[row] } else { 0.0 }
+        })
     }
 
     fn bodies(&self, q: &Joints<N>) -> Bodies {
-        // One carriage bears the other.
-        let moving_mass = self.mass.into_iter().fold(0.0, f64::max);
+        // One carriage bears the other; a chuck has an inertia instead.
+        let masses = self.mass.into_iter().zip(self.travel);
+        let masses = masses.filter(|(_, travel)| *travel == 1.0).map(|(mass, _)| mass);
+        let moving_mass = masses.fold(0.0, f64::max);
         Bodies { moving_mass, points: vec![self.pose(q).position] }
     }
 

@@ -14,6 +14,7 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
+use super::scaled::{self, Scale};
 use crate::analysis::Bodies;
 use crate::kinematics::{
     Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
@@ -334,6 +335,21 @@ impl FiveBar {
             return Ok(());
         }
         Err(refusal("wrong_assembly_mode", "with these elbows the tool is on the other side"))
+    }
+}
+
+impl Scale for FiveBar {
+    fn scale(&mut self, mass: f64, stiffness: f64) {
+        let masses = [
+            &mut self.proximal_mass,
+            &mut self.proximal_inertia,
+            &mut self.distal_mass,
+            &mut self.distal_inertia,
+            &mut self.tool_mass,
+            &mut self.bar_mass,
+        ];
+        scaled::all(masses, mass);
+        scaled::soften(&mut self.elasticity, stiffness);
     }
 }
 

@@ -18,6 +18,7 @@ use messages::math;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::polar::center;
+use super::scaled::{self, Scale};
 use crate::analysis::Bodies;
 use crate::kinematics::{
     Attitude, Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind,
@@ -238,6 +239,22 @@ fn passing([x, y]: [Taylor; 2], turned: f64) -> Option<[Taylor; 2]> {
 fn planar<S: Scalar>(point: [S; 3]) -> S {
     let square = point[0] * point[0] + point[1] * point[1];
     if square.value() == 0.0 { 0.0.into() } else { square.sqrt() }
+}
+
+impl Scale for Mcm {
+    fn scale(&mut self, mass: f64, stiffness: f64) {
+        let load = &mut self.load;
+        scaled::all(&mut load.head_inertia, mass);
+        let others = [
+            &mut load.carriage_mass,
+            &mut load.slide_mass,
+            &mut load.table_inertia,
+            &mut load.yoke_inertia,
+            &mut load.head_mass,
+        ];
+        scaled::all(others, mass);
+        scaled::soften(&mut self.elasticity, stiffness);
+    }
 }
 
 impl Mechanism<5> for Mcm {

@@ -16,6 +16,7 @@ use core::f64::consts::FRAC_PI_2;
 use messages::math;
 use nalgebra::{Matrix3, Vector3};
 
+use super::scaled::{self, Scale};
 use crate::analysis::Bodies;
 use crate::kinematics::{
     Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
@@ -198,6 +199,23 @@ impl Polar {
             limit: EDGE_TOLERANCE,
             detail: "the arm is in line with the table's axis, at the edge of its reach",
         })
+    }
+}
+
+impl Scale for Polar {
+    fn scale(&mut self, mass: f64, stiffness: f64) {
+        let load = &mut self.load;
+        let masses = [
+            &mut load.arm_mass,
+            &mut load.arm_inertia,
+            &mut load.head_mass,
+            &mut load.head_inertia,
+            &mut load.table_inertia,
+            &mut load.workpiece_mass,
+            &mut load.workpiece_inertia,
+        ];
+        scaled::all(masses, mass);
+        scaled::soften(&mut self.elasticity, stiffness);
     }
 }
 

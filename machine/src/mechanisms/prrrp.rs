@@ -14,6 +14,7 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross};
+use super::scaled::{self, Scale};
 use crate::analysis::Bodies;
 use crate::kinematics::{
     Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
@@ -165,6 +166,20 @@ impl Prrrp {
             limit: self.link,
             detail: "a link is not as long as that",
         }
+    }
+}
+
+impl Scale for Prrrp {
+    fn scale(&mut self, mass: f64, stiffness: f64) {
+        let masses = [
+            &mut self.link_mass,
+            &mut self.link_inertia,
+            &mut self.cart_mass,
+            &mut self.tool_mass,
+            &mut self.bar_mass,
+        ];
+        scaled::all(masses, mass);
+        scaled::soften(&mut self.elasticity, stiffness);
     }
 }
 

@@ -1,119 +1,21 @@
 //! A mechanism that is other than its file says: heavier or lighter, stiffer or softer.
 
-use super::{Cartesian, MechanismKind, Serial};
 use crate::transmission::Elasticity;
 
-impl MechanismKind {
-    /// The same with all masses and inertias `mass` times as large, and all springs `stiffness` times as
-    /// stiff, at the same damping ratio of a given load. What balances a weight stays as it is.
-    #[must_use]
-    pub fn scaled(&self, mass: f64, stiffness: f64) -> Self {
-        let mut kind = self.clone();
-        match &mut kind {
-            Self::Cartesian(it) => scale_cartesian(it, mass, stiffness),
-            Self::CartesianLift(it) => scale_cartesian(it, mass, stiffness),
-            Self::CoreXy(it) => {
-                scale(&mut it.mass, mass);
-                soften(&mut it.elasticity, stiffness);
-            }
-            Self::Mcm(it) => {
-                let load = &mut it.load;
-                scale(&mut load.head_inertia, mass);
-                for value in [
-                    &mut load.carriage_mass,
-                    &mut load.slide_mass,
-                    &mut load.table_inertia,
-                    &mut load.yoke_inertia,
-                    &mut load.head_mass,
-                ] {
-                    *value *= mass;
-                }
-                soften(&mut it.elasticity, stiffness);
-            }
-            Self::Polar(it) => {
-                let load = &mut it.load;
-                for value in [
-                    &mut load.arm_mass,
-                    &mut load.arm_inertia,
-                    &mut load.head_mass,
-                    &mut load.head_inertia,
-                    &mut load.table_inertia,
-                    &mut load.workpiece_mass,
-                    &mut load.workpiece_inertia,
-                ] {
-                    *value *= mass;
-                }
-                soften(&mut it.elasticity, stiffness);
-            }
-            Self::TriPlanar(it) => {
-                scale(&mut it.platform_inertia, mass);
-                for value in [&mut it.platform_mass, &mut it.leg_mass, &mut it.inductor_mass] {
-                    *value *= mass;
-                }
-                soften(&mut it.elasticity, stiffness);
-            }
-            Self::FiveBar(it) => {
-                for value in [
-                    &mut it.proximal_mass,
-                    &mut it.proximal_inertia,
-                    &mut it.distal_mass,
-                    &mut it.distal_inertia,
-                    &mut it.tool_mass,
-                    &mut it.bar_mass,
-                ] {
-                    *value *= mass;
-                }
-                soften(&mut it.elasticity, stiffness);
-            }
-            Self::Prrrp(it) => {
-                for value in [
-                    &mut it.link_mass,
-                    &mut it.link_inertia,
-                    &mut it.cart_mass,
-                    &mut it.tool_mass,
-                    &mut it.bar_mass,
-                ] {
-                    *value *= mass;
-                }
-                soften(&mut it.elasticity, stiffness);
-            }
-            Self::TwinActuator(it) => {
-                it.tool_mass *= mass;
-                for body in &mut it.bodies {
-                    body.housing_inertia *= mass;
-                    body.rod_mass *= mass;
-                    body.rod_inertia *= mass;
-                }
-                soften(&mut it.elasticity, stiffness);
-            }
-            Self::Serial2(it) => scale_serial(it, mass, stiffness),
-            Self::Serial3(it) => scale_serial(it, mass, stiffness),
-            Self::Serial4(it) => scale_serial(it, mass, stiffness),
-            Self::Serial5(it) => scale_serial(it, mass, stiffness),
-            Self::Serial6(it) => scale_serial(it, mass, stiffness),
-        }
-        kind
-    }
+/// What has masses and springs.
+pub(super) trait Scale {
+    /// Makes all masses and inertias `mass` times as large, and all springs `stiffness` times as stiff, at
+    /// the same damping ratio of a given load. What balances a weight stays as it is.
+    fn scale(&mut self, mass: f64, stiffness: f64);
 }
 
-fn scale_cartesian<const N: usize>(it: &mut Cartesian<N>, mass: f64, stiffness: f64) {
-    scale(&mut it.mass, mass);
-    soften(&mut it.elasticity, stiffness);
+/// Multiplies all `values` by `factor`.
+pub(super) fn all<'a>(values: impl IntoIterator<Item = &'a mut f64>, factor: f64) {
+    values.into_iter().for_each(|value| *value *= factor);
 }
 
-fn scale_serial<const N: usize>(it: &mut Serial<N>, mass: f64, stiffness: f64) {
-    for link in &mut it.links {
-        link.mass *= mass;
-        link.inertia *= mass;
-    }
-    soften(&mut it.elasticity, stiffness);
-}
-
-fn scale(values: &mut [f64], factor: f64) {
-    values.iter_mut().for_each(|value| *value *= factor);
-}
-
-fn soften<const N: usize>(springs: &mut Option<[Elasticity; N]>, factor: f64) {
+/// Makes `springs` `factor` times as stiff.
+pub(super) fn soften<const N: usize>(springs: &mut Option<[Elasticity; N]>, factor: f64) {
     for spring in springs.iter_mut().flatten() {
         spring.stiffness *= factor;
         spring.damping *= factor.sqrt();

@@ -13,6 +13,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 pub use dynamics::SerialChainState;
 
+use super::scaled::{self, Scale};
 use crate::analysis::Bodies;
 use crate::kinematics::{
     Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose, TaskSpace,
@@ -71,6 +72,16 @@ pub struct Serial<const N: usize> {
     /// Spring and damper of each joint's transmission, in the joint's own unit [N/m or N·m/rad];
     /// `None` when they are taken as rigid.
     pub elasticity: Option<[Elasticity; N]>,
+}
+
+impl<const N: usize> Scale for Serial<N> {
+    fn scale(&mut self, mass: f64, stiffness: f64) {
+        for link in &mut self.links {
+            link.mass *= mass;
+            link.inertia *= mass;
+        }
+        scaled::soften(&mut self.elasticity, stiffness);
+    }
 }
 
 impl<const N: usize> Mechanism<N> for Serial<N> {

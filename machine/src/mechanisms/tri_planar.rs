@@ -23,6 +23,7 @@ pub use mounting::{Mounting, Standing};
 
 use mounting::rows;
 
+use super::scaled::{self, Scale};
 use crate::analysis::Bodies;
 use crate::kinematics::{
     Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, TaskSpace,
@@ -167,6 +168,15 @@ impl TriPlanar {
     /// Height of the triangles [m].
     fn height(&self) -> f64 {
         self.side * (ROOT_3 / 2.0)
+    }
+}
+
+impl Scale for TriPlanar {
+    fn scale(&mut self, mass: f64, stiffness: f64) {
+        scaled::all(&mut self.platform_inertia, mass);
+        let masses = [&mut self.platform_mass, &mut self.leg_mass, &mut self.inductor_mass];
+        scaled::all(masses, mass);
+        scaled::soften(&mut self.elasticity, stiffness);
     }
 }
 

@@ -16,6 +16,7 @@
 use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
 
 use super::plane::{self, Body, cross, turned};
+use super::scaled::{self, Scale};
 use crate::analysis::Bodies;
 use crate::kinematics::{
     Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, MarginKind, Mechanism, Pose,
@@ -207,6 +208,19 @@ impl TwinActuator {
 
     fn tool_body(&self) -> Body {
         Body::new(self.tool_mass, 0.0)
+    }
+}
+
+impl Scale for TwinActuator {
+    fn scale(&mut self, mass: f64, stiffness: f64) {
+        self.tool_mass *= mass;
+        for body in &mut self.bodies {
+            scaled::all(
+                [&mut body.housing_inertia, &mut body.rod_mass, &mut body.rod_inertia],
+                mass,
+            );
+        }
+        scaled::soften(&mut self.elasticity, stiffness);
     }
 }
 

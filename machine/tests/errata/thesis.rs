@@ -164,7 +164,7 @@ fn each_belt_has_a_stretch_of_its_own() {
 fn a_diagonal_takes_half_of_what_is_printed() {
     let r = 1.25e-3;
     let (mass, acceleration) = ([0.33, 1.06], [10.0, 10.0]);
-    let machine = CoreXy { mass, elasticity: None };
+    let machine = CoreXy::rigid(mass);
     let q = Joints::from([0.1, 0.0]);
     let chain = machine.solve(&q, (), None).unwrap();
     // Joints are the belts' travels: along x = y the second one stands.

@@ -14,27 +14,28 @@ use crate::transmission::{Elasticity, link};
 use super::{BuildContext, home, springs};
 
 /// The spring behind an axis [N/m or N·m/rad at the joint] and the damping ratio of its load.
-struct Spring<'a> {
-    stiffness: f64,
-    damping_ratio: &'a Number<Positive>,
+pub(super) struct Spring<'a> {
+    pub(super) stiffness: f64,
+    pub(super) damping_ratio: &'a Number<Positive>,
 }
 
 /// What a transmission makes of the gear's output.
-struct Output<'a> {
+pub(super) struct Output<'a> {
     /// [m/rad or rad/rad].
-    travel: f64,
+    pub(super) travel: f64,
     /// Turns stiffly with the gear's output [kg·m²].
-    inertia: f64,
-    spring: Option<Spring<'a>>,
+    pub(super) inertia: f64,
+    pub(super) spring: Option<Spring<'a>>,
     /// What the joint must be measured in for this transmission.
-    unit: JointUnit,
-    span: Span,
+    pub(super) unit: JointUnit,
+    pub(super) span: Span,
 }
 
 /// A joint of a mechanism as its table names it.
 pub(super) type Named = (&'static str, JointUnit);
 
-fn output(axis: &AxisTable) -> Vec<Output<'_>> {
+/// Every transmission that `axis` gives.
+pub(super) fn output(axis: &AxisTable) -> Vec<Output<'_>> {
     let table = &axis.transmission;
     let screw = table.screw.as_ref().map(|screw| {
         let lead = screw.lead.value;
@@ -54,6 +55,16 @@ fn output(axis: &AxisTable) -> Vec<Output<'_>> {
             .map(|stiffness| Spring { stiffness, damping_ratio: &belt.damping_ratio }),
         unit: JointUnit::Length,
         span: belt.span,
+    });
+    let rack = table.rack.as_ref().map(|rack| Output {
+        travel: rack.pinion_radius.value,
+        inertia: rack.inertia.value,
+        spring: rack.stiffness.map(|stiffness| Spring {
+            stiffness: stiffness.value,
+            damping_ratio: &rack.damping_ratio,
+        }),
+        unit: JointUnit::Length,
+        span: rack.span,
     });
     let direct = table.direct.as_ref().map(|direct| Output {
         travel: 1.0,
@@ -86,12 +97,22 @@ fn output(axis: &AxisTable) -> Vec<Output<'_>> {
         unit: JointUnit::Length,
         span: planar.span,
     });
-    [screw, belt, direct, link, planar].into_iter().flatten().collect()
+    [screw, belt, rack, direct, link, planar].into_iter().flatten().collect()
 }
 
 /// The damping ratio of the spring behind `axis`, where there is one.
 pub(super) fn damping_ratio(axis: &AxisTable) -> Option<&Number<Positive>> {
     output(axis).into_iter().find_map(|output| output.spring).map(|spring| spring.damping_ratio)
+}
+
+/// Where the travel of `axis` per turn of its gear is said.
+pub(super) fn travel_place(axis: &AxisTable) -> Option<Span> {
+    let transmission = &axis.transmission;
+    let screw = transmission.screw.as_ref().map(|screw| screw.lead.span);
+    screw
+        .or(transmission.belt.as_ref().map(|belt| belt.pulley_radius.span))
+        .or(transmission.rack.as_ref().map(|rack| rack.pinion_radius.span))
+        .or(transmission.planar.as_ref().map(|planar| planar.pitch.span))
 }
 
 /// The joints of a mechanism, the springs behind them, and its tool at rest [m].
@@ -115,7 +136,7 @@ pub(super) fn joints<const N: usize, M: Mechanism<N>>(
     let mut springs = Vec::with_capacity(N);
     for (index, (name, unit)) in names.into_iter().enumerate() {
         let output =
-            axis(context, name).and_then(|axis| transmission(name, unit, axis, diagnostics));
+            self::axis(table, name).and_then(|axis| transmission(name, unit, axis, diagnostics));
         let load = mass[(index, index)];
         let spring = output.as_ref().and_then(|output| output.spring.as_ref());
         springs.extend(
@@ -159,13 +180,14 @@ pub(super) fn sign(number: &Number, diagnostics: &mut Diagnostics) -> i32 {
     if number.value < 0.0 { -1 } else { 1 }
 }
 
-fn axis<'a>(context: &BuildContext<'a>, name: &str) -> Option<&'a AxisTable> {
-    context.table.axis.entries.iter().find(|(found, _)| found.value == name).map(|(_, axis)| axis)
+/// The table of the axis `name`.
+pub(super) fn axis<'a>(table: &'a MachineTable, name: &str) -> Option<&'a AxisTable> {
+    table.axis.entries.iter().find(|(found, _)| found.value == name).map(|(_, axis)| axis)
 }
 
 /// The range [m or rad] that the file gives to the axis `name`, infinite where it is unlimited.
 pub(super) fn range(context: &BuildContext<'_>, name: &str) -> Option<[f64; 2]> {
-    match axis(context, name)?.limits.position.as_ref()? {
+    match axis(context.table, name)?.limits.position.as_ref()? {
         Either::Word(_) => Some([f64::NEG_INFINITY, f64::INFINITY]),
         Either::Value([lower, upper]) => Some([lower.value, upper.value]),
     }
@@ -228,7 +250,7 @@ fn refuse_home(error: &KinematicsError, table: &MachineTable, diagnostics: &mut 
 }
 
 /// The one transmission of an axis; none is a joint that turns with the gear.
-fn transmission<'a>(
+pub(super) fn transmission<'a>(
     name: &str,
     unit: JointUnit,
     axis: &'a AxisTable,
@@ -251,7 +273,7 @@ fn transmission<'a>(
                 unit.name()
             ),
             match unit {
-                JointUnit::Length => "use a screw, a belt or a planar motor",
+                JointUnit::Length => "use a screw, a belt, a rack or a planar motor",
                 JointUnit::Angle => "use `direct` or `link`",
             },
         ),
@@ -259,7 +281,7 @@ fn transmission<'a>(
             ProblemKind::MissingKey,
             axis.transmission.span,
             format!("axis `{name}` moves along a line, and nothing says how far in a turn"),
-            Some(format!("add [axis.{name}.transmission.screw], `.belt` or `.planar`")),
+            Some(format!("add [axis.{name}.transmission.screw], `.belt`, `.rack` or `.planar`")),
         ),
         _ => {}
     }

@@ -1,9 +1,9 @@
 //! The stiffness of a transmission, given or from what it is made of.
 
-use crate::document::{Diagnostics, ProblemKind, Span};
-use crate::file::tables::{
-    AxisTable, BeltTable, MachineTable, ScrewTable, SectionTable, ShaftTable,
-};
+use super::corexy::BeltTable;
+use super::linear::{self, CarriageTable};
+use crate::document::{Diagnostics, Number, Positive, ProblemKind, Span};
+use crate::file::tables::{AxisTable, MachineTable, SectionTable, ShaftTable};
 use crate::quantity as unit;
 use crate::transmission::belt::Belt;
 use crate::transmission::screw::{self, ScrewShaft};
@@ -51,10 +51,12 @@ fn shaft_of(table: &ShaftTable) -> ScrewShaft {
 /// Refuses stiffnesses that are said twice, or not at all, and shafts without material.
 pub(super) fn check(table: &MachineTable, diagnostics: &mut Diagnostics) {
     let mechanism = &table.mechanism;
-    if let Some(cartesian) = &mechanism.cartesian {
-        for screw in [&cartesian.x, &cartesian.y].into_iter().chain(&cartesian.z) {
-            let ScrewTable { stiffness, shaft, .. } = screw;
-            check_shaft(stiffness.is_some(), shaft.as_ref(), diagnostics);
+    for (_, carriage) in linear::carriages(mechanism) {
+        let CarriageTable { stiffness, shaft, .. } = carriage;
+        check_shaft(stiffness.is_some(), shaft.as_ref(), diagnostics);
+        if carriage.lead.is_some() {
+            let is_rigid = stiffness.is_none() && shaft.is_none();
+            rigid(is_rigid, &carriage.damping_ratio, carriage.span, diagnostics);
         }
     }
     if let Some(belt) = mechanism.corexy.as_ref().and_then(|corexy| corexy.belt.as_ref()) {
@@ -76,11 +78,34 @@ pub(super) fn check(table: &MachineTable, diagnostics: &mut Diagnostics) {
     for (_, AxisTable { transmission, .. }) in &table.axis.entries {
         if let Some(screw) = &transmission.screw {
             check_shaft(screw.stiffness.is_some(), screw.shaft.as_ref(), diagnostics);
+            let is_rigid = screw.stiffness.is_none() && screw.shaft.is_none();
+            rigid(is_rigid, &screw.damping_ratio, screw.span, diagnostics);
         }
         if let Some(belt) = &transmission.belt {
             let built = belt.section.as_ref().map(|section| section.span);
             once(belt.stiffness.is_some(), built, "section", diagnostics);
+            let is_rigid = belt.stiffness.is_none() && built.is_none();
+            rigid(is_rigid, &belt.damping_ratio, belt.span, diagnostics);
         }
+        if let Some(rack) = &transmission.rack {
+            rigid(rack.stiffness.is_none(), &rack.damping_ratio, rack.span, diagnostics);
+        }
+        if let Some(direct) = &transmission.direct {
+            rigid(direct.stiffness.is_none(), &direct.damping_ratio, direct.span, diagnostics);
+        }
+    }
+}
+
+/// Refuses a damping ratio of a spring that there is not; the table stands at `table`.
+fn rigid(is_rigid: bool, ratio: &Number<Positive>, table: Span, diagnostics: &mut Diagnostics) {
+    // The place of a default is that of its table.
+    if is_rigid && ratio.span != table {
+        diagnostics.contradict(
+            ratio.span,
+            "`damping_ratio` has no effect: without a `stiffness` the transmission is rigid"
+                .to_owned(),
+            "say how stiff it is, or leave the damping out",
+        );
     }
 }
 
