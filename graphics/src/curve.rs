@@ -162,25 +162,27 @@ pub(crate) fn signed_area(points: &[Point]) -> f64 {
     doubled / 2.0
 }
 
+/// The full circle, counterclockwise from its right side.
+#[cfg(any(test, feature = "codes"))]
+pub(crate) fn circle(centre: Point, radius: f64) -> Contour {
+    let arc = Arc {
+        centre,
+        major: kurbo::Vec2::new(radius, 0.0),
+        minor: kurbo::Vec2::new(0.0, radius),
+        start: 0.0,
+        sweep: messages::math::TURN,
+    };
+    Contour { start: arc.point(0.0), segments: vec![Segment::Arc(arc)], is_closed: true }
+}
+
 /// Contours for tests.
 #[cfg(test)]
 pub(crate) mod samples {
-    use kurbo::{Point, Vec2};
-    use messages::math;
+    use kurbo::Point;
 
-    use crate::{Arc, Contour, Segment};
+    use crate::{Contour, Segment};
 
-    /// The full circle, counterclockwise from its right side.
-    pub(crate) fn circle(centre: Point, radius: f64) -> Contour {
-        let arc = Arc {
-            centre,
-            major: Vec2::new(radius, 0.0),
-            minor: Vec2::new(0.0, radius),
-            start: 0.0,
-            sweep: math::TURN,
-        };
-        Contour { start: arc.point(0.0), segments: vec![Segment::Arc(arc)], is_closed: true }
-    }
+    pub(crate) use super::circle;
 
     /// The closed polygon through corners.
     pub(crate) fn polygon(corners: &[(f64, f64)]) -> Contour {

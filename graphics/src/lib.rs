@@ -4,6 +4,8 @@
 //! Nothing here knows a machine or a motion. Lengths are metres, y points up and x to the right, angles are
 //! radians, counterclockwise. Curves stay curves: nothing is made of chords that was not drawn so.
 
+#[cfg(feature = "codes")]
+pub mod code;
 mod curve;
 #[cfg(feature = "dxf")]
 pub mod dxf;
