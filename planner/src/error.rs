@@ -113,24 +113,29 @@ fn beyond(place: &Place, violation: &LimitViolation, zero: Option<&[f64; 3]>) ->
         0 => String::new(),
         stroke => format!("stroke {stroke}: "),
     };
-    let name = ["x", "y", "z"][row.min(2)];
-    let mut text = format!(
-        "{stroke}{name} of the tool would be {:.3} mm in machine coordinates, outside the area, which \
-         {} at {:.3} mm",
-        value * 1e3,
-        if value > limit { "ends" } else { "begins" },
-        limit * 1e3
-    );
-    if let Some(zero) = zero {
-        let word = name.to_uppercase();
-        text.push_str(&format!(
-            "; {word}0 of the program is at {name} {:.3} mm there, so {word} can be {} {:.3} mm",
-            zero[row.min(2)] * 1e3,
-            if value > limit { "at most" } else { "no less than" },
-            (limit - zero[row.min(2)]) * 1e3
-        ));
-    }
-    text
+    let row = row.min(2);
+    let name = ["x", "y", "z"][row];
+    let [value, limit] = [value * 1e3, limit * 1e3];
+    let is_above = value > limit;
+    let Some(zero) = zero.map(|zero| zero[row] * 1e3) else {
+        return format!(
+            "{stroke}{name} of the tool would be {value:.3} mm in machine coordinates, outside the area, \
+             which {} at {limit:.3} mm",
+            if is_above { "ends" } else { "begins" },
+        );
+    };
+    // What a person has written stands first.
+    let word = name.to_uppercase();
+    format!(
+        "{stroke}{word}{:.3} is outside the area: {word} can be {} {:.3} mm, it is {:.3} mm too far; {name} \
+         of the tool would be {value:.3} mm in machine coordinates, where the area {} at {limit:.3} mm and \
+         {word}0 of the program is at {zero:.3} mm",
+        value - zero,
+        if is_above { "at most" } else { "no less than" },
+        limit - zero,
+        (value - limit).abs(),
+        if is_above { "ends" } else { "begins" },
+    )
 }
 
 impl PlanError {

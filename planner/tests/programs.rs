@@ -147,20 +147,18 @@ fn planned(text: &str) -> Result<Plan, (Option<u64>, String)> {
 /// Machine coordinates alone say nothing to somebody who wrote others.
 #[test]
 fn a_place_outside_the_area_is_told_in_both_coordinates() {
-    let x = |value: f64, word: &str| {
-        format!(
-            "x of the tool would be {value:.3} mm in machine coordinates, outside the area, which ends \
-             at 200.000 mm; X0 of the program is at x 100.000 mm there, so X can be at most {word} mm"
-        )
-    };
+    let x = "X150.000 is outside the area: X can be at most 100.000 mm, it is 50.000 mm too far; x of the \
+             tool would be 250.000 mm in machine coordinates, where the area ends at 200.000 mm and X0 of the \
+             program is at 100.000 mm";
     let lit = planned("G21 G90 F600\nM3 S500\nG1 X50\nG1 X150\n").unwrap_err();
-    assert_eq!(lit, (Some(4), format!("stroke 1: {}", x(250.0, "100.000"))));
+    assert_eq!(lit, (Some(4), format!("stroke 1: {x}")));
     // A free move: its end, and not where it passes the edge.
     let (line, message) = planned("G21 G90\nG0 X50\nG0 X150\n").unwrap_err();
-    assert_eq!((line, message.contains(&x(250.0, "100.000"))), (Some(3), true), "{message}");
+    assert_eq!((line, message.contains(x)), (Some(3), true), "{message}");
     let below = planned("G21 G90 F600\nG92 X20 Y0\nM3 S500\nG1 Y-101\n").unwrap_err().1;
-    assert!(below.contains("y of the tool would be -1.000 mm"), "{below}");
-    assert!(below.ends_with("so Y can be no less than -100.000 mm"), "{below}");
+    let told =
+        "Y-101.000 is outside the area: Y can be no less than -100.000 mm, it is 1.000 mm too far";
+    assert!(below.contains(told), "{below}");
     // Two origins: neither is meant more than the other.
     let several = planned("G21 G90 F600\nM3 S500\nG1 X1\nG92 X0\nG1 X150\n").unwrap_err().1;
     assert!(several.ends_with("which ends at 200.000 mm"), "{several}");

@@ -6,8 +6,13 @@
 //! file.
 //!
 //! A code, word or form that is not known here is a [`GcodeError`] with its place, and what is accepted
-//! without effect leaves a note in the drawing. Only N, Q of G64, and the codes that cancel what this
-//! reader does not have anyway (G40, G49, G80, G97, G98, G99) pass without one.
+//! without effect leaves a note in the drawing. Only N, numbers of programs, Q of G64, and the codes that
+//! cancel what this reader does not have anyway (G15, G40, G49, G50, G69, G80, G97, G98, G99) pass without
+//! one.
+//!
+//! A line goes through `lexer`, which reads words and what they are worth (`expression`), `block`, which
+//! gathers them, and `interpreter`, which does them. `steps` puts that together and asks `flow` where an O
+//! word leads.
 
 mod arc;
 mod block;
@@ -15,9 +20,12 @@ mod characters;
 mod codes;
 mod encoding;
 mod error;
+mod expression;
+mod flow;
 mod interpreter;
 mod lexer;
 mod lines;
+mod parameters;
 mod recognise;
 mod settings;
 mod steps;
@@ -49,10 +57,13 @@ pub struct Program {
 ///
 /// # Errors
 /// The first thing that is not G-code, not supported here, or contradicts itself, and with it what else
-/// is not supported further down.
+/// is wrong further down.
 pub fn read(file: &str, text: &str, machine: &Machine) -> Result<Program, Box<GcodeError>> {
-    let settings = ReaderSettings::of(machine);
-    let reading = Steps::new(file, text.as_bytes(), &settings);
+    read_by(file, text, &ReaderSettings::of(machine))
+}
+
+fn read_by(file: &str, text: &str, settings: &ReaderSettings) -> Result<Program, Box<GcodeError>> {
+    let reading = Steps::new(file, text.as_bytes(), settings);
     let (survey, steps) = reading.read_through(u64::MAX)?;
     let drawing = Drawing {
         name: name(file),

@@ -5,7 +5,8 @@ use std::ops::Range;
 use machine::gcode_settings::WordMeanings;
 
 use super::codes::{Codes, Stop, spell};
-use super::error::Refusal;
+use super::error::{Needs, Refusal};
+use super::expression::Target;
 use super::lexer::Word;
 
 /// A line, gathered word by word.
@@ -19,6 +20,8 @@ pub(super) struct Block {
     spans: [Range<usize>; 26],
     /// Its G and M codes.
     pub(super) codes: Codes,
+    /// What it sets parameters to.
+    pub(super) settings: Vec<(Target, f64)>,
     /// The powers after the first of a cluster, `S1:2:3`, and where they stand.
     pub(super) cluster: Vec<(f64, Range<usize>)>,
     /// Whether something other than a motion has taken its coordinates.
@@ -35,6 +38,7 @@ impl Block {
             numbers: [0.0; 26],
             spans: std::array::from_fn(|_| 0..0),
             codes: Codes::default(),
+            settings: Vec::new(),
             cluster: Vec::new(),
             axes_taken: false,
             begun: false,
@@ -46,6 +50,7 @@ impl Block {
         self.present = 0;
         self.used = 0;
         self.codes = Codes::default();
+        self.settings.clear();
         self.cluster.clear();
         self.axes_taken = false;
         self.begun = false;
@@ -198,9 +203,9 @@ impl Block {
         let help = match letter {
             b'X' | b'Y' | b'Z' => "coordinates need G0, G1, G2 or G3, on this line or before",
             b'I' | b'J' | b'K' | b'R' => "I, J, K and R belong to G2 and G3",
-            b'P' => "P belongs to G2, G3, G4, G10, G64 and M62 to M65",
+            b'P' => "P belongs to G2, G3, G4, G10, G64, M62 to M65 and M98",
             b'H' => "H belongs to G43",
-            b'L' => "L belongs to G10",
+            b'L' => "L belongs to G10 and M98",
             _ => "Q belongs to G64, M67 and M68",
         };
         Err(Refusal::new(
@@ -208,7 +213,8 @@ impl Block {
             format!("nothing on this line uses {name}"),
             "unused word",
             help,
-        ))
+        )
+        .needing(Needs::Motion))
     }
 }
 

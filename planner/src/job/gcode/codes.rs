@@ -103,6 +103,15 @@ pub(super) enum ToolLength {
     Given,
 }
 
+/// M98 and M99.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Call {
+    /// M98.
+    Program,
+    /// M99.
+    Return,
+}
+
 /// Codes that do nothing here, each with a note.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Idle {
@@ -153,6 +162,8 @@ pub(super) struct Codes {
     pub(super) analog_output: Option<Chosen<()>>,
     pub(super) air_assist: Option<Chosen<bool>>,
     pub(super) stop: Option<Chosen<Stop>>,
+    /// M98 and M99.
+    pub(super) call: Option<Chosen<Call>>,
     /// G80. RS-274 has it in group 1, but preambles write it beside G0, and LinuxCNC allows that.
     pub(super) cancelled: Option<Chosen<()>>,
     /// M62 to M65.
@@ -175,7 +186,7 @@ pub(super) const MILLIMETRE: f64 = 1e-3;
 const SUPPORTED_G: &str = "G0 G1 G2 G3 G4 G10 G17 G18 G19 G20 G21 G28 G53 G54-G59 G59.1-G59.3 G61 \
                            G61.1 G64 G90 G91 G90.1 G91.1 G92 G92.1-G92.3 G93 G94, and without effect \
                            G15 G40 G40.1 G43 G49 G50 G50.1 G69 G80 G97 G98 G99";
-const SUPPORTED_M: &str = "M0 M1 M2 M3 M4 M5 M7 M8 M9 M30 M62-M65 M67 M68, and without effect M6 M17 M18 \
+const SUPPORTED_M: &str = "M0 M1 M2 M3 M4 M5 M7 M8 M9 M30 M62-M65 M67 M68 M98 M99, and without effect M6 M17 M18 \
                            M48 M49 M84";
 
 impl Codes {
@@ -304,6 +315,8 @@ impl Codes {
             50 => choose(&mut self.laser, Laser::Off, span, line, "laser"),
             70 | 80 => choose(&mut self.air_assist, true, span, line, "air assist"),
             90 => choose(&mut self.air_assist, false, span, line, "air assist"),
+            980 => choose(&mut self.call, Call::Program, span, line, "subroutine"),
+            990 => choose(&mut self.call, Call::Return, span, line, "subroutine"),
             670 | 680 => choose(&mut self.analog_output, (), span, line, "analog output"),
             _ => Err(unsupported(line, &word, tenths)),
         }
@@ -390,7 +403,6 @@ fn tool_advice(tenths: u16) -> Option<&'static str> {
         660 => "a marking machine has no inputs to wait for: write M0 to wait for a person",
         700..=730 => "states are not saved: write the codes out",
         820 | 830 | 4000 => "delete it, or set gcode.dialect = \"marlin\"",
-        980 | 990 => "subroutines: write the moves out",
         1060 | 1070 => {
             "switch the laser with M3 or M4 and S, and off with M5; where the fan is the laser, set \
              gcode.fan_is_laser = true or gcode.dialect = \"marlin\""

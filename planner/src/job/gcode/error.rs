@@ -23,7 +23,7 @@ pub struct GcodeError {
     /// What would be right.
     #[help]
     pub help: String,
-    /// What else is not supported further down in the file, each thing once and a few at most.
+    /// What else is wrong further down in the file, each thing once and a few at most.
     #[related]
     pub others: Vec<GcodeError>,
     #[source_code]
@@ -39,6 +39,23 @@ pub(super) struct Refusal {
     pub(super) message: String,
     pub(super) found: String,
     pub(super) help: String,
+    /// On what of the lines before it depends.
+    pub(super) needs: Needs,
+}
+
+/// What a refusal depends on: where a line before could not be done, it may only follow from that.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Needs {
+    /// Only its own line.
+    Nothing,
+    /// The motion in force.
+    Motion,
+    /// Motion and feed.
+    Feed,
+    /// Motion and place.
+    Place,
+    /// Parameters, and where the flow is.
+    Values,
 }
 
 impl Refusal {
@@ -49,7 +66,24 @@ impl Refusal {
         found: impl Into<String>,
         help: impl Into<String>,
     ) -> Box<Self> {
-        Box::new(Self { span, message: message.into(), found: found.into(), help: help.into() })
+        Box::new(Self {
+            span,
+            message: message.into(),
+            found: found.into(),
+            help: help.into(),
+            needs: Needs::Nothing,
+        })
+    }
+
+    /// The same, of which `needs` says what it depends on.
+    pub(super) fn needing(mut self: Box<Self>, needs: Needs) -> Box<Self> {
+        self.needs = needs;
+        self
+    }
+
+    /// Whether it depends on what parameters are worth.
+    pub(super) fn is_of_values(&self) -> bool {
+        self.needs == Needs::Values
     }
 }
 
@@ -62,7 +96,7 @@ impl GcodeError {
         around: &Around,
         refusal: Refusal,
     ) -> Self {
-        let Refusal { span, message, found, help } = refusal;
+        let Refusal { span, message, found, help, needs: _ } = refusal;
         let within = |bytes: &Range<usize>| bytes.start.min(line.len())..bytes.end.min(line.len());
         let span = within(&span);
         // An illegible line is taken for Latin-1, so that places before it are places in its text.
@@ -89,6 +123,14 @@ impl GcodeError {
             },
             span: (offset + start, end.saturating_sub(start)).into(),
         }
+    }
+}
+
+impl GcodeError {
+    /// Of nothing that is known.
+    pub(super) fn unknown() -> Self {
+        let refusal = Refusal::new(0..0, "the program cannot be read", "here", "look at the file");
+        Self::new("", 0, &[], &Around::default(), *refusal)
     }
 }
 

@@ -3,6 +3,7 @@
 mod arc_words;
 mod laser_words;
 mod origin_words;
+mod predefined;
 mod remarks;
 
 use std::ops::Range;
@@ -12,9 +13,10 @@ use nalgebra::Vector3;
 
 use super::block::Block;
 use super::codes::{
-    Chosen, FeedMode, MILLIMETRE, Motion, Once, PathControl, Plane, Reference, Stop, spell,
+    Call, Chosen, FeedMode, MILLIMETRE, Motion, Once, PathControl, Plane, Reference, Stop, spell,
 };
-use super::error::Refusal;
+use super::error::{Needs, Refusal};
+use super::parameters::Store;
 use super::settings::ReaderSettings;
 use super::tracer::{Feed, Pace, Tracer};
 use crate::drawing::{Action, Corners, Note};
@@ -83,6 +85,19 @@ impl Zeros {
     }
 }
 
+/// How a program goes on after a line.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Next {
+    /// With the next line.
+    Line,
+    /// Not at all.
+    End,
+    /// With a program that M98 calls, so many times.
+    Program { number: u64, times: u64, span: Range<usize> },
+    /// Where the program was called that M99 ends.
+    Return(Range<usize>),
+}
+
 /// Runs a program line by line.
 #[derive(Debug)]
 pub(super) struct Interpreter {
@@ -93,6 +108,8 @@ pub(super) struct Interpreter {
     home: Vector3<f64>,
     modal: Modal,
     said: u32,
+    /// What the program has set.
+    pub(super) parameters: Store,
     pub(super) zeros: Zeros,
     pub(super) notes: Vec<Note>,
     pub(super) tracer: Tracer,
@@ -124,14 +141,15 @@ impl Interpreter {
                 corners: Corners::AsMachine,
             },
             said: 0,
+            parameters: Store::new(),
             zeros: Zeros::None,
             notes: Vec::new(),
             tracer: Tracer::new(settings),
         }
     }
 
-    /// Does what `block` says, which was gathered from `line`. Gives back whether it ends the program.
-    pub(super) fn execute(&mut self, line: &[u8], block: &mut Block) -> Result<bool, Box<Refusal>> {
+    /// Does what `block` says, which was gathered from `line`. Gives back what comes next.
+    pub(super) fn execute(&mut self, line: &[u8], block: &mut Block) -> Result<Next, Box<Refusal>> {
         self.tracer.facts.blocks += 1;
         self.settle_feed(block)?;
         self.settle_laser(block)?;
@@ -159,9 +177,44 @@ impl Interpreter {
             self.modal.motion = motion.as_ref().map(|chosen| chosen.code);
         }
         self.shift_or_home(line, block, once.as_ref(), motion.as_ref())?;
+        let call = block.codes.call.clone();
+        let call = call.map(|call| self.call(block, call)).transpose()?;
         self.motion(block, once.as_ref(), motion.as_ref())?;
         block.check_used()?;
-        Ok(self.stop(block))
+        if self.stop(block) {
+            return Ok(Next::End);
+        }
+        Ok(call.unwrap_or(Next::Line))
+    }
+
+    /// Whether coordinates are absolute.
+    pub(super) fn is_absolute(&self) -> bool {
+        self.modal.distance == Reference::Absolute
+    }
+
+    /// M98 and M99.
+    fn call(&self, block: &mut Block, call: Chosen<Call>) -> Result<Next, Box<Refusal>> {
+        /// Rounds of one call.
+        const MOST: f64 = 1e6;
+        if call.code == Call::Return {
+            return Ok(Next::Return(call.span));
+        }
+        claim(block, b'P')?;
+        let help = "M98 P1000 L3 runs the program that begins with O1000 three times";
+        let whole = |number: f64| number.floor() == number && (0.0..=1e9).contains(&number);
+        let Some(number) = block.number(b'P').filter(|&number| whole(number)) else {
+            return Err(Refusal::new(call.span, "M98 has no P of a program", "M98", help));
+        };
+        let times = block.number(b'L').unwrap_or(1.0);
+        if times > MOST {
+            return Err(Refusal::new(
+                block.span(b'L'),
+                format!("M98 with L{times} is more than {MOST} rounds"),
+                "rounds",
+                help,
+            ));
+        }
+        Ok(Next::Program { number: number as u64, times: times as u64, span: call.span })
     }
 
     /// Puts what a program left on out, and completes its facts.
@@ -334,7 +387,8 @@ impl Interpreter {
                     "G53 needs G0 or G1, a coordinate, and G90",
                     "machine coordinates",
                     "G53 G0 X0 Y0 moves to the machine's zero; arcs and G91 cannot be combined with it",
-                ));
+                )
+                .needing(Needs::Motion));
             }
         }
         let arc = matches!(now, Some(Motion::Clockwise | Motion::Counterclockwise));
@@ -393,7 +447,8 @@ impl Interpreter {
                 "the move has no feed rate",
                 "no F",
                 help,
-            ));
+            )
+            .needing(Needs::Feed));
         };
         if self.modal.level.is_none() && self.modal.laser.is_some() {
             self.remark(Remark::NoPower);

@@ -9,7 +9,9 @@ use machine::gcode_settings::WordMeanings;
 
 use super::characters;
 use super::error::Refusal;
+use super::expression::{Parameters, Reader, Target};
 use super::lines::character;
+use super::parameters;
 
 /// Largest magnitude of a number in a program: far beyond any machine, and small enough that no
 /// sum or product of such numbers overflows.
@@ -40,7 +42,9 @@ pub(super) enum Token {
     Word(Word),
     /// A further power of a cluster, `:2` of `S1:2`.
     Further(f64, Range<usize>),
-    /// `O` or `:` where a program's number begins a line, with its place.
+    /// `#1=2`: what is set to what.
+    Setting(Target, f64),
+    /// `O` or `:` that begins a line, with its place.
     Program(usize),
     /// `/` as the first thing of a line.
     Delete,
@@ -59,21 +63,30 @@ pub(super) struct Words<'a> {
     /// Whether the last word was S.
     after_power: bool,
     words: &'a WordMeanings,
+    parameters: &'a dyn Parameters,
 }
 
 impl<'a> Words<'a> {
     /// Over the bytes of one `line`, without its line feed.
-    pub(super) fn new(line: &'a [u8], words: &'a WordMeanings) -> Self {
-        Self { line, at: 0, begun: false, numbered: false, after_power: false, words }
+    pub(super) fn new(
+        line: &'a [u8],
+        words: &'a WordMeanings,
+        parameters: &'a dyn Parameters,
+    ) -> Self {
+        Self { line, at: 0, begun: false, numbered: false, after_power: false, words, parameters }
     }
 
     /// Over the first line of a program: some editors begin a file with a byte order mark.
-    pub(super) fn first(line: &'a [u8], words: &'a WordMeanings) -> Self {
+    pub(super) fn first(
+        line: &'a [u8],
+        words: &'a WordMeanings,
+        parameters: &'a dyn Parameters,
+    ) -> Self {
         let mut at = 0;
         while line[at..].starts_with(BYTE_ORDER_MARK) {
             at += BYTE_ORDER_MARK.len();
         }
-        Self { at, ..Self::new(line, words) }
+        Self { at, ..Self::new(line, words, parameters) }
     }
 
     /// The next token, `None` at the end of the line.
@@ -106,6 +119,11 @@ impl<'a> Words<'a> {
                     self.after_power = letter == b'S';
                     return self.word(letter).map(|word| Some(Token::Word(word)));
                 }
+                b'#' => {
+                    self.begun = true;
+                    self.numbered = false;
+                    return self.setting().map(Some);
+                }
                 b':' if self.after_power => {
                     let Word { number, span, .. } = self.word(b':')?;
                     return Ok(Some(Token::Further(number, span)));
@@ -125,9 +143,36 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// The rest of the line, from here.
-    pub(super) fn rest(&self) -> Range<usize> {
-        self.at..self.line.len()
+    /// `#1=2`.
+    fn setting(&mut self) -> Result<Token, Box<Refusal>> {
+        let start = self.at;
+        let mut reader = Reader::new(self.line, self.at, self.parameters);
+        let refuse = |end: usize, message: String| {
+            Err(Refusal::new(
+                start..end,
+                message,
+                "parameter",
+                "a line that begins with # sets a parameter, as #1=2.5 does; a comment begins with ; or \
+                 stands in ( )",
+            ))
+        };
+        let target = match reader.target() {
+            Ok(target) => target,
+            Err(refusal) if refusal.is_of_values() => return Err(refusal),
+            Err(refusal) => return refuse(refusal.span.end, refusal.message),
+        };
+        reader.blanks();
+        if self.line.get(reader.at) != Some(&b'=') {
+            return refuse(reader.at, "a parameter has no value after it".to_owned());
+        }
+        if let Some(message) = parameters::refusal(&target) {
+            return refuse(reader.at, message);
+        }
+        reader.at += 1;
+        let value = reader.value()?;
+        self.at = reader.at;
+        self.after_number('#')?;
+        Ok(Token::Setting(target, value))
     }
 
     /// Passes over `( … )`.
@@ -183,6 +228,12 @@ impl<'a> Words<'a> {
             self.blanks();
         }
         let unsigned = self.at;
+        if matches!(self.peek(), Some(b'#' | b'[' | b'A'..=b'Z' | b'a'..=b'z'))
+            && letter != b'N'
+            && Reader::begins(self.line, digits)
+        {
+            return self.computed(letter, start, digits);
+        }
         let mut mantissa = 0_u64;
         let mut count = 0_usize;
         let mut decimals = None;
@@ -213,14 +264,32 @@ impl<'a> Words<'a> {
             digits.parse().unwrap_or(f64::INFINITY)
         };
         if magnitude > LARGEST {
-            return Err(Refusal::new(
-                start..self.at,
-                format!("the number of {name} is too large"),
-                format!("beyond {LARGEST:e}"),
-                format!("numbers lie between -{LARGEST:e} and {LARGEST:e}"),
-            ));
+            return Err(self.too_large(name, start));
         }
         let number = if negative { -magnitude } else { magnitude };
+        let span = start..self.at;
+        self.after_number(name)?;
+        Ok(Word { letter, number, span })
+    }
+
+    fn too_large(&self, name: char, start: usize) -> Box<Refusal> {
+        Refusal::new(
+            start..self.at,
+            format!("the number of {name} is too large"),
+            format!("beyond {LARGEST:e}"),
+            format!("numbers lie between -{LARGEST:e} and {LARGEST:e}"),
+        )
+    }
+
+    /// A word whose number is a parameter, a function or an expression.
+    fn computed(&mut self, letter: u8, start: usize, at: usize) -> Result<Word, Box<Refusal>> {
+        let mut reader = Reader::new(self.line, at, self.parameters);
+        let number = reader.value()?;
+        self.at = reader.at;
+        let name = char::from(letter);
+        if number.abs() > LARGEST {
+            return Err(self.too_large(name, start));
+        }
         let span = start..self.at;
         self.after_number(name)?;
         Ok(Word { letter, number, span })
@@ -233,18 +302,6 @@ impl<'a> Words<'a> {
             _ => format!("write a decimal number after {name}, such as {name}10 or {name}2.5"),
         };
         match self.line.get(digits) {
-            Some(b'#') => Refusal::new(
-                digits..digits + 1,
-                "parameters (#) are not supported",
-                "parameter",
-                wanted,
-            ),
-            Some(b'[') => Refusal::new(
-                digits..digits + 1,
-                "expressions ([ ]) are not supported",
-                "expression",
-                wanted,
-            ),
             Some(byte) if !(b' '..=b'~').contains(byte) && *byte != b'\t' => {
                 let (character, length) = character(self.line, digits);
                 Refusal::new(
@@ -292,9 +349,10 @@ impl<'a> Words<'a> {
         let (character, length) = character(self.line, self.at);
         let span = self.at..self.at + length;
         let (message, help) = match character {
-            '#' => ("parameters (#) are not supported".to_owned(), "write the numbers out"),
             ':' => ("a : stands where no power is before it".to_owned(), "a cluster is S1:2:3"),
-            '[' | ']' => ("expressions ([ ]) are not supported".to_owned(), "write the number out"),
+            '[' | ']' => {
+                ("an expression without a letter".to_owned(), "a word is a letter and a number: X[1+2]")
+            }
             '*' => ("checksums (*) are not supported".to_owned(), "save the program without them"),
             '/' => (
                 "/ stands inside a line".to_owned(),
@@ -330,9 +388,22 @@ mod tests {
     use super::*;
     use machine::gcode_settings::Dialect;
 
+    struct NoParameters;
+
+    impl Parameters for NoParameters {
+        fn numbered(&self, _index: u32) -> Option<f64> {
+            Some(2.0)
+        }
+
+        fn named(&self, _name: &str) -> Option<f64> {
+            None
+        }
+    }
+
     fn words(line: &str) -> Result<Vec<(char, f64)>, Box<Refusal>> {
         let meanings = Dialect::Standard.meanings();
-        let mut words = Words::new(line.as_bytes(), &meanings);
+        let store = NoParameters;
+        let mut words = Words::new(line.as_bytes(), &meanings, &store);
         let mut read = Vec::new();
         while let Some(token) = words.next()? {
             match token {
@@ -355,6 +426,10 @@ mod tests {
         assert_eq!(
             words("S1:0.5: 0 X1").unwrap(),
             [('S', 1.0), (':', 0.5), (':', 0.0), ('X', 1.0)]
+        );
+        assert_eq!(
+            words("X#1 Y-[1+#1]z sin[30]").unwrap(),
+            [('X', 2.0), ('Y', -3.0), ('Z', 0.49999999999999994)]
         );
         assert_eq!(words("(a) X1 (b;c) Y2 (d)\r").unwrap(), [('X', 1.0), ('Y', 2.0)]);
     }
@@ -387,9 +462,14 @@ mod tests {
         check("X-", 0, "X has no number");
         check("X.", 0, "X has no number");
         check("Xnan", 0, "X has no number");
-        check("X#1", 1, "parameters (#) are not supported");
-        check("X[1+2]", 1, "expressions ([ ]) are not supported");
-        check("#1=5", 0, "parameters (#) are not supported");
+        check("X#<a>", 1, "#<a> has no value");
+        check("X[1+2", 1, "the expression is not closed by ]");
+        check("X[1 2]", 4, "an operator or ] is missing");
+        check("X1 [2]", 3, "an expression without a letter");
+        check("# 4mm x 4mm square", 0, "a parameter has no value after it");
+        check("#this", 0, "this is no function");
+        check("#5420=1", 0, "#5420 is not set by a program: those are #1 to #5000");
+        check("#<_x>=1", 0, "#<_x> is predefined and cannot be set");
         check("X1:2", 2, "a : stands where no power is before it");
         check("X1 2", 3, "X has more than one number");
         check("X1.2.3", 4, "X has more than one number");

@@ -101,25 +101,27 @@ impl<R: Read> Lines<R> {
     }
 
     /// Number of the present line, from 1; 0 before the first.
-    #[cfg_attr(not(test), expect(dead_code, reason = "for subroutines and loops"))]
     pub(super) fn number(&self) -> u64 {
         self.number
     }
 
     /// Holds all text from the present line on.
-    #[cfg_attr(not(test), expect(dead_code, reason = "for subroutines and loops"))]
     pub(super) fn hold(&mut self) {
         self.holds = true;
     }
 
     /// The place after the present line.
-    #[cfg_attr(not(test), expect(dead_code, reason = "for subroutines and loops"))]
     pub(super) fn place(&self) -> Place {
         Place { offset: self.dropped + self.next as u64, number: self.number }
     }
 
+    /// The place of the present line: after [`Self::go_to`] it comes again.
+    pub(super) fn start(&self) -> Place {
+        let offset = self.dropped + self.line.start as u64;
+        Place { offset, number: self.number.saturating_sub(1) }
+    }
+
     /// Goes to `place`: the next line is the one there. Its text must be held since it was passed.
-    #[cfg_attr(not(test), expect(dead_code, reason = "for subroutines and loops"))]
     pub(super) fn go_to(&mut self, place: Place) {
         self.next = (place.offset.saturating_sub(self.dropped) as usize).min(self.filled);
         self.number = place.number;

@@ -15,7 +15,12 @@ pub(super) struct ReaderSettings {
     pub(super) mark_speed: f64,
     /// Largest speed in the dark [m/s].
     pub(super) rapid: f64,
+    /// Lines that a program with loops may go through: one that goes through more has no end.
+    pub(super) most_lines: u64,
 }
+
+/// [`ReaderSettings::most_lines`].
+const MOST_LINES: u64 = 10_000_000;
 
 impl ReaderSettings {
     pub(super) fn of(machine: &Machine) -> Self {
@@ -24,6 +29,7 @@ impl ReaderSettings {
             home: Vector3::from(machine.home),
             mark_speed: machine.path.speed,
             rapid: machine.path.rapid,
+            most_lines: MOST_LINES,
         }
     }
 }

@@ -1,12 +1,15 @@
 //! A program as a stream: a block is read, done and forgotten, so that memory does not depend on the
 //! program's length.
 
-use std::io::Read;
-use std::ops::Range;
+mod errors;
 
+use std::io::Read;
+
+use self::errors::Errors;
 use super::block::Block;
 use super::error::{GcodeError, Refusal};
-use super::interpreter::{Interpreter, Remark};
+use super::flow::{self, Flow, Statement, Stop};
+use super::interpreter::{Interpreter, Next, Remark};
 use super::lexer::{Token, Words};
 use super::lines::{Around, LONGEST_LINE, Lines, MOST_HELD, NoLine};
 use super::settings::ReaderSettings;
@@ -15,9 +18,6 @@ use crate::drawing::{Note, Step};
 
 /// Steps that are read ahead.
 const BATCH: usize = 256;
-
-/// How many errors of one file are worth reading at once.
-const MOST_ERRORS: usize = 10;
 
 /// The steps of a program, in order, read as they are asked for.
 ///
@@ -28,6 +28,9 @@ pub struct Steps<R> {
     lines: Lines<R>,
     block: Block,
     interpreter: Interpreter,
+    flow: Flow,
+    /// Lines that have been read, each as often as it was run.
+    read: u64,
     /// How many of the steps that have been read are handed out.
     taken: usize,
     /// Whether the program has ended, by itself or by an error.
@@ -44,6 +47,10 @@ pub struct Steps<R> {
 enum Gathered {
     /// Words, or nothing.
     Block,
+    /// Left out by `/`.
+    Deleted,
+    /// An O word.
+    Statement(Statement),
     /// A tape mark, `%`.
     Mark,
 }
@@ -56,6 +63,13 @@ enum Fault {
     Word(Box<Refusal>),
 }
 
+impl From<Fault> for Stop {
+    fn from(fault: Fault) -> Self {
+        let (Fault::Illegible(refusal) | Fault::Word(refusal)) = fault;
+        Self::Refused(refusal)
+    }
+}
+
 impl<R: Read> Steps<R> {
     /// Of the program that `source` gives; `name` is its name in errors.
     pub(super) fn new(name: &str, source: R, settings: &ReaderSettings) -> Self {
@@ -64,6 +78,8 @@ impl<R: Read> Steps<R> {
             lines: Lines::new(source),
             block: Block::new(),
             interpreter: Interpreter::new(settings),
+            flow: Flow::new(settings.most_lines),
+            read: 0,
             taken: 0,
             ended: false,
             error: None,
@@ -80,11 +96,11 @@ impl<R: Read> Steps<R> {
     ) -> Result<(Survey, Option<Vec<Step>>), Box<GcodeError>> {
         let mut dropped = 0;
         while !self.ended {
-            if let Err(error) = self.read_block() {
-                return Err(self.with_others(error));
+            if let Err(stop) = self.read_line() {
+                return Err(Errors::find(self, stop));
             }
             let tracer = &mut self.interpreter.tracer;
-            if tracer.line > most {
+            if self.read > most {
                 dropped += tracer.steps.len();
                 tracer.steps.clear();
                 tracer.steps.shrink_to(BATCH);
@@ -96,39 +112,64 @@ impl<R: Read> Steps<R> {
             facts: tracer.facts,
             zero: zeros.only(),
             notes,
-            lines: tracer.line,
+            lines: self.read,
             steps: (dropped + tracer.steps.len()) as u64,
             time: tracer.time,
             tolerance: tracer.tolerance,
         };
-        Ok((survey, (tracer.line <= most).then_some(tracer.steps)))
+        Ok((survey, (self.read <= most).then_some(tracer.steps)))
+    }
+
+    /// Goes to the next line. Gives back whether there is one.
+    fn advance(&mut self) -> Result<bool, NoLine> {
+        let is_there = self.lines.advance()?;
+        self.read += u64::from(is_there);
+        self.interpreter.tracer.line = self.lines.number();
+        Ok(is_there)
     }
 
     /// Reads the next line and does what it says.
-    fn read_block(&mut self) -> Result<(), Box<GcodeError>> {
-        match self.lines.advance() {
-            Ok(true) => self.interpreter.tracer.line += 1,
-            Ok(false) => {
-                self.end();
-                return Ok(());
-            }
-            Err(fault) => return Err(self.no_line(fault)),
+    fn read_line(&mut self) -> Result<(), Stop> {
+        if !self.advance().map_err(Stop::NoLine)? {
+            self.flow.check_end()?;
+            self.end();
+            return Ok(());
         }
-        let done = match self.gather() {
-            Ok(Gathered::Mark) => Ok(self.is_end_mark()),
-            Ok(Gathered::Block) if self.block.begun => {
-                if let Some(line) = self.stray_mark.take() {
-                    self.interpreter.remark_at(line, Remark::TapeMark);
-                }
-                self.interpreter.execute(self.lines.line(), &mut self.block)
+        if self.flow.is_holding() {
+            self.flow.pass()?;
+        }
+        match self.gather()? {
+            Gathered::Block if self.block.begun => self.execute(),
+            Gathered::Block => Ok(()),
+            Gathered::Deleted => {
+                self.interpreter.remark(Remark::BlockDelete);
+                Ok(())
             }
-            Ok(Gathered::Block) => Ok(false),
-            Err(Fault::Illegible(refusal) | Fault::Word(refusal)) => Err(refusal),
-        };
-        match done {
-            Ok(true) => self.end(),
-            Ok(false) => {}
-            Err(refusal) => return Err(self.refuse(*refusal)),
+            Gathered::Statement(statement) => {
+                self.flow.run(&statement, &mut self.lines, &mut self.interpreter)
+            }
+            Gathered::Mark => {
+                if self.is_end_mark() {
+                    self.end();
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// Does what the block says.
+    fn execute(&mut self) -> Result<(), Stop> {
+        if let Some(line) = self.stray_mark.take() {
+            self.interpreter.remark_at(line, Remark::TapeMark);
+        }
+        let Self { lines, interpreter, flow, block, .. } = self;
+        match interpreter.execute(lines.line(), block)? {
+            Next::Line => {}
+            Next::End => self.end(),
+            Next::Program { number, times, span } => {
+                flow.call_program(number, times, span, lines, interpreter)?;
+            }
+            Next::Return(span) => flow.end_program(span, lines, interpreter)?,
         }
         Ok(())
     }
@@ -140,20 +181,23 @@ impl<R: Read> Steps<R> {
         let line = lines.line();
         let is_first = interpreter.tracer.line == 1;
         let meanings = &interpreter.words;
-        let mut words =
-            if is_first { Words::first(line, meanings) } else { Words::new(line, meanings) };
+        let mut words = if is_first {
+            Words::first(line, meanings, interpreter)
+        } else {
+            Words::new(line, meanings, interpreter)
+        };
         while let Some(token) = words.next().map_err(Fault::Illegible)? {
             match token {
                 Token::Word(word) => block.take(line, word, meanings).map_err(Fault::Word)?,
                 Token::Further(number, span) => block.cluster.push((number, span)),
+                Token::Setting(target, value) => {
+                    block.begun = true;
+                    block.settings.push((target, value));
+                }
                 Token::Program(at) => {
-                    program_number(line, at, words.rest()).map_err(Fault::Word)?;
-                    return Ok(Gathered::Block);
+                    return flow::statement(line, at).map(Gathered::Statement).map_err(Fault::Word);
                 }
-                Token::Delete => {
-                    interpreter.remark(Remark::BlockDelete);
-                    return Ok(Gathered::Block);
-                }
+                Token::Delete => return Ok(Gathered::Deleted),
                 Token::Tape(at) => {
                     if !block.begun && words.next().map_err(Fault::Illegible)?.is_none() {
                         return Ok(Gathered::Mark);
@@ -162,12 +206,23 @@ impl<R: Read> Steps<R> {
                         at..at + 1,
                         "% is not alone on its line",
                         "tape mark",
-                        "% on a line of its own begins or ends a program",
+                        "% on a line of its own begins or ends a program; a comment begins with ; or \
+                         stands in ( )",
                     )));
                 }
             }
         }
         block.check_gathered().map_err(Fault::Word)?;
+        for (target, value) in block.settings.drain(..) {
+            if !interpreter.parameters.set(target, value) {
+                return Err(Fault::Word(Refusal::new(
+                    0..line.len(),
+                    "the program has too many parameters",
+                    "one too many",
+                    "set those again that are no longer needed",
+                )));
+            }
+        }
         Ok(Gathered::Block)
     }
 
@@ -187,14 +242,18 @@ impl<R: Read> Steps<R> {
 
     /// Notes how many lines after the program's end have words, which are not read.
     fn note_rest(&mut self) {
+        // What follows may be the programs that M98 calls.
+        if self.flow.is_holding() {
+            return;
+        }
         let mut rest = 0_u64;
+        let line = self.interpreter.tracer.line;
         while let Ok(true) = self.lines.advance() {
             let first = self.lines.line().trim_ascii_start().first();
             rest += u64::from(first.is_some_and(u8::is_ascii_alphabetic));
         }
         if rest > 0 {
             let lines = if rest == 1 { "one line" } else { &format!("{rest} lines") };
-            let line = self.interpreter.tracer.line;
             let text = format!("the program ends here: {lines} with words after it, not read");
             self.interpreter.notes.push(Note { line, text });
         }
@@ -205,35 +264,18 @@ impl<R: Read> Steps<R> {
         self.interpreter.finish();
     }
 
-    /// Looks at the rest of the program for what is not supported, so that a person need not find one
-    /// thing at a time. What depends on the lines before is left out: it may be a mere consequence.
-    fn with_others(mut self, mut first: Box<GcodeError>) -> Box<GcodeError> {
-        while first.others.len() + 1 < MOST_ERRORS && matches!(self.lines.advance(), Ok(true)) {
-            self.interpreter.tracer.line += 1;
-            match self.gather() {
-                Ok(Gathered::Mark) if self.is_end_mark() => break,
-                Ok(Gathered::Block) if self.block.ends_program() => break,
-                Ok(Gathered::Block) if self.block.begun => {
-                    self.interpreter.tracer.facts.blocks += 1;
-                }
-                // What is not made of words at all may be no G-code.
-                Ok(_) | Err(Fault::Illegible(_)) => {}
-                Err(Fault::Word(refusal)) => {
-                    let said = |error: &GcodeError| error.message == refusal.message;
-                    if !said(&first) && !first.others.iter().any(said) {
-                        let error = self.refuse(*refusal);
-                        first.others.push(*error);
-                    }
-                }
-            }
+    /// The error of a stop.
+    fn error(&mut self, stop: Stop) -> Box<GcodeError> {
+        match stop {
+            Stop::Refused(refusal) => self.refuse(*refusal),
+            Stop::NoLine(fault) => self.no_line(fault),
         }
-        first
     }
 
     /// The error of a refusal in the present line.
     fn refuse(&mut self, refusal: Refusal) -> Box<GcodeError> {
         self.ended = true;
-        let number = self.interpreter.tracer.line;
+        let number = self.lines.number();
         let around = self.lines.around();
         Box::new(GcodeError::new(&self.name, number, self.lines.line(), &around, refusal))
     }
@@ -241,7 +283,7 @@ impl<R: Read> Steps<R> {
     /// The error of a line that cannot be read.
     fn no_line(&mut self, fault: NoLine) -> Box<GcodeError> {
         self.ended = true;
-        let number = self.interpreter.tracer.line + 1;
+        let number = self.lines.number() + 1;
         let refusal = match fault {
             NoLine::Unreadable(cause) => Refusal::new(
                 0..0,
@@ -267,22 +309,6 @@ impl<R: Read> Steps<R> {
     }
 }
 
-/// Takes the number of a program, whose `O` or `:` is at `at` and whose digits stand in `rest`.
-fn program_number(line: &[u8], at: usize, rest: Range<usize>) -> Result<(), Box<Refusal>> {
-    let text = line[rest].trim_ascii_start();
-    let digits = text.iter().take_while(|byte| byte.is_ascii_digit()).count();
-    let after = text[digits..].trim_ascii_start();
-    if digits > 0 && matches!(after.first(), None | Some(b'(' | b';')) {
-        return Ok(());
-    }
-    Err(Refusal::new(
-        at..at + 1,
-        "O words (subroutines, loops, conditions) are not supported",
-        "O word",
-        "write the moves out",
-    ))
-}
-
 impl<R: Read> Iterator for Steps<R> {
     type Item = Result<Step, Box<GcodeError>>;
 
@@ -291,7 +317,7 @@ impl<R: Read> Iterator for Steps<R> {
             self.taken = 0;
             self.interpreter.tracer.steps.clear();
             while !self.ended && self.interpreter.tracer.steps.len() < BATCH {
-                self.error = self.read_block().err();
+                self.error = self.read_line().err().map(|stop| self.error(stop));
             }
         }
         match self.interpreter.tracer.steps.get(self.taken) {

@@ -61,7 +61,7 @@ pub struct Survey {
 ///
 /// # Errors
 /// Where it cannot be read; the first thing that is not G-code, not supported here, or contradicts
-/// itself, and with it what else is not supported further down.
+/// itself, and with it what else is wrong further down.
 pub fn survey(path: &Path, machine: &Machine) -> Result<Survey, JobError> {
     let (program, _) = ProgramFile::open(path, &DialectChoices::default(), machine, 0)?;
     Ok(program.survey)

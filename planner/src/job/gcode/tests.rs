@@ -6,6 +6,7 @@ mod arcs;
 mod dialects;
 mod files;
 mod mutations;
+mod parameters;
 mod refusals;
 mod samples;
 mod streams;

@@ -106,6 +106,12 @@ impl Tracer {
         }
     }
 
+    /// Takes `to` for the place where it is, without a step.
+    pub(super) fn jump(&mut self, to: Vector3<f64>) {
+        self.position = to;
+        self.tool = self.drawn(to);
+    }
+
     /// G1 to `to`.
     pub(super) fn line(&mut self, to: Vector3<f64>, feed: Feed) {
         self.count((to - self.position).norm(), feed);

@@ -8,7 +8,7 @@ use super::{Interpreter, Modal, Remark, claim, place};
 use crate::job::gcode::arc::{Arc, Form, NoArc, axes, rounding};
 use crate::job::gcode::block::Block;
 use crate::job::gcode::codes::{Chosen, Motion, Plane, Reference};
-use crate::job::gcode::error::Refusal;
+use crate::job::gcode::error::{Needs, Refusal};
 
 /// Most turns of one arc.
 const MOST_TURNS: f64 = 10_000.0;
@@ -29,11 +29,18 @@ impl Interpreter {
         let start = self.tracer.arc_start();
         let refuse = |fault: NoArc| {
             let (message, help) = fault.explain();
-            Refusal::new(place, message, "this arc", help)
+            Refusal::new(place, message, "this arc", help).needing(Needs::Place)
         };
         let Modal { plane, unit, .. } = self.modal;
-        let arc = Arc::new(plane, counterclockwise, start, to, form, turns, rounding(unit))
-            .map_err(refuse)?;
+        let arc = Arc::new(plane, counterclockwise, start, to, form, turns, rounding(unit));
+        let arc = match arc {
+            Ok(arc) => arc,
+            Err(fault) => {
+                // What follows is read from where the arc should have ended.
+                self.tracer.jump(to);
+                return Err(refuse(fault));
+            }
+        };
         self.note_height(to);
         if self.modal.plane != Plane::Xy && self.z == ZMeaning::Ignored {
             self.remark(Remark::Height);
@@ -69,7 +76,8 @@ impl Interpreter {
                 format!(
                     "this plane's centre is {first} and {second}; G17 is XY, G18 is ZX, G19 is YZ"
                 ),
-            ));
+            )
+            .needing(Needs::Motion));
         }
         let absolute = self.modal.arc_distance == Reference::Absolute;
         let mut centre = self.tracer.position;
@@ -91,7 +99,8 @@ impl Interpreter {
                 "the arc has no centre",
                 "no centre or radius",
                 format!("an arc in this plane needs {first} {wanted} {second}, or R"),
-            ));
+            )
+            .needing(Needs::Motion));
         }
         Ok(Form::Centre(centre))
     }

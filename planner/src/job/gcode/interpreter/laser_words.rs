@@ -9,7 +9,7 @@ use super::{AIR_ASSIST, Interpreter, Remark, claim};
 use crate::drawing::{Action, Power};
 use crate::job::gcode::block::Block;
 use crate::job::gcode::codes::{Laser, Motion, Once};
-use crate::job::gcode::error::Refusal;
+use crate::job::gcode::error::{Needs, Refusal};
 use crate::job::gcode::tracer::{Feed, Pace};
 
 /// The output bit of digital output 0.
@@ -114,7 +114,8 @@ impl Interpreter {
                 "a cluster of powers needs a G1 move on its line",
                 "cluster",
                 "G1 X10 S1:2:3 marks three equal parts of the line with these powers",
-            ));
+            )
+            .needing(Needs::Motion));
         }
         if let Some((_, span)) = block.cluster.get(MOST_PARTS - 1) {
             return Err(Refusal::new(

@@ -59,9 +59,10 @@ fn codes_that_are_not_there() {
     check("M67 E0 Q1 G64 P1", 1, 8, "two codes of this line use Q", "lines of their own");
     check("G0 X1 Q5", 1, 7, "nothing on this line uses Q", "M67");
     check("D1", 1, 1, "D words are not supported", "words begin with");
-    check("o100 sub", 1, 1, "O words", "write the moves out");
-    check("G0 X#5", 1, 5, "parameters (#)", "decimal number");
-    check("G0 X[1]", 1, 5, "expressions", "decimal number");
+    check("o100 subb", 1, 1, "subb is no O word", "o100 sub");
+    check("M99", 1, 1, "M99 in the main program", "M30");
+    check("M98 P7\nM30\nO8\nM99", 1, 1, "there is no program O7", "O1000");
+    check("G0 X#<a>", 1, 5, "#<a> has no value", "[#1 * 2]");
 }
 
 #[test]
@@ -125,14 +126,39 @@ fn what_is_not_supported_is_found_at_once() {
     let found =
         all("G21 G90 G51\nT1 M66\nG43.2 H1 Z5\nM50\nG0 X10\nM3 S500\nM66\nG1 X2\nM19\nM2\nM20");
     let unsupported = |line, code| (line, format!("{code} is not supported"));
-    let expected = [(1, "G51"), (2, "M66"), (3, "G43.2"), (4, "M50"), (9, "M19")];
-    assert_eq!(found, expected.map(|(line, code)| unsupported(line, code)));
-    // The feed that is missing below follows from the line that was refused, the marks that are no
-    // words say nothing more, and the program ends with its tape mark.
+    let feed = (8, "the move has no feed rate".to_owned());
+    let expected = [
+        unsupported(1, "G51"),
+        unsupported(2, "M66"),
+        unsupported(3, "G43.2"),
+        unsupported(4, "M50"),
+        feed,
+        unsupported(9, "M19"),
+    ];
+    assert_eq!(found, expected);
+    // The program ends with its tape mark, and the feed of the refused line holds.
     let found = all("%\nF600 M66\nG1 X1\nX\u{2212}5\nM50\n%\nM19");
-    assert_eq!(found, [unsupported(2, "M66"), unsupported(5, "M50")]);
+    let dash = (4, "X has no number, but minus sign (U+2212)".to_owned());
+    assert_eq!(found, [unsupported(2, "M66"), dash, unsupported(5, "M50")]);
     let many: String = (200..300).map(|code| format!("M{code}\n")).collect();
-    assert_eq!(all(&many).len(), 10);
+    assert_eq!(all(&many).len(), 20);
+    let last = refused(&many).others.pop().unwrap();
+    assert!(last.help.ends_with("\n80 more lines are refused, not shown"), "{}", last.help);
+}
+
+#[test]
+fn one_error_makes_no_others() {
+    let count = |text: &str| all(text).into_iter().map(|error| error.0).collect::<Vec<_>>();
+    // No feed, no motion and no place after a line that could not be read.
+    assert_eq!(count("G1 X1,5 F600\nX2\nG2 X3 I1\nY5\nM66\nM66"), [1, 5]);
+    assert_eq!(count("G81 X1 R2\nX3\nX4\nG1 Y5\nS2000"), [1, 4, 5]);
+    assert_eq!(count("F600 G0 X1 S2000\nX2\nG1 X3\nG2 X9 R1\nG0 X0 Y0\nG2 X9 R1"), [1, 6]);
+    // Two arcs that do not fit are two errors, and the end of one is the start of the next.
+    assert_eq!(count("F600 G2 X9 I1\nG3 X10 I1\nG3 X12 I1"), [1, 2]);
+    // A missing feed is one.
+    assert_eq!(count("G1 X1\nX2\nX3\nM66"), [1, 4]);
+    // A subroutine that fails leaves open what comes next.
+    assert_eq!(count("o1 sub\nG0 X#<a>\nM66\no1 endsub\no1 call\nG0 X#<a>\nM50"), [2, 3, 7]);
 }
 
 #[test]
