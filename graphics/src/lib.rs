@@ -27,6 +27,7 @@ pub mod read;
 pub mod shape;
 #[cfg(feature = "svg")]
 pub mod svg;
+pub mod text;
 
 pub use error::ReadError;
 pub use shape::{
