@@ -19,6 +19,7 @@ use roxmltree::{Document, Node};
 
 use crate::ReadError;
 use crate::read::arcs::circular;
+use crate::read::is_finite;
 use crate::read::notes::Notes;
 use crate::read::pen::{Budget, Pen};
 use crate::read::xml::{self, Lines, number};
@@ -215,8 +216,7 @@ impl Project<'_> {
             false => recipes.into_iter().map(Some).collect(),
         };
         let contours: Vec<Contour> = contours.iter().map(|it| it.transformed(by)).collect();
-        let is_finite = crate::read::bounds(&contours).is_some_and(|all| all.is_finite());
-        if !is_finite {
+        if contours.is_empty() || !contours.iter().all(is_finite) {
             return Ok(());
         }
         for recipe in choices {

@@ -2,7 +2,6 @@
 
 #[cfg_attr(not(all(feature = "svg", feature = "dxf", feature = "lightburn")), allow(dead_code))]
 pub(crate) mod arcs;
-pub(crate) mod bounds;
 #[cfg(feature = "dxf")]
 pub(crate) mod join;
 mod kind;
@@ -21,8 +20,9 @@ use std::io::Read as _;
 use std::path::Path;
 
 use crate::ReadError;
-use crate::shape::{FileNote, Graphic};
-pub(crate) use bounds::bounds;
+use kurbo::Rect;
+
+use crate::shape::{Contour, FileNote, Graphic, Segment};
 use kind::Kind;
 #[cfg(any(feature = "svg", feature = "dxf", feature = "lightburn"))]
 pub(crate) use text::text;
@@ -92,6 +92,27 @@ fn unknown(extension: &str) -> ReadError {
         extension => format!("the file, .{extension}, is no drawing that is known"),
     };
     ReadError::new(message, "give an SVG, DXF, LightBurn (.lbrn2, .lbrn) or HPGL (.plt) file")
+}
+
+/// The smallest upright rectangle around contours [m]; `None` around none.
+pub(crate) fn bounds(contours: &[Contour]) -> Option<Rect> {
+    contours.iter().map(Contour::bounds).reduce(|one, other| one.union(other))
+}
+
+/// Whether all numbers of a contour are finite: products of large ones in a file may not be.
+pub(crate) fn is_finite(contour: &Contour) -> bool {
+    let is_finite = |segment: &Segment| match *segment {
+        Segment::Line(end) => end.is_finite(),
+        Segment::Cubic(first, second, end) => {
+            first.is_finite() && second.is_finite() && end.is_finite()
+        }
+        Segment::Arc(arc) => {
+            let (start, sweep) = (arc.start.is_finite(), arc.sweep.is_finite());
+            let axes = arc.major.is_finite() && arc.minor.is_finite();
+            start && sweep && axes && arc.centre.is_finite()
+        }
+    };
+    contour.start.is_finite() && contour.segments.iter().all(is_finite)
 }
 
 pub(crate) fn too_large() -> ReadError {

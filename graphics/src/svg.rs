@@ -23,7 +23,7 @@ use crate::ReadError;
 use crate::read::notes::Notes;
 use crate::read::pen::{Budget, Pen};
 use crate::read::xml::{self, Lines};
-use crate::read::{MOST_BYTES, bounds};
+use crate::read::{MOST_BYTES, bounds, is_finite};
 use crate::shape::{Colour, Contour, Fill, FillRule, Graphic, Segment, Shape};
 use path::Drawn;
 use source::Source;
@@ -426,19 +426,6 @@ fn upright(contours: &[Contour]) -> Option<Rect> {
 
 fn same(one: f64, other: f64) -> bool {
     (one - other).abs() <= CLIPPED
-}
-
-fn is_finite(contour: &Contour) -> bool {
-    let segment = |segment: &Segment| match *segment {
-        Segment::Line(end) => end.is_finite(),
-        Segment::Cubic(first, second, end) => {
-            first.is_finite() && second.is_finite() && end.is_finite()
-        }
-        Segment::Arc(arc) => {
-            arc.centre.is_finite() && arc.major.is_finite() && arc.minor.is_finite()
-        }
-    };
-    contour.start.is_finite() && contour.segments.iter().all(segment)
 }
 
 fn affine(by: usvg::Transform) -> Affine {

@@ -13,10 +13,10 @@ use super::frame::{Frame, cross};
 use super::record::Record;
 use super::spline::{Spline, through};
 use crate::ReadError;
-use crate::read::MOST_DEPTH;
 use crate::read::arcs::{bulged, circular};
 use crate::read::notes::Notes;
 use crate::read::pen::{Budget, Pen};
+use crate::read::{MOST_DEPTH, is_finite};
 use crate::shape::{Arc, Colour, Contour};
 
 /// The contours of all objects that are seen.
@@ -122,7 +122,7 @@ impl<'p, 'a> Drawing<'_, 'p, 'a> {
         if !contours.is_empty() && (by_layer || is_dashed(type_name)) {
             self.notes.add("a dashed line is drawn without gaps", line);
         }
-        for contour in contours.into_iter().filter(is_drawable) {
+        for contour in contours.into_iter().filter(is_finite) {
             self.pieces.push(Piece { contour, layer: Shared::clone(&layer), colour, line });
         }
         Ok(())
@@ -392,11 +392,6 @@ fn draw_bulged(
         pen.close_here();
     }
     Some(())
-}
-
-fn is_drawable(contour: &Contour) -> bool {
-    let all = crate::read::bounds(core::slice::from_ref(contour));
-    all.is_some_and(|all| all.is_finite())
 }
 
 fn kind_name(kind: &str) -> String {

@@ -10,6 +10,7 @@ use messages::math;
 use super::commands::Command;
 use crate::ReadError;
 use crate::read::arcs::circular;
+use crate::read::is_finite;
 use crate::read::notes::Notes;
 use crate::read::pen::{Budget, Pen};
 use crate::shape::{Arc, Colour, Contour, Fill, FillRule, Segment, Shape};
@@ -172,10 +173,7 @@ impl Plotter {
             .into_iter()
             .map(closed)
             .map(|contour| contour.transformed(Affine::scale(UNIT)))
-            .filter(|contour| {
-                let all = crate::read::bounds(core::slice::from_ref(contour));
-                all.is_some_and(|all| all.is_finite())
-            })
+            .filter(is_finite)
             .collect();
         if let Some(polygon) = &mut self.polygon {
             polygon.extend(contours);

@@ -1,6 +1,6 @@
 //! Arcs by what files give of them.
 
-use core::f64::consts::{PI, TAU};
+use core::f64::consts::TAU;
 
 use kurbo::{Point, Vec2};
 use messages::math;
@@ -80,9 +80,10 @@ pub(crate) fn between(from: Point, to: Point, given: EndpointArc) -> Option<Arc>
 }
 
 /// Whether an angle [rad] is on an arc.
+#[cfg(test)]
 pub(crate) fn holds(arc: &Arc, angle: f64) -> bool {
     let forward = (angle - arc.start) * arc.sweep.signum();
-    forward.rem_euclid(TAU) <= arc.sweep.abs() + PI * 1e-12
+    forward.rem_euclid(TAU) <= arc.sweep.abs() + TAU * 1e-12
 }
 
 #[cfg(test)]
