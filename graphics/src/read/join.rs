@@ -1,6 +1,6 @@
 //! Contours of pieces that touch end to end.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 
 use kurbo::{Affine, Point, Vec2};
 
@@ -8,6 +8,9 @@ use crate::shape::{Arc, Contour, Segment};
 
 /// How far apart two ends may be to be one place [m].
 pub(crate) const TOUCHING: f64 = 1e-6;
+
+/// How many ends within some µm are tried: a heap of more of them stays apart.
+const MOST_LOOKED_AT: usize = 1000;
 
 /// Joins open contours whose ends touch, each turned as it fits, and closes them where they close. Contours
 /// stay in the order of their first piece; with each comes the index of that piece.
@@ -22,11 +25,11 @@ pub(crate) fn join(contours: Vec<Contour>) -> Vec<(usize, Contour)> {
     for first in 0..pieces.len() {
         let Some(mut contour) = pieces[first].take() else { continue };
         if is_open(&contour) {
-            extend(&mut contour, &mut pieces, &ends);
+            extend(&mut contour, &mut pieces, &mut ends);
             if is_open(&contour) {
                 // What comes before the first piece.
                 let mut turned = reversed(&contour);
-                extend(&mut turned, &mut pieces, &ends);
+                extend(&mut turned, &mut pieces, &mut ends);
                 contour = reversed(&turned);
             }
         }
@@ -44,7 +47,7 @@ fn touch(one: Point, other: Point) -> bool {
 }
 
 /// Puts pieces at the end of a contour until none fits, or it is back at its start.
-fn extend(contour: &mut Contour, pieces: &mut [Option<Contour>], ends: &Ends) {
+fn extend(contour: &mut Contour, pieces: &mut [Option<Contour>], ends: &mut Ends) {
     loop {
         let at = contour.end();
         if touch(at, contour.start) && length_exceeds(contour) {
@@ -55,8 +58,7 @@ fn extend(contour: &mut Contour, pieces: &mut [Option<Contour>], ends: &Ends) {
             }
             return;
         }
-        let next = ends.near(at).find(|&(index, _)| pieces[index].is_some());
-        let Some((index, is_end)) = next else { return };
+        let Some((index, is_end)) = ends.near(at, pieces) else { return };
         let Some(piece) = pieces[index].take() else { return };
         let piece = if is_end { reversed(&piece) } else { piece };
         let mut segments = piece.segments.into_iter();
@@ -143,7 +145,7 @@ type End = (usize, bool);
 /// The ends of contours by place.
 #[derive(Debug, Default)]
 struct Ends {
-    cells: HashMap<(i64, i64), Vec<(Point, End)>>,
+    cells: HashMap<(i64, i64), VecDeque<(Point, End)>>,
 }
 
 impl Ends {
@@ -152,19 +154,28 @@ impl Ends {
     }
 
     fn add(&mut self, at: Point, end: End) {
-        self.cells.entry(Self::cell(at)).or_default().push((at, end));
+        self.cells.entry(Self::cell(at)).or_default().push_back((at, end));
     }
 
-    /// The ends that touch a place, those in the same cell first.
-    fn near(&self, at: Point) -> impl Iterator<Item = End> {
-        let cells =
-            [0, 1, -1].into_iter().flat_map(|x| [0, 1, -1].map(|y| Vec2::new(x.into(), y.into())));
-        let cells = cells.map(move |step| Self::cell(at + step * (2.0 * TOUCHING)));
-        cells
-            .filter_map(|cell| self.cells.get(&cell))
-            .flatten()
-            .filter(move |(place, _)| touch(*place, at))
-            .map(|&(_, end)| end)
+    /// An end of an unused piece that touches a place, the first one in the same cell before others.
+    fn near(&mut self, at: Point, pieces: &[Option<Contour>]) -> Option<End> {
+        for x in [0.0, 1.0, -1.0] {
+            for y in [0.0, 1.0, -1.0] {
+                let cell = Self::cell(at + Vec2::new(x, y) * (2.0 * TOUCHING));
+                let Some(ends) = self.cells.get_mut(&cell) else { continue };
+                // So that thousands of lines from one point do not pass over all used ones each time.
+                while ends.front().is_some_and(|&(_, (index, _))| pieces[index].is_none()) {
+                    ends.pop_front();
+                }
+                let mut looked_at = ends.iter().take(MOST_LOOKED_AT);
+                let found = looked_at
+                    .find(|(place, (index, _))| touch(*place, at) && pieces[*index].is_some());
+                if let Some(&(_, end)) = found {
+                    return Some(end);
+                }
+            }
+        }
+        None
     }
 }
 
@@ -236,6 +247,15 @@ mod tests {
             at = segment.end();
         }
         assert!((at - contour.start).hypot() < 1e-12);
+    }
+
+    #[test]
+    fn a_star_of_many_lines_is_joined_in_pairs() {
+        let rays = 100_000;
+        let ray = |number: u32| line((0.0, 0.0), (1.0, f64::from(number)));
+        let joined = join((0..rays).map(ray).collect());
+        assert_eq!(joined.len(), rays as usize / 2);
+        assert!(joined.iter().all(|(_, contour)| contour.segments.len() == 2));
     }
 
     #[test]
