@@ -25,6 +25,7 @@ pub mod hpgl;
 pub mod lightburn;
 pub mod read;
 pub mod shape;
+pub mod single_line;
 #[cfg(feature = "svg")]
 pub mod svg;
 pub mod text;

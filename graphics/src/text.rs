@@ -1,4 +1,4 @@
-//! Text as curves: by an outline font, or by single strokes.
+//! Text as curves: by an outline font, or by [single strokes](crate::single_line).
 
 #[cfg(feature = "text")]
 mod font;
