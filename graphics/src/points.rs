@@ -47,7 +47,8 @@ impl PropertyAccess for Vertex {
 /// What is no PLY file, has no `vertex` with `x`, `y` and `z`, or more than [`MOST_POINTS`] of them.
 pub fn ply(bytes: &[u8]) -> Result<Vec<[f64; 3]>, ReadError> {
     const HELP: &str = "give a PLY file whose `vertex` elements have x, y and z";
-    let unreadable = |error: ply_rs_bw::parser::ParseError| ReadError::new(first_line(&error.to_string()), HELP);
+    let unreadable =
+        |error: ply_rs_bw::parser::ParseError| ReadError::new(first_line(&error.to_string()), HELP);
     let parser = Parser::<Vertex>::new();
     let mut reader = Reader::new(Cursor::new(bytes));
     let header = parser.read_header(&mut reader).map_err(unreadable)?;
@@ -60,9 +61,8 @@ pub fn ply(bytes: &[u8]) -> Result<Vec<[f64; 3]>, ReadError> {
             let text = format!("the element `{name}` has no property");
             return Err(ReadError::new(text, HELP));
         }
-        let vertices = parser
-            .read_payload_for_element(&mut reader, element, &header)
-            .map_err(unreadable)?;
+        let vertices =
+            parser.read_payload_for_element(&mut reader, element, &header).map_err(unreadable)?;
         if name != "vertex" {
             continue;
         }

@@ -3,6 +3,7 @@
 mod cartesian;
 mod corexy;
 mod five_bar;
+mod gantry;
 mod mcm;
 mod parts;
 mod polar;
@@ -22,6 +23,8 @@ pub enum Kind {
     Cartesian,
     /// Three screws: the third lifts the head.
     CartesianLift,
+    /// Two belts, and a screw that lifts the head.
+    Gantry,
     /// Two crossed belts.
     CoreXy,
     /// Two arms with two forearms.
@@ -42,9 +45,10 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Cartesian,
         Self::CartesianLift,
+        Self::Gantry,
         Self::CoreXy,
         Self::FiveBar,
         Self::Prrrp,
@@ -60,6 +64,7 @@ impl Kind {
         match self {
             Self::Cartesian => "cartesian",
             Self::CartesianLift => "cartesian_lift",
+            Self::Gantry => "gantry",
             Self::CoreXy => "corexy",
             Self::FiveBar => "five_bar",
             Self::Prrrp => "prrrp",
@@ -76,6 +81,7 @@ impl Kind {
         match self {
             Self::Cartesian => "Cartesian",
             Self::CartesianLift => "Cartesian with lift",
+            Self::Gantry => "Gantry",
             Self::CoreXy => "CoreXY",
             Self::FiveBar => "Five-bar",
             Self::Prrrp => "PRRRP",
@@ -91,7 +97,12 @@ impl Kind {
     pub fn has_z(self) -> bool {
         matches!(
             self,
-            Self::CartesianLift | Self::Polar | Self::TriPlanar | Self::Mcm | Self::Serial
+            Self::CartesianLift
+                | Self::Gantry
+                | Self::Polar
+                | Self::TriPlanar
+                | Self::Mcm
+                | Self::Serial
         )
     }
 
@@ -114,6 +125,7 @@ impl Kind {
             Self::FiveBar => [0.16, 0.12],
             Self::Prrrp => [0.14, 0.2],
             Self::TwinActuator => [0.12, 0.1],
+            Self::Gantry => [0.6, 0.4],
             Self::TriPlanar => [0.16, 0.16],
             _ => [0.2, 0.2],
         }
@@ -125,7 +137,7 @@ impl Kind {
             Self::Cartesian | Self::CartesianLift | Self::CoreXy | Self::FiveBar | Self::Prrrp => {
                 [0.25, 10.0]
             }
-            Self::Serial => [0.2, 5.0],
+            Self::Serial | Self::Gantry => [0.2, 5.0],
             Self::Polar => [0.1, 2.0],
             Self::Mcm => [0.1, 1.0],
             Self::TriPlanar => [0.05, 0.5],
@@ -138,6 +150,7 @@ impl Kind {
 pub(super) fn draft(request: &Request, asked: &Asked) -> Result<Draft, Short> {
     match request.kind {
         Kind::Cartesian | Kind::CartesianLift => cartesian::draft(request, asked),
+        Kind::Gantry => gantry::draft(request, asked),
         Kind::CoreXy => Ok(corexy::draft(request, asked)),
         Kind::FiveBar => Ok(five_bar::draft(request, asked)),
         Kind::Prrrp => Ok(prrrp::draft(request, asked)),
