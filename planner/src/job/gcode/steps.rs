@@ -199,7 +199,7 @@ impl<R: Read> Steps<R> {
                 }
                 Token::Delete => return Ok(Gathered::Deleted),
                 Token::Tape(at) => {
-                    if !block.begun && words.next().map_err(Fault::Illegible)?.is_none() {
+                    if !block.begun && matches!(words.next(), Ok(None)) {
                         return Ok(Gathered::Mark);
                     }
                     return Err(Fault::Illegible(Refusal::new(

@@ -59,6 +59,7 @@ fn codes_that_are_not_there() {
     check("M67 E0 Q1 G64 P1", 1, 8, "two codes of this line use Q", "lines of their own");
     check("G0 X1 Q5", 1, 7, "nothing on this line uses Q", "M67");
     check("D1", 1, 1, "D words are not supported", "words begin with");
+    check("G0 X1\n% tape note", 2, 1, "% is not alone on its line", "begins or ends");
     check("o100 subb", 1, 1, "subb is no O word", "o100 sub");
     check("M99", 1, 1, "M99 in the main program", "M30");
     check("M98 P7\nM30\nO8\nM99", 1, 1, "there is no program O7", "O1000");
