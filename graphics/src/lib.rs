@@ -7,22 +7,22 @@
 #[cfg(feature = "codes")]
 pub mod code;
 mod curve;
+pub mod dither;
 #[cfg(feature = "dxf")]
 pub mod dxf;
-pub mod dither;
 mod error;
 mod extent;
 pub mod hatch;
+pub mod hpgl;
 #[cfg(feature = "image")]
 pub mod image;
+#[cfg(feature = "lightburn")]
+pub mod lightburn;
 pub mod offset;
 pub mod order;
 pub mod points;
 #[cfg(test)]
 mod random;
-pub mod hpgl;
-#[cfg(feature = "lightburn")]
-pub mod lightburn;
 pub mod read;
 pub mod shape;
 pub mod single_line;

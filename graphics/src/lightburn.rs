@@ -13,12 +13,14 @@ use std::rc::Rc;
 
 use core::f64::consts::{FRAC_PI_2, TAU};
 
+use base64::Engine as _;
 use kurbo::{Affine, Point, Vec2};
 use messages::math;
 use roxmltree::{Document, Node};
 
 use crate::ReadError;
 use crate::read::arcs::circular;
+use crate::read::images::{Images, Placed};
 use crate::read::is_finite;
 use crate::read::notes::Notes;
 use crate::read::pen::{Budget, Pen};
@@ -55,6 +57,7 @@ pub fn read(bytes: &[u8]) -> Result<Graphic, ReadError> {
         notes: Notes::default(),
         budget: Budget::default(),
         shapes: Vec::new(),
+        images: Images::default(),
     };
     let is_mirrored =
         |name| root.attribute(name).is_some_and(|value| value == "True" || value == "1");
@@ -71,6 +74,7 @@ pub fn read(bytes: &[u8]) -> Result<Graphic, ReadError> {
     }
     Ok(Graphic {
         shapes: project.shapes,
+        images: project.images.all,
         recipes: project.recipes.all,
         notes: project.notes.finish(),
         ..Graphic::default()
@@ -138,6 +142,7 @@ struct Project<'l> {
     notes: Notes,
     budget: Budget,
     shapes: Vec<Shape>,
+    images: Images,
 }
 
 impl Project<'_> {
@@ -185,7 +190,7 @@ impl Project<'_> {
                 polygon(node).map(|contours| (contours, by))
             }
             "Bitmap" => {
-                self.notes.add("an image is left out", line);
+                self.image(node, by, line);
                 return Ok(());
             }
             kind => {
@@ -200,6 +205,27 @@ impl Project<'_> {
         };
         let layer = node.attribute("CutIndex").and_then(|index| index.trim().parse().ok());
         self.add(contours, by, layer.unwrap_or(0), line)
+    }
+
+    /// An image about its middle.
+    fn image(&mut self, node: Node<'_, '_>, by: Affine, line: u64) {
+        let size = number(node, "W").zip(number(node, "H"));
+        let data = node.attribute("Data").unwrap_or("");
+        let data: String = data.split_ascii_whitespace().collect();
+        let file = base64::engine::general_purpose::STANDARD.decode(data).ok();
+        let (Some((width, height)), Some(file)) = (size, file) else {
+            self.notes.add("an image whose size or data is at fault is left out", line);
+            return;
+        };
+        let square = Affine::new([width, 0.0, 0.0, height, -width / 2.0, -height / 2.0]);
+        let layer = node.attribute("CutIndex").and_then(|index| index.trim().parse().ok());
+        let layer = layer.unwrap_or(0);
+        let placed = Placed {
+            layer: Some(self.recipes.name(layer).into()),
+            recipe: self.recipes.of(layer, true).first().copied(),
+            line,
+        };
+        self.images.add(&file, by * square, placed, &mut self.notes);
     }
 
     /// One shape for each recipe of its layer.

@@ -2,6 +2,8 @@
 
 #[cfg_attr(not(all(feature = "svg", feature = "dxf", feature = "lightburn")), allow(dead_code))]
 pub(crate) mod arcs;
+#[cfg(any(feature = "svg", feature = "lightburn"))]
+pub(crate) mod images;
 #[cfg(feature = "dxf")]
 pub(crate) mod join;
 mod kind;
@@ -91,7 +93,10 @@ fn unknown(extension: &str) -> ReadError {
         "" => "the file is no drawing that is known".to_owned(),
         extension => format!("the file, .{extension}, is no drawing that is known"),
     };
-    ReadError::new(message, "give an SVG, DXF, LightBurn (.lbrn2, .lbrn) or HPGL (.plt) file")
+    ReadError::new(
+        message,
+        "give an SVG, DXF, LightBurn (.lbrn2, .lbrn) or HPGL (.plt) file, or an image",
+    )
 }
 
 /// The smallest upright rectangle around contours [m]; `None` around none.
@@ -167,7 +172,7 @@ mod tests {
             (b"%!PS-Adobe-3.0 EPSF-3.0", "PostScript"),
             (b"AC1032\0\0", "DWG"),
             (b"PK\x03\x04", "zip"),
-            (b"\x89PNG\r\n\x1a\n", "image"),
+            (b"\x89PNG\r\n\x1a\n", "PNG"),
         ] {
             let error = read(bytes, "svg").expect_err("another format");
             assert!(error.message.contains(name), "{error}");

@@ -20,11 +20,12 @@ use usvg::fontdb::Database;
 use usvg::tiny_skia_path::PathSegment;
 
 use crate::ReadError;
+use crate::read::images::{Images, Placed};
 use crate::read::notes::Notes;
 use crate::read::pen::{Budget, Pen};
 use crate::read::xml::{self, Lines};
 use crate::read::{MOST_BYTES, bounds, is_finite};
-use crate::shape::{Colour, Contour, Fill, FillRule, Graphic, Segment, Shape};
+use crate::shape::{Colour, Contour, Fill, FillRule, Graphic, Raster, Segment, Shape};
 use path::Drawn;
 use source::Source;
 
@@ -90,32 +91,33 @@ fn read_text(text: &str) -> Result<Graphic, ReadError> {
         notes: &mut notes,
         budget: Budget::default(),
         shapes: Vec::new(),
+        images: Images::default(),
         known: has_clones.then(HashMap::new),
     };
     let to_metres = Affine::new([PIXEL, 0.0, 0.0, -PIXEL, 0.0, height * PIXEL]);
     walk.group(tree.root(), to_metres, &Place::default())?;
-    let mut shapes = walk.shapes;
+    let (mut shapes, mut images) = (walk.shapes, walk.images.all);
     source.name_left_out(&mut notes);
     let page = page.then(|| Rect::new(0.0, 0.0, width * PIXEL, height * PIXEL));
     if page.is_none() {
-        shapes = from_lowest(shapes);
+        let all = Graphic { shapes, images, ..Graphic::default() };
+        (shapes, images) = from_lowest(all);
     }
-    Ok(Graphic { shapes, page, notes: notes.finish(), ..Graphic::default() })
+    Ok(Graphic { shapes, images, page, notes: notes.finish(), ..Graphic::default() })
 }
 
-/// Shapes without a page, their lowest point at 0.
-fn from_lowest(shapes: Vec<Shape>) -> Vec<Shape> {
-    let lowest = shapes.iter().filter_map(|shape| bounds(&shape.contours)).map(|all| all.y0);
-    let lowest = lowest.fold(f64::INFINITY, f64::min);
-    if !lowest.is_finite() {
-        return shapes;
-    }
+/// Shapes and images without a page, their lowest point at 0.
+fn from_lowest(all: Graphic) -> (Vec<Shape>, Vec<Raster>) {
+    let Some(lowest) = all.bounds().map(|all| all.y0).filter(|lowest| lowest.is_finite()) else {
+        return (all.shapes, all.images);
+    };
     let by = Affine::translate((0.0, -lowest));
-    let moved = |shape: Shape| Shape {
+    let shape = |shape: Shape| Shape {
         contours: shape.contours.iter().map(|contour| contour.transformed(by)).collect(),
         ..shape
     };
-    shapes.into_iter().map(moved).collect()
+    let image = |image: Raster| Raster { placement: by * image.placement, ..image };
+    (all.shapes.into_iter().map(shape).collect(), all.images.into_iter().map(image).collect())
 }
 
 fn has_element(document: &Document<'_>, name: &str) -> bool {
@@ -140,7 +142,13 @@ fn resolve(text: &str, has_text: bool, notes: &mut Notes) -> Result<usvg::Tree, 
     let mut options = usvg::Options {
         style_sheet: Some(STYLE.to_owned()),
         image_href_resolver: usvg::ImageHrefResolver {
-            resolve_data: Box::new(|_, _, _| None),
+            resolve_data: Box::new(|kind, data, _| match kind {
+                "image/png" => Some(usvg::ImageKind::PNG(data)),
+                "image/jpeg" | "image/jpg" => Some(usvg::ImageKind::JPEG(data)),
+                "image/gif" => Some(usvg::ImageKind::GIF(data)),
+                "image/webp" => Some(usvg::ImageKind::WEBP(data)),
+                _ => None,
+            }),
             resolve_string: Box::new(|_, _| None),
         },
         ..usvg::Options::default()
@@ -203,6 +211,7 @@ struct Walk<'s, 'a, 'input> {
     notes: &'s mut Notes,
     budget: Budget,
     shapes: Vec<Shape>,
+    images: Images,
     /// Path data by number, where it may be drawn several times.
     known: Option<HashMap<usize, Rc<Drawn>>>,
 }
@@ -226,13 +235,31 @@ impl Walk<'_, '_, '_> {
                     let place = Place { line, is_text: true, ..place.clone() };
                     self.group(text.flattened(), by, &place)?;
                 }
-                usvg::Node::Image(_) => {}
+                usvg::Node::Image(image) => self.image(image, by, &place),
             }
         }
         if let Some(clip) = group.clip_path() {
             self.clip(clip, by, first)?;
         }
         Ok(())
+    }
+
+    fn image(&mut self, image: &usvg::Image, by: Affine, place: &Place) {
+        let (usvg::ImageKind::PNG(file)
+        | usvg::ImageKind::JPEG(file)
+        | usvg::ImageKind::GIF(file)
+        | usvg::ImageKind::WEBP(file)) = image.kind()
+        else {
+            return;
+        };
+        if place.is_invisible || !image.is_visible() {
+            self.notes.add("what is hidden (visibility or opacity) is left out", place.line);
+            return;
+        }
+        let (width, height) = (f64::from(image.size().width()), f64::from(image.size().height()));
+        let square = Affine::new([width, 0.0, 0.0, -height, 0.0, height]);
+        let placed = Placed { layer: place.layer.clone(), recipe: None, line: place.line };
+        self.images.add(file, by * square, placed, self.notes);
     }
 
     fn place(&mut self, group: &usvg::Group, place: &Place) -> Place {

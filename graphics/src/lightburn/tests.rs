@@ -124,6 +124,23 @@ fn text_has_the_place_of_its_outline_or_its_own() {
     assert!(notes(&graphic)[0].contains("text without an outline"));
 }
 
+#[cfg(feature = "image")]
+#[test]
+fn an_image_lies_about_its_middle() {
+    let file = "iVBORw0KGgoAAAANSUhEUgAAAAQAAAACCAAAAABawyK/AAAADElEQVR4nGNg+A+FABP2A/1SO5xNAAAAAElFTkSuQmCC";
+    let content = format!(
+        "<Shape Type='Bitmap' CutIndex='4' W='40' H='20' Data='{file}'><XForm>1 0 0 1 50 60</XForm>\
+         </Shape>"
+    );
+    let graphic = project("", &content);
+    let [image] = graphic.images.as_slice() else { panic!("{graphic:?}") };
+    assert_eq!((image.columns, image.rows), (4, 2));
+    let all = image.bounds();
+    for (found, expected) in [(all.x0, 0.030), (all.x1, 0.070), (all.y0, 0.050), (all.y1, 0.070)] {
+        assert!((found - expected).abs() < 1e-12, "{all:?}");
+    }
+}
+
 #[test]
 fn shapes_share_lists_by_number() {
     let content = "<Shape Type='Path' VertID='7' PrimID='8'><XForm>1 0 0 1 0 0</XForm>\
@@ -148,6 +165,7 @@ fn a_project_from_another_corner_is_mirrored_back() {
 fn what_is_left_out_is_named() {
     for (content, note) in [
         ("<Shape Type='Bitmap' W='1' H='1' Data='AAAA'/>", "an image is left out"),
+        ("<Shape Type='Bitmap' W='1' H='1' Data='?'/>", "is at fault"),
         ("<Shape Type='Flux'/>", "of the type \"Flux\""),
         ("<Shape Type='Rect' W='-1' H='1'/>", "numbers that do not fit"),
         ("<Shape Type='Path' VertID='3'/>", "numbers that do not fit"),

@@ -13,6 +13,7 @@ pub(super) enum Kind {
     Dxf,
     LightBurn,
     Hpgl,
+    Image,
     /// Another format, by its name.
     Other(&'static str),
 }
@@ -25,6 +26,7 @@ impl Kind {
             "dxf" => Self::Dxf,
             "lbrn" | "lbrn2" => Self::LightBurn,
             "plt" | "hpgl" | "hpg" | "hgl" => Self::Hpgl,
+            "png" | "jpg" | "jpeg" | "bmp" | "gif" | "webp" => Self::Image,
             _ => return None,
         })
     }
@@ -39,9 +41,11 @@ impl Kind {
             (b"\xc5\xd0\xd3\xc6", Self::Other("a PostScript document")),
             (b"AC10", Self::Other("a DWG drawing")),
             (b"PK\x03\x04", Self::Other("a zip archive")),
-            (b"\x89PNG", Self::Other("an image")),
-            (b"\xff\xd8\xff", Self::Other("an image")),
-            (b"GIF8", Self::Other("an image")),
+            (b"\x89PNG", Self::Image),
+            (b"\xff\xd8\xff", Self::Image),
+            (b"GIF8", Self::Image),
+            (b"BM", Self::Image),
+            (b"RIFF", Self::Image),
         ] {
             if bytes.starts_with(start) {
                 return Some(kind);
@@ -75,6 +79,7 @@ impl Kind {
             Self::Dxf => "a DXF drawing",
             Self::LightBurn => "a LightBurn project",
             Self::Hpgl => "an HPGL plot",
+            Self::Image => "an image",
             Self::Other(name) => name,
         }
     }
@@ -89,6 +94,8 @@ impl Kind {
             #[cfg(feature = "lightburn")]
             Self::LightBurn => crate::lightburn::read(bytes),
             Self::Hpgl => crate::hpgl::read(bytes),
+            #[cfg(feature = "image")]
+            Self::Image => crate::image::read(bytes),
             other => {
                 let message =
                     format!("the file is {}, which is not read as a drawing", other.name());

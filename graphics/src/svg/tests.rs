@@ -213,7 +213,7 @@ fn what_is_left_out_is_named() {
         ("<path d='M1 1z'/>", "without a length"),
         ("<path d='M1 1L2 2 foo' stroke='red'/>", "up to its fault"),
         ("<image width='1' height='1' href='a.png'/>", "in another file is not followed"),
-        (&format!("<image width='1' height='1' href='{png}'/>"), "embedded image is left out"),
+        (&format!("<image width='1' height='1' href='{png}'/>"), "image is left out"),
         ("<use href='other.svg#a'/>", "another file is not followed"),
         ("<foreignObject><p>text</p></foreignObject>", "foreign object"),
         ("<path d='M0 0L1 1' stroke='red' stroke-dasharray='1 2'/>", "without gaps"),
@@ -274,6 +274,25 @@ fn a_rectangular_clip_path_is_honoured_where_nothing_crosses_it() {
     let graphic = drawing(A4, &across);
     assert_eq!(graphic.shapes.len(), 1);
     assert_eq!(notes(&graphic), ["a clip path is not applied: what it hides is drawn"]);
+}
+
+#[cfg(feature = "image")]
+#[test]
+fn an_image_in_the_file_lies_where_the_file_has_it() {
+    // 4 by 2 pixels, black and white by turns from the upper left corner.
+    let file = "iVBORw0KGgoAAAANSUhEUgAAAAQAAAACCAAAAABawyK/AAAADElEQVR4nGNg+A+FABP2A/1SO5xNAAAAAElFTkSuQmCC";
+    let content = format!(
+        "<g inkscape:groupmode='layer' inkscape:label='Photo'><image x='10' y='20' width='40' \
+         height='20' href='data:image/png;base64,{file}'/></g>"
+    );
+    let graphic = drawing(A4, &content);
+    let [image] = graphic.images.as_slice() else { panic!("{graphic:?}") };
+    assert_eq!((image.columns, image.rows, image.layer.as_deref()), (4, 2, Some("Photo")));
+    assert_eq!(&image.pixels[..4], [0, 255, 0, 255]);
+    let at = |x: f64, y: f64| image.placement * Point::new(x, y);
+    assert!((at(0.0, 0.0) - Point::new(0.010, 0.297 - 0.040)).hypot() < 1e-7, "{image:?}");
+    assert!((at(4.0, 2.0) - Point::new(0.050, 0.297 - 0.020)).hypot() < 1e-7, "{image:?}");
+    assert!(notes(&graphic).is_empty());
 }
 
 #[test]
