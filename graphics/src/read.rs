@@ -44,6 +44,12 @@ pub const MOST_ELEMENTS: usize = 300_000;
 /// a thread has.
 pub const MOST_DEPTH: usize = 100;
 
+/// Extensions of files that are read here, without their dots.
+pub const EXTENSIONS: [&str; 15] = [
+    "svg", "svgz", "dxf", "lbrn2", "lbrn", "plt", "hpgl", "hpg", "hgl", "png", "jpg", "jpeg",
+    "bmp", "gif", "webp",
+];
+
 /// Reads a drawing. Its content says what it is; `extension`, of its name and without a dot, counts where the
 /// content does not, and a note is made where the two differ.
 ///

@@ -2,12 +2,15 @@
 
 pub mod cloud;
 pub mod cloud_table;
+pub mod composition;
+mod drawing_error;
 mod estimate;
 pub mod file;
 pub mod gcode;
 pub mod letters;
 pub mod path_table;
 pub mod points;
+mod whole;
 mod within_reach;
 pub mod workpiece_table;
 
@@ -18,6 +21,7 @@ use machine::{DocumentError, Machine, Override};
 
 use crate::drawing::{Drawing, Power, Step, Turns};
 use crate::light::Policy;
+pub use drawing_error::DrawingError;
 use gcode::GcodeError;
 
 /// A job, read and understood, but not planned.
@@ -37,6 +41,8 @@ pub struct Job {
     /// A program too long to be held, whose steps follow those of the drawing; `None` where the drawing
     /// has all of them, as after [`Job::read`].
     pub rest: Option<gcode::ProgramFile>,
+    /// Drawings whose steps follow those of `drawing`; `None` for other jobs.
+    pub composition: Option<composition::Composition>,
     /// Why this job can be planned but not run on a machine, if so.
     pub ideal_only: Option<&'static str>,
     /// How the joints stand before the job, load side [m or rad], on a machine that is planned by
@@ -60,6 +66,7 @@ impl Job {
             program: None,
             survey: None,
             rest: None,
+            composition: None,
             ideal_only: None,
             standing: None,
             surface: None,
@@ -130,6 +137,10 @@ pub enum JobError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Document(#[from] DocumentError),
+    /// A drawing that is not sound.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Drawing(#[from] DrawingError),
     /// A G-code program that is not sound.
     #[error(transparent)]
     #[diagnostic(transparent)]
@@ -138,6 +149,9 @@ pub enum JobError {
 
 /// Extensions of G-code programs. Another file is one too if it begins like one.
 const GCODE: [&str; 7] = ["ngc", "nc", "gcode", "tap", "gc", "cnc", "g"];
+
+/// Extensions of drawings and images.
+const DRAWINGS: [&str; 15] = graphics::read::EXTENSIONS;
 
 /// Extension of job files.
 const JOB_FILE: &str = "toml";
@@ -174,7 +188,8 @@ impl Job {
     pub fn steps(&self) -> Result<impl Iterator<Item = Result<Step, JobError>> + '_, JobError> {
         let rest = self.rest.as_ref().map(gcode::ProgramFile::steps).transpose()?;
         let rest = rest.into_iter().flatten().map(|step| step.map_err(JobError::Gcode));
-        Ok(self.drawing.steps.iter().cloned().map(Ok).chain(rest))
+        let composed = self.composition.iter().flat_map(composition::Composition::steps).map(Ok);
+        Ok(self.drawing.steps.iter().cloned().map(Ok).chain(composed).chain(rest))
     }
 
     fn read_up_to(
@@ -188,11 +203,14 @@ impl Job {
         if GCODE.contains(&extension.as_str()) {
             return file::program(path, overrides, machine, most);
         }
+        if DRAWINGS.contains(&extension.as_str()) {
+            return file::drawing(path, overrides, machine);
+        }
         if extension != JOB_FILE {
             if gcode::is_program(path) {
                 return file::program(path, overrides, machine, most);
             }
-            let known = || GCODE.into_iter().chain([JOB_FILE]);
+            let known = || GCODE.into_iter().chain([JOB_FILE]).chain(DRAWINGS);
             let help = match nearest(&extension, known()) {
                 Some(near) => format!("did you mean `.{near}`?"),
                 None => {
@@ -240,6 +258,7 @@ impl JobError {
                 path.display().to_string()
             }
             Self::Document(error) => error.file().to_owned(),
+            Self::Drawing(error) => error.path.display().to_string(),
             Self::Gcode(error) => error.file.clone(),
         }
     }
@@ -251,6 +270,7 @@ impl JobError {
             Self::Document(error) => {
                 error.line().zip(error.column()).map(|(line, column)| (line as u64, column as u64))
             }
+            Self::Drawing(error) => error.line.map(|line| (line, error.column.unwrap_or(1))),
             Self::Gcode(error) => Some((error.line, error.column)),
         }
     }

@@ -206,13 +206,32 @@ impl Cloud {
     }
 }
 
-/// Points from a table of x, y and z, separated by commas, semicolons or blanks, in metres unless the
-/// first line names a unit. Lines that begin with `#` are remarks.
+/// The points of a file with these bytes: of a PLY file, or else of a table; in units of `unit` [m], or of
+/// what the file itself says, or metres.
+///
+/// # Errors
+/// What is wrong, and what would be right.
+pub fn read(bytes: &[u8], unit: Option<f64>) -> Result<Vec<Vector3<f64>>, (String, String)> {
+    if bytes.starts_with(b"ply") {
+        let points = graphics::points::ply(bytes).map_err(|error| (error.message, error.help))?;
+        let unit = unit.unwrap_or(1.0);
+        return Ok(points.into_iter().map(|point| Vector3::from(point) * unit).collect());
+    }
+    let help = "give lines of x, y, z, and the unit in the first line".to_owned();
+    let Ok(text) = core::str::from_utf8(bytes) else {
+        return Err(("this is neither a PLY file nor a table in UTF-8".to_owned(), help));
+    };
+    parse(text, unit).map_err(|line| (format!("line {line} is no point x, y, z"), help))
+}
+
+/// Points from a table of x, y and z, separated by commas, semicolons or blanks, in units of `unit` [m], or
+/// in metres unless the first line names a unit. Numbers after the third, such as colours, are passed over;
+/// lines that begin with `#` are remarks.
 ///
 /// # Errors
 /// The line, from 1, that is no point.
-pub fn parse(text: &str) -> Result<Vec<Vector3<f64>>, usize> {
-    let mut scale = 1.0;
+pub fn parse(text: &str, unit: Option<f64>) -> Result<Vec<Vector3<f64>>, usize> {
+    let mut scale = unit.unwrap_or(1.0);
     let mut points = Vec::new();
     let mut is_first = true;
     for (index, line) in text.lines().enumerate() {
@@ -225,15 +244,18 @@ pub fn parse(text: &str) -> Result<Vec<Vector3<f64>>, usize> {
         let words: Vec<&str> = line.split(split).filter(|word| !word.is_empty()).collect();
         let numbers: Vec<f64> = words.iter().filter_map(|word| word.parse().ok()).collect();
         if remark || (is_first && numbers.is_empty()) {
-            if is_first {
-                scale = unit(line);
+            if is_first && unit.is_none() {
+                scale = unit_of(line);
             }
             is_first = false;
             continue;
         }
         is_first = false;
         match numbers[..] {
-            [x, y, z] if words.len() == 3 && [x, y, z].iter().all(|value| value.is_finite()) => {
+            [x, y, z, ..]
+                if words.len() == numbers.len()
+                    && [x, y, z].iter().all(|value| value.is_finite()) =>
+            {
                 points.push(Vector3::new(x, y, z) * scale);
             }
             _ => return Err(index + 1),
@@ -243,7 +265,7 @@ pub fn parse(text: &str) -> Result<Vec<Vector3<f64>>, usize> {
 }
 
 /// The unit that a heading names [m].
-fn unit(heading: &str) -> f64 {
+fn unit_of(heading: &str) -> f64 {
     let names = |name: &str| {
         heading
             .split(|character: char| !character.is_alphanumeric() && character != '\u{b5}')

@@ -1,25 +1,24 @@
 //! The job file's table of a cloud of points.
 
-use core::ops::RangeInclusive;
 use std::path::Path;
 
-use machine::document::{
-    Diagnostics, NonNegative, Number, Point, Positive, ProblemKind, Quantity, Range, Spanned,
-};
+use machine::document::{Diagnostics, NonNegative, Number, Point, Positive, Quantity, Spanned};
 use machine::quantity::{Angle, AngularSpeed, Duration, Length};
 use machine::{DocumentError, Machine, table};
 use messages::math;
 use nalgebra::Vector3;
 
 use super::cloud::{self, Cloud, Glass, Height};
+use super::whole::whole;
 use crate::drawing::Drawing;
 
 table! {
     /// Points inside glass, deepest first: a file of them, or a sphere of so many.
     pub struct CloudTable {
-        /// File of lines x, y, z in metres, or in the unit that its first line names, relative to
-        /// this file.
+        /// File of points, relative to this one: PLY, or lines x, y, z (CSV, XYZ).
         pub file: Option<Spanned<String>>,
+        /// What the file's numbers count; left out, the unit that its first line names, else metres.
+        pub unit: Option<Quantity<Length, Positive>>,
         /// A sample: points at random inside a sphere.
         pub sphere: Option<SphereTable>,
         /// Where the file's origin lies; its z as `z` says.
@@ -111,44 +110,22 @@ const MOST_POINTS: u64 = 10_000_000;
 /// The largest seed: what a number in TOML holds without rounding, 2⁵³.
 const LARGEST_SEED: u64 = 1 << 53;
 
-/// The whole number in `range` that the `number` of `key` is; else notes what would be right.
-fn whole<R: Range>(
-    number: &Number<R>,
-    range: RangeInclusive<u64>,
-    key: &str,
-    diagnostics: &mut Diagnostics,
-) -> Option<u64> {
-    let value = number.value;
-    if value.fract() == 0.0 && (*range.start() as f64..=*range.end() as f64).contains(&value) {
-        return Some(value as u64);
-    }
-    diagnostics.refuse(
-        ProblemKind::OutOfRange,
-        number.span,
-        format!("`{key}` cannot be {value}"),
-        Some(format!("write a whole number from {} to {}", range.start(), range.end())),
-    );
-    None
-}
-
 fn points(table: &CloudTable, folder: &Path, diagnostics: &mut Diagnostics) -> Vec<Vector3<f64>> {
     let at = table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
     match (&table.file, &table.sphere) {
         (Some(file), None) => {
             let path = folder.join(&file.value);
-            let read = std::fs::read_to_string(&path).map_err(|error| {
-                (error.to_string(), "a path is relative to the job file's folder")
-            });
-            let points = read.and_then(|text| {
-                let help = "give lines of x, y, z, and the unit in the first line";
-                cloud::parse(&text)
-                    .map_err(|line| (format!("line {line} is no point x, y, z"), help))
-            });
+            let unit = table.unit.as_ref().map(|unit| unit.value);
+            let points = std::fs::read(&path)
+                .map_err(|error| {
+                    (error.to_string(), "a path is relative to the job file's folder".to_owned())
+                })
+                .and_then(|bytes| cloud::read(&bytes, unit));
             match points {
                 Ok(points) => points.into_iter().map(|point| point + at).collect(),
                 Err((cause, help)) => {
                     let text = format!("{}: {cause}", path.display());
-                    diagnostics.contradict(file.span, text, help);
+                    diagnostics.contradict(file.span, text, &help);
                     Vec::new()
                 }
             }

@@ -18,7 +18,8 @@ impl Job {
             return survey.time;
         }
         let mut place = self.drawing.start;
-        let mut time = 0.0;
+        let composed = self.composition.as_ref();
+        let mut time = composed.map_or(0.0, |composed| composed.time(marking, limits.rapid));
         for step in &self.drawing.steps {
             time += match &step.action {
                 Action::Mark { curve, speed, .. } => {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use machine::document::{
-    Diagnostics, Document, Either, Fraction, Number, Point, Positive, Quantity, Spanned,
+    Diagnostics, Document, Either, Fraction, Named, Number, Point, Positive, Quantity, Spanned,
     schema_text,
 };
 use machine::gcode_settings::{Dialect, DialectChoices, DwellUnit, LaserMode};
@@ -12,6 +12,8 @@ use machine::{DocumentError, Machine, Override, table};
 use nalgebra::Vector3;
 
 use super::cloud_table::{self, CloudTable};
+use super::composition::tables::{DrawingTable, FrameTable, LayerTable, OrderTable};
+use super::composition::{Composed, Defaults, Part, Parts, compose};
 use super::letters::{self, Letter, Style};
 use super::path_table::{self, PathTable};
 use super::workpiece_table::{self, AttitudeTable, SurfaceTable};
@@ -21,7 +23,8 @@ use crate::drawing::{Drawing, Power, Turns};
 use crate::light::Policy;
 
 table! {
-    /// What to mark, and how: exactly one of `letters`, `points`, `path`, `cloud` and `gcode`.
+    /// What to mark, and how: exactly one of `letters`, `points`, `path`, `cloud`, `gcode`, `drawing` and
+    /// `drawings`.
     pub struct JobTable {
         /// Letters of the thesis.
         pub letters: Option<LettersTable>,
@@ -33,6 +36,16 @@ table! {
         pub cloud: Option<CloudTable>,
         /// A G-code program.
         pub gcode: Option<GcodeTable>,
+        /// A drawing: a file of a drawing program, an image, text or a code.
+        pub drawing: Option<DrawingTable>,
+        /// Several drawings, under names of their own, in order.
+        pub drawings: Option<Named<DrawingTable>>,
+        /// How the layers of drawings are marked, in the order of marking.
+        pub layers: Option<Named<LayerTable>>,
+        /// In which order drawings are marked.
+        pub order: OrderTable,
+        /// Shows where drawings lie instead of marking them.
+        pub frame: Option<FrameTable>,
         /// The surface that the drawing is put on, around the middle of its height instead of
         /// the machine's home.
         pub surface: Option<SurfaceTable>,
@@ -49,6 +62,27 @@ table! {
         /// What its words mean; what is left out, the machine file's `[gcode]` table rules.
         pub gcode: DialectTable,
         /// How to mark; what is left out, the program and the machine file rule.
+        pub marking: MarkingTable,
+    }
+}
+
+table! {
+    /// How to mark a file of a drawing program, or an image.
+    pub struct DrawingFileTable {
+        /// Where it lies.
+        pub drawing: DrawingTable,
+        /// How its layers are marked, in the order of marking.
+        pub layers: Option<Named<LayerTable>>,
+        /// In which order it is marked.
+        pub order: OrderTable,
+        /// Shows where it lies instead of marking it.
+        pub frame: Option<FrameTable>,
+        /// The surface that the drawing is put on, around the middle of its height instead of
+        /// the machine's home.
+        pub surface: Option<SurfaceTable>,
+        /// How the tool is turned, where not by the surface.
+        pub attitude: Option<AttitudeTable>,
+        /// How to mark; what is left out, the machine file's `[path]` table rules.
         pub marking: MarkingTable,
     }
 }
@@ -171,20 +205,26 @@ pub(super) fn job(
     most: u64,
 ) -> Result<Job, JobError> {
     let (table, mut diagnostics) = document.decode::<JobTable>()?;
-    let JobTable { letters, points, path, cloud, gcode, surface, attitude, marking, span: place } =
-        table;
+    let JobTable {
+        letters,
+        points,
+        path,
+        cloud,
+        gcode,
+        drawing,
+        drawings,
+        layers,
+        order,
+        frame,
+        surface,
+        attitude,
+        marking,
+        span: place,
+    } = table;
     let home = Vector3::from(machine.home);
     let surface = surface.and_then(|table| workpiece_table::surface(&table, &mut diagnostics));
-    let on_surface;
-    let machine = match surface {
-        // The machine's home is no place of the flat drawing.
-        Some(surface) => {
-            let home = workpiece_table::middle(&surface);
-            on_surface = Machine { home, ..machine.clone() };
-            &on_surface
-        }
-        None => machine,
-    };
+    let on_surface = workpiece_table::flat(machine, surface.as_ref());
+    let machine = &*on_surface;
     if let (Some(path), Some(_)) = (&path, surface)
         && path.smooth.value
     {
@@ -199,7 +239,18 @@ pub(super) fn job(
             diagnostics.contradict(place, text, "keep one of them");
         }
     }
-    let kinds = Kinds { letters, points, path, cloud, gcode };
+    let tables = [
+        layers.as_ref().map(|layers| ("layers", layers.span)),
+        frame.as_ref().map(|frame| ("frame", frame.span)),
+    ];
+    if drawing.is_none() && drawings.is_none() {
+        for (name, span) in tables.into_iter().flatten() {
+            let text = format!("[{name}] is for drawings, and this job has none");
+            diagnostics.contradict(span, text, "leave it out, or add a table [drawing]");
+        }
+    }
+    let kinds =
+        Kinds { letters, points, path, cloud, gcode, drawing, drawings, layers, order, frame };
     let files = Files { folder, most };
     let job = of_tables(kinds, &marking, place, diagnostics, files, machine)?;
     Ok(workpiece_table::place(job, surface, attitude.as_ref(), home))
@@ -212,6 +263,12 @@ struct Kinds {
     path: Option<PathTable>,
     cloud: Option<CloudTable>,
     gcode: Option<GcodeTable>,
+    drawing: Option<DrawingTable>,
+    drawings: Option<Named<DrawingTable>>,
+    /// What drawings have beside them.
+    layers: Option<Named<LayerTable>>,
+    order: OrderTable,
+    frame: Option<FrameTable>,
 }
 
 /// Where a job file's own files are, and what is read of them.
@@ -231,17 +288,25 @@ fn of_tables(
     Files { folder, most }: Files<'_>,
     machine: &Machine,
 ) -> Result<Job, JobError> {
-    const HELP: &str = "keep one of the tables [letters], [points], [path], [cloud] and [gcode]";
-    let Kinds { letters, points, path, cloud, gcode } = kinds;
+    let help = |verb: &str| {
+        format!(
+            "{verb} one of the tables [letters], [points], [path], [cloud], [gcode], [drawing] and \
+             [drawings.NAME]"
+        )
+    };
+    let Kinds { letters, points, path, cloud, gcode, drawing, drawings, layers, order, frame } =
+        kinds;
     let places = [
         letters.as_ref().map(|table| table.span),
         points.as_ref().map(|table| table.span),
         path.as_ref().map(|table| table.span),
         cloud.as_ref().map(|table| table.span),
         gcode.as_ref().map(|table| table.span),
+        drawing.as_ref().map(|table| table.span),
+        drawings.as_ref().map(|table| table.span),
     ];
     for place in places.into_iter().flatten().skip(1) {
-        diagnostics.contradict(place, "a job marks one thing".to_owned(), HELP);
+        diagnostics.contradict(place, "a job marks one thing".to_owned(), &help("keep"));
     }
     let power = power(marking);
     if places.iter().flatten().count() > 1 {
@@ -263,12 +328,20 @@ fn of_tables(
         let path: PathBuf = folder.join(&program.file.value);
         let dialect = machine::dialect_choices!(program);
         of_program(&path, &dialect, marking, diagnostics, machine, most)
+    } else if drawing.is_some() || drawings.is_some() {
+        let named = drawings.iter().flat_map(|drawings| &drawings.entries).map(|(_, table)| table);
+        let parts = drawing.iter().chain(named).map(|table| Part { table, file: None }).collect();
+        let name = stem(&diagnostics, "drawing");
+        let parts = Parts {
+            drawings: parts,
+            layers: layers.as_ref(),
+            order: &order,
+            frame: frame.as_ref(),
+            defaults: defaults(marking, machine),
+        };
+        of_drawings(&parts, &name, marking, diagnostics, folder, machine)
     } else {
-        diagnostics.contradict(
-            place,
-            "nothing to mark".to_owned(),
-            "add one of the tables [letters], [points], [path], [cloud] and [gcode]",
-        );
+        diagnostics.contradict(place, "nothing to mark".to_owned(), &help("add"));
         Ok(diagnostics.fail()?)
     }
 }
@@ -291,6 +364,64 @@ pub(super) fn program(
     let (table, diagnostics) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
     let dialect = machine::dialect_choices!(table.gcode);
     of_program(path, &dialect, &table.marking, diagnostics, machine, most)
+}
+
+/// Reads the drawing at `path` as a job of its own, with `overrides` of its tables.
+pub(super) fn drawing(
+    path: &Path,
+    overrides: &[Override],
+    machine: &Machine,
+) -> Result<Job, JobError> {
+    let empty = Document::parse(&path.display().to_string(), "")?;
+    let (table, mut diagnostics) =
+        empty.override_with(overrides, "")?.decode::<DrawingFileTable>()?;
+    let home = Vector3::from(machine.home);
+    let surface =
+        table.surface.and_then(|table| workpiece_table::surface(&table, &mut diagnostics));
+    let on_surface = workpiece_table::flat(machine, surface.as_ref());
+    let parts = Parts {
+        drawings: vec![Part { table: &table.drawing, file: Some(path) }],
+        layers: table.layers.as_ref(),
+        order: &table.order,
+        frame: table.frame.as_ref(),
+        defaults: defaults(&table.marking, machine),
+    };
+    let name = gcode::name(&path.display().to_string());
+    let folder = Path::new("");
+    let job = of_drawings(&parts, &name, &table.marking, diagnostics, folder, &on_surface)?;
+    Ok(workpiece_table::place(job, surface, table.attitude.as_ref(), home))
+}
+
+/// What layers have that say nothing else.
+fn defaults(marking: &MarkingTable, machine: &Machine) -> Defaults {
+    let speed = match &marking.speed {
+        None => Some(machine.path.speed),
+        Some(Either::Value(speed)) => Some(speed.value),
+        Some(Either::Word(_)) => None,
+    };
+    let follows_speed =
+        marking.policy.as_ref().is_some_and(|policy| policy.value == Policy::Proportional);
+    Defaults { speed, power: Power { level: power(marking), follows_speed } }
+}
+
+fn of_drawings(
+    parts: &Parts<'_>,
+    name: &str,
+    marking: &MarkingTable,
+    mut diagnostics: Diagnostics,
+    folder: &Path,
+    machine: &Machine,
+) -> Result<Job, JobError> {
+    let Composed { composition, notes, files } = compose(parts, folder, machine, &mut diagnostics)?;
+    let start = Vector3::from(machine.home);
+    let drawing = Drawing { name: name.to_owned(), start, steps: Vec::new(), notes };
+    let mut job = Job { composition: Some(composition), files, ..job_of(drawing, marking) };
+    // Each layer has its own speed and policy.
+    job.marking.policy = None;
+    if let Some(MarkingSpeed::Constant(_)) = job.marking.speed {
+        job.marking.speed = None;
+    }
+    Ok(diagnostics.finish(job)?)
 }
 
 fn of_letters(

@@ -81,6 +81,13 @@ impl MechanismVisitor for Within<'_> {
             }
             return extent.corners().all(|corner| reach.holds_point(&corner));
         }
+        if let (true, Some(composition)) = (reach.is_linear, &job.composition) {
+            if let Some((bounds, [low, high])) = composition.bounds().zip(composition.heights()) {
+                extent.add(Vector3::new(bounds.x0, bounds.y0, low));
+                extent.add(Vector3::new(bounds.x1, bounds.y1, high));
+            }
+            return extent.corners().all(|corner| reach.holds_point(&corner));
+        }
         if !reach.is_linear && job.time(machine) <= SHORT {
             return false;
         }

@@ -1,5 +1,8 @@
 //! The job file's tables of the surface that is marked and of how the tool is turned.
 
+use std::borrow::Cow;
+
+use machine::Machine;
 use machine::document::{Diagnostics, Point, Positive, Quantity, Spanned};
 use machine::quantity::{Angle, Length};
 use machine::surface::{Cone, Placement, Projection, Shape, Surface};
@@ -118,8 +121,16 @@ pub(super) fn surface(table: &SurfaceTable, diagnostics: &mut Diagnostics) -> Op
     Some(Surface { shape: Shape::Cone(cone), placement })
 }
 
+/// `machine` as the flat drawing on a `surface` sees it: its home is the middle of the surface.
+pub(super) fn flat<'a>(machine: &'a Machine, surface: Option<&Surface>) -> Cow<'a, Machine> {
+    match surface {
+        Some(surface) => Cow::Owned(Machine { home: middle(surface), ..machine.clone() }),
+        None => Cow::Borrowed(machine),
+    }
+}
+
 /// The flat point in the middle of a surface, around which a drawing lies [m].
-pub(super) fn middle(surface: &Surface) -> [f64; 3] {
+fn middle(surface: &Surface) -> [f64; 3] {
     match surface.shape {
         Shape::Cone(cone) => [0.0, cone.length / 2.0, 0.0],
         Shape::Plane | Shape::Sphere(_) => [0.0; 3],
