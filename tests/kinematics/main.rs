@@ -483,6 +483,41 @@ fn joint_coordinates_differ_from_motor_angles_by_the_ratio() {
     assert_close(&reply["pose"]["position"], &json!([0.05, 0.15]), "cartesian joints");
 }
 
+/// Machines whose frame is mirrored, skew and scaled, turned and off by a mesh, and whose axis turns.
+#[test]
+fn a_place_and_its_joints_are_the_same_both_ways() {
+    let place = Place::new();
+    for (file, from, to) in [
+        ("diode_corexy", [0.0, 0.0, 0.0], [0.3, 0.2, 0.0]),
+        ("gantry", [0.0, 0.0, -0.01], [0.6, 0.4, 0.04]),
+        ("rotary", [0.0, 0.0, -0.005], [0.2, 0.188, 0.04]),
+        ("galvo", [-0.085, -0.085, 0.0], [0.085, 0.085, 0.0]),
+    ] {
+        let machine = support::source(&format!("machines/{file}.toml"));
+        let places: Vec<[f64; 3]> = (0..64)
+            .map(|index| {
+                let share =
+                    [index % 4, index / 4 % 4, index / 16].map(|step| f64::from(step) / 3.0);
+                core::array::from_fn(|row| from[row] + (to[row] - from[row]) * share[row])
+            })
+            .collect();
+        let pose = |place: &[f64; 3]| json!({"pose": {"position": place}}).to_string() + "\n";
+        let input: String = places.iter().map(pose).collect();
+        let joints = replies(&kinematics(&place, &machine, false, "inverse", input.as_str()));
+        let back = |reply: &Value| json!({"q": reply["q"]}).to_string() + "\n";
+        let input: String = joints.iter().map(back).collect();
+        let found = replies(&kinematics(&place, &machine, false, "forward", input.as_str()));
+        assert_eq!(found.len(), places.len(), "{joints:#?}");
+        for (wanted, found) in places.iter().zip(&found) {
+            let position = found["pose"]["position"].as_array().unwrap();
+            for (row, value) in position.iter().enumerate() {
+                let error = value.as_f64().unwrap() - wanted[row];
+                assert!(error.abs() < 1e-12, "{file} {wanted:?}: {found}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_line_without_an_answer_is_an_error_in_its_place() {
     let place = Place::new();

@@ -248,16 +248,17 @@ fn interpolating(count: usize) -> Option<DMatrix<f64>> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, clippy::disallowed_methods)]
+    #![allow(clippy::unwrap_used)]
 
     use super::{Lines, Mesh, MeshError};
     use crate::taylor::Taylor;
+    use messages::math;
 
     /// A measured field that no polynomial is: 40 µm in x, 25 µm in y.
     fn deviations(rows: usize, columns: usize) -> Vec<Vec<[f64; 2]>> {
         let at = |row: usize, column: usize| {
             let (r, c) = (row as f64, column as f64);
-            [40e-6 * (0.7 * c + 0.3 * r).sin(), 25e-6 * (0.5 * r - 0.9 * c).cos()]
+            [40e-6 * math::sin(0.7 * c + 0.3 * r), 25e-6 * math::cos(0.5 * r - 0.9 * c)]
         };
         (0..rows).map(|row| (0..columns).map(|column| at(row, column)).collect()).collect()
     }

@@ -7,6 +7,7 @@ use machine::kinematics::Joints;
 use machine::mechanisms::galvo::{Galvo, Optics};
 use machine::transmission::Elasticity;
 use machine::{Cartesian, CoreXy, Mechanism, Pose};
+use messages::math;
 use nalgebra::Vector3;
 
 use super::SCREW;
@@ -25,7 +26,7 @@ const ASKEW: Alignment = Alignment {
 fn mesh() -> Mesh {
     let at = |row: usize, column: usize| {
         let (r, c) = (row as f64, column as f64);
-        [60e-6 * (0.9 * c - 0.4 * r).sin(), 45e-6 * (0.7 * r + 0.2 * c).cos()]
+        [60e-6 * math::sin(0.9 * c - 0.4 * r), 45e-6 * math::cos(0.7 * r + 0.2 * c)]
     };
     let rows: Vec<Vec<[f64; 2]>> =
         (0..6).map(|row| (0..7).map(|column| at(row, column)).collect()).collect();
@@ -134,10 +135,10 @@ fn a_frame_lies_over_the_axes_as_it_says() {
     close(tool(Alignment { swapped: true, ..none }, [0.1, 0.2, 0.0]), [0.2, 0.1, 0.0]);
     // 1 m along x with 1 mrad of turn is 1 mm up; along y with 1 mrad of skew 1 mm to the left.
     let turned = Alignment { rotation: 1e-3, ..none };
-    close(tool(turned, [1.0, 0.0, 0.0]), [1e-3_f64.cos(), 1e-3_f64.sin(), 0.0]);
+    close(tool(turned, [1.0, 0.0, 0.0]), [math::cos(1e-3), math::sin(1e-3), 0.0]);
     let leaning = Alignment { skew: 1e-3, ..none };
     close(tool(leaning, [1.0, 0.0, 0.0]), [1.0, 0.0, 0.0]);
-    close(tool(leaning, [0.0, 1.0, 0.0]), [-(1e-3_f64.sin()), 1e-3_f64.cos(), 0.0]);
+    close(tool(leaning, [0.0, 1.0, 0.0]), [-(math::sin(1e-3)), math::cos(1e-3), 0.0]);
     let longer = Alignment { scale: [1.0002, 1.0, 1.0], ..none };
     close(tool(longer, [0.5, 0.5, 0.0]), [0.5001, 0.5, 0.0]);
     // A deviation of the mesh is where the tool is, less where it should be.
