@@ -69,6 +69,18 @@ fn a_following_error_below_what_a_jerk_changes_is_warned_of() {
     sound("corexy", &["axis.a.limits.following_error=0.11 mm"]);
 }
 
+/// A rotor behind its field gives way as a load behind a spring does.
+#[test]
+fn a_rotor_that_its_field_hardly_moves_is_warned_of() {
+    // 6.4e-3 kg·m² on 6 N·m/rad, at 2 · 5000 m/s³ · some 2 rad/m.
+    warned(
+        "galvo",
+        &["axis.m1.motor.stepper.rotor_inertia=6.4e-3 kg m^2"],
+        &["a following error of 2.000e-3 rad stops the machine", "takes for a jump below"],
+    );
+    sound("galvo", &["axis.m1.motor.stepper.rotor_inertia=6.4e-6 kg m^2"]);
+}
+
 #[test]
 fn an_encoder_coarser_than_the_tolerance_is_warned_of() {
     warned(

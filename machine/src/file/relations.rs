@@ -278,8 +278,12 @@ impl Subject<'_> {
         // The jerk of a join, once more for what the mechanism adds to it.
         let jerk = 2.0 * path.jerk.value * self.worst_speed;
         let jump = jerk * CYCLE_TIME * CYCLE_TIME * CYCLE_TIME / 12.0 / DISCONTINUITY;
-        let lead = resonance
-            .map_or(0.0, |resonance| jerk * CYCLE_TIME / (resonance * resonance) / LEAD_STEP);
+        // Springs give way by the load's acceleration over ω², the field of a stepper by what all that
+        // it turns takes of its stiffness.
+        let springs = resonance.map_or(0.0, |resonance| 1.0 / (resonance * resonance));
+        let field =
+            axis.motor.stepper().map_or(0.0, |motor| axis.gains.inertia / motor.stiffness());
+        let lead = jerk * CYCLE_TIME * (springs + field) / LEAD_STEP;
         let least = jump.max(lead);
         if limit < least {
             let text = format!(
