@@ -64,14 +64,14 @@ fn every_cycle_is_a_line_with_the_machines_axes() {
 }
 
 #[test]
-fn without_a_summary_the_axes_are_numbered() {
+fn without_a_summary_the_actuators_are_numbered() {
     let place = Place::new();
     let folder = simulated(&place);
     let samples = folder.join("samples.bin");
     std::fs::remove_file(folder.join("summary.json")).unwrap();
     let rows = exported(&place, &samples);
-    assert_eq!(rows[0].len(), 11 + 4 * messages::MAX_AXES);
-    assert!(rows[0].iter().any(|column| column == "axis_8_voltage"), "{:?}", rows[0]);
+    assert_eq!(rows[0].len(), 11 + 4 * messages::MAX_ACTUATORS);
+    assert!(rows[0].iter().any(|column| column == "actuator_16_voltage"), "{:?}", rows[0]);
 }
 
 #[test]

@@ -154,7 +154,7 @@ struct Bench<'a> {
     controller: Controller,
     outputs: Outputs,
     feedback: Feedback,
-    positions: [messages::AxisArray; 2],
+    positions: [messages::ActuatorArray; 2],
     sent: usize,
     supply: usize,
     places: [Place; 4],
@@ -169,8 +169,8 @@ impl<'a> Bench<'a> {
     fn new(planned: &'a Planned) -> Self {
         let first = &planned.setpoints[0];
         let mut feedback = Feedback { epoch: 1, ..Feedback::default() };
-        for (index, axis) in planned.machine.axes.iter().enumerate() {
-            feedback.position[index] = (first.position[index] + first.lead[index]) / axis.ratio;
+        for (index, it) in planned.machine.actuators.iter().enumerate() {
+            feedback.position[index] = (first.position[index] + first.lead[index]) / it.ratio;
         }
         feedback.tool = first.tool;
         let place = Place { tool: first.tool, joints: planned.joints(0.0) };

@@ -39,16 +39,16 @@ fn play(machine: &Machine, plan: &Plan, death: u64, late: u64, lost: (Peers, Fau
         let peers = if step < death + late { Peers::default() } else { lost.0 };
         chain.finish(&feedback, None, peers);
         let outputs = &chain.outputs;
-        let axes = || machine.axes.iter().enumerate();
+        let actuators = || machine.actuators.iter().enumerate();
         if step == death {
-            let speeds = axes().map(|(index, axis)| (feedback.velocity[index] * axis.ratio).abs());
+            let speeds = actuators().map(|(index, it)| (feedback.velocity[index] * it.ratio).abs());
             rest.speed = speeds.fold(0.0, f64::max);
         }
         let follows =
             matches!(outputs.command.mode(), CommandMode::Voltage | CommandMode::Position);
         if step > death && follows {
             let errors = &outputs.command.following_error;
-            let off = axes().map(|(index, axis)| (errors[index] * axis.ratio).abs());
+            let off = actuators().map(|(index, it)| (errors[index] * it.ratio).abs());
             rest.off = off.fold(rest.off, f64::max);
         }
         if outputs.command.state() == ControllerState::Faulted {

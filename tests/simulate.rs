@@ -42,7 +42,7 @@ struct Outcome {
 impl Outcome {
     fn largest_limit_use(&self) -> f64 {
         let report = &self.report;
-        [report.velocity_use, report.acceleration_use, report.jerk_use, report.effort_use]
+        [&report.velocity_use[..], &report.acceleration_use, &report.jerk_use, &report.effort_use]
             .iter()
             .flat_map(|uses| uses.iter().take(self.axes))
             .copied()

@@ -47,8 +47,8 @@ fn main() {
         let mut controller = Controller::new(&machine);
         let mut outputs = Outputs::default();
         let mut feedback = Feedback { status: status::POWERED, ..Feedback::default() };
-        for (index, axis) in machine.axes.iter().enumerate() {
-            feedback.position[index] = home[index] / axis.ratio;
+        for (index, actuator) in machine.actuators.iter().enumerate() {
+            feedback.position[index] = home[index] / actuator.ratio;
         }
         let (mut sent, mut steps, mut cycle) = (0, 0_u32, 0);
         let mut batch = Vec::with_capacity(2);

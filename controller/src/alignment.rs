@@ -7,7 +7,7 @@ use crate::feedforward::Planned;
 use machine::Machine;
 use machine::motor::StepperMotor;
 use messages::time::CYCLE_TIME;
-use messages::{AxisArray, Fault, FaultCode, FaultQuantity, MAX_AXES};
+use messages::{ActuatorArray, Fault, FaultCode, FaultQuantity, MAX_ACTUATORS};
 
 use crate::supervision::Finding;
 
@@ -20,7 +20,7 @@ const CYCLES: u32 = 64;
 /// What is left of the distance.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Alignment {
-    offset: AxisArray,
+    offset: ActuatorArray,
     left: u32,
 }
 
@@ -30,15 +30,16 @@ impl Alignment {
     /// # Errors
     /// An axis that stands too far away, with the distance in joint units.
     pub fn new(machine: &Machine, standing: &Planned, start: &Planned) -> Result<Self, Finding> {
-        let mut offset = [0.0; MAX_AXES];
-        for (index, axis) in machine.axes.iter().enumerate().take(MAX_AXES) {
+        let mut offset = [0.0; MAX_ACTUATORS];
+        for (index, actuator) in machine.actuators.iter().enumerate().take(MAX_ACTUATORS) {
             offset[index] = standing.angle[index] - start.angle[index];
             // A stepper is powered where its rotor stands, and leads it by what gravity asks.
-            let load_angle = axis.motor.stepper().map_or(0.0, StepperMotor::largest_load_angle);
-            let limit = (TOLERANCE * axis.encoder.resolution()).max(load_angle);
+            let load_angle = actuator.motor.stepper().map_or(0.0, StepperMotor::largest_load_angle);
+            let limit = (TOLERANCE * actuator.encoder.resolution()).max(load_angle);
             if offset[index].abs() > limit || offset[index].is_nan() {
-                let (value, limit) = (offset[index].abs() * axis.ratio, limit * axis.ratio);
-                let fault = Fault::new(FaultCode::StreamStart).on(index);
+                let ratio = actuator.ratio.abs();
+                let (value, limit) = (offset[index].abs() * ratio, limit * ratio);
+                let fault = Fault::new(FaultCode::StreamStart).on_actuator(index);
                 let quantity = FaultQuantity::StartDistance;
                 return Err(Finding::sound(fault.beyond(quantity, value, limit)));
             }

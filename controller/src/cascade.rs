@@ -1,4 +1,4 @@
-//! The three loops of one axis: position P, velocity PI, current PI, with saturation and
+//! The three loops of one actuator: position P, velocity PI, current PI, with saturation and
 //! anti-windup.
 //!
 //! Gains from motor and load (source 003 ch. 3, the cascade): current `Kp = L·ω_c`, `Ki = R·ω_c`;
@@ -159,11 +159,11 @@ impl Cascade {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use machine::{Axis, Machine};
+    use machine::{Actuator, Machine};
     use messages::math;
 
-    fn of(axis: &Axis) -> Cascade {
-        Cascade::new(axis.motor.dc().unwrap(), &axis.gains)
+    fn of(actuator: &Actuator) -> Cascade {
+        Cascade::new(actuator.motor.dc().unwrap(), &actuator.gains)
     }
 
     /// The current loop on a locked rotor, one cycle of delay, exact winding.
@@ -182,7 +182,7 @@ mod tests {
             let period = number(&case["Ts"]);
             let decay = math::exp(-period * resistance / inductance);
             let mut machine = Machine::builtin();
-            let axis = &mut machine.axes[0];
+            let axis = &mut machine.actuators[0];
             let motor = axis.motor.dc_mut().unwrap();
             motor.resistance = resistance;
             motor.inductance = inductance;
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn gains_follow_from_motor_and_load() {
-        let cascade = of(&Machine::builtin().axes[0]);
+        let cascade = of(&Machine::builtin().actuators[0]);
         // Source 003, the pilot: CoreXY Kp_v 0.0194, Ki_v 0.775, Kp_i 0.803, Ki_i 803.
         assert!((cascade.velocity.proportional - 0.0194).abs() < 1e-4);
         assert!((cascade.velocity.integral - 0.775).abs() < 2e-3);
@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn a_voltage_at_its_limit_stops_the_velocity_integral() {
-        let mut cascade = of(&Machine::builtin().axes[0]);
+        let mut cascade = of(&Machine::builtin().actuators[0]);
         let far = Reference { position: 100.0, ..Reference::default() };
         // The measured current stays away, so that the voltage stays at its limit.
         for _ in 0..1000 {
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn what_is_not_a_number_goes_out_and_stays_in_no_integral() {
-        let mut cascade = of(&Machine::builtin().axes[0]);
+        let mut cascade = of(&Machine::builtin().actuators[0]);
         for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX] {
             for slot in 0..7 {
                 let at = |index: usize| if index == slot { number } else { 0.0 };
@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn at_its_references_it_gives_the_feedforward_alone() {
-        let mut cascade = of(&Machine::builtin().axes[0]);
+        let mut cascade = of(&Machine::builtin().actuators[0]);
         let reference = Reference { position: 3.0, velocity: 7.0, current: 0.5, voltage: 2.0 };
         let measured = Measurement { position: 3.0, velocity: 7.0, current: 0.5 };
         assert_eq!(cascade.step(&reference, &measured, true), Drive { current: 0.5, voltage: 2.0 });

@@ -7,9 +7,9 @@
 
 use crate::feedforward::Planned;
 use machine::{Machine, Motor};
+use messages::ActuatorArray;
 use messages::math;
 use messages::time::CYCLE_TIME;
-use messages::{AxisArray, MAX_AXES};
 
 /// Cycles to fade over. An axis that kept its speed for 10 ms, while the plan accelerated at 10 m/s²,
 /// takes as much acceleration again to come back; over half of this it would take twice that.
@@ -31,16 +31,16 @@ const SPEED_LOSS: f64 = 2.0 * CYCLE_TIME;
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CatchUp {
     /// Distance at the start of the fading [rad].
-    offset: AxisArray,
+    offset: ActuatorArray,
     /// How fast it grew there [rad/s].
-    slope: AxisArray,
+    slope: ActuatorArray,
     left: u32,
 }
 
 impl CatchUp {
     /// From `coasted`, where the axes are at an instant, to `planned`, where the plan has them.
     pub fn new(coasted: &Planned, planned: &Planned) -> Self {
-        let difference = |from: &AxisArray, to: &AxisArray| -> AxisArray {
+        let difference = |from: &ActuatorArray, to: &ActuatorArray| -> ActuatorArray {
             core::array::from_fn(|index| from[index] - to[index])
         };
         let offset = difference(&coasted.angle, &planned.angle);
@@ -51,17 +51,17 @@ impl CatchUp {
 
     /// Cycles until the axes of `machine` are back on the plan but for micrometres; 0 where they are.
     pub fn settling(&self, machine: &Machine) -> u64 {
-        let axes = machine.axes.iter().zip(self.offset.iter().zip(&self.slope)).take(MAX_AXES);
-        let settling = axes.map(|(axis, (offset, slope))| {
-            let off = (offset.abs() + slope.abs() * SPEED_LOSS) * axis.ratio.abs();
+        let drives = machine.drives().zip(self.offset.iter().zip(&self.slope));
+        let settling = drives.map(|((actuator, axis), (offset, slope))| {
+            let off = (offset.abs() + slope.abs() * SPEED_LOSS) * actuator.ratio.abs();
             let left = off / (ON_PLAN * axis.limits.following_error);
-            match axis.motor {
+            match actuator.motor {
                 _ if left <= 1.0 => 0.0,
                 Motor::Stepper(_) => f64::from(CYCLES),
                 // The position loop leaves e^(−ω·t) of it.
                 Motor::Dc(_) => {
                     let left = if left > LARGE { left * WOUND_UP } else { left };
-                    (math::ln(left) / (axis.gains.position * CYCLE_TIME)).ceil()
+                    (math::ln(left) / (actuator.gains.position * CYCLE_TIME)).ceil()
                 }
             }
         });
@@ -100,6 +100,7 @@ impl CatchUp {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use messages::MAX_ACTUATORS;
 
     #[test]
     fn it_begins_with_position_and_speed_and_ends_on_the_plan_without_a_step() {
@@ -129,10 +130,10 @@ mod tests {
     #[test]
     fn light_waits_for_as_long_as_the_axes_are_off_the_plan() {
         let mut machine = Machine::builtin();
-        let axis = &machine.axes[1];
+        let axis = &machine.actuators[1];
         let (ratio, bandwidth) = (axis.ratio, axis.gains.position);
         let on_plan = 5e-6 / ratio;
-        let planned = Planned { angle: [3.0; MAX_AXES], ..Planned::default() };
+        let planned = Planned { angle: [3.0; MAX_ACTUATORS], ..Planned::default() };
         let settling = |machine: &Machine, offset: f64, slope: f64| {
             let mut coasted = planned;
             coasted.angle[1] += offset;
@@ -147,7 +148,7 @@ mod tests {
         assert_eq!(settling(&machine, -20.0 * on_plan, 0.0), cycles(20.0 * WOUND_UP));
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../machines");
         machine = Machine::load(&folder.join("cartesian_steppers.toml"), &[]).unwrap();
-        let turned = 6e-6 / machine.axes[1].ratio;
+        let turned = 6e-6 / machine.actuators[1].ratio;
         assert_eq!(settling(&machine, turned, 0.0), u64::from(CYCLES));
     }
 }

@@ -53,11 +53,11 @@ use crate::statistics::Statistics;
 use crate::stream_time::{ONE, StreamTime};
 use crate::supervision::{Elapsed, Finding, Supervision, Tracking};
 use answer::PROGRESS_INTERVAL;
-use machine::{Axis, Machine, Motor};
+use machine::{Actuator, Machine, Motor};
 use messages::feedback::status;
 use messages::{
-    AxisArray, CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity, Feedback,
-    LaserCycle, MAX_AXES, Nanoseconds, RealtimeFacts,
+    ActuatorArray, CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity, Feedback,
+    LaserCycle, MAX_ACTUATORS, Nanoseconds, RealtimeFacts,
 };
 
 /// Cycles between two reports.
@@ -82,13 +82,13 @@ pub struct Controller {
     catch_up: CatchUp,
     feedforward: Feedforward,
     /// None for steppers.
-    cascades: [Option<Cascade>; MAX_AXES],
+    cascades: [Option<Cascade>; MAX_ACTUATORS],
     /// The mode in which the motors follow the plan.
     drive: CommandMode,
     supervision: Supervision,
     standing: Standing,
     /// Where the motors stood when they were to be enabled [rad].
-    enabled_at: AxisArray,
+    enabled_at: ActuatorArray,
     statistics: Statistics,
     /// The stream being played, from its first setpoint until it is over; 0 for none.
     playing: u64,
@@ -106,9 +106,11 @@ impl Controller {
     /// For this machine, disabled.
     ///
     /// # Panics
-    /// If the machine has no axis; machine files without are refused when read.
+    /// If the machine has no actuator; machine files without are refused when read.
     pub fn new(machine: &Machine) -> Self {
-        let cascade = |axis: &Axis| axis.motor.dc().map(|motor| Cascade::new(motor, &axis.gains));
+        let cascade = |actuator: &Actuator| {
+            actuator.motor.dc().map(|motor| Cascade::new(motor, &actuator.gains))
+        };
         Self {
             state: State::Disabled,
             fault: Fault::default(),
@@ -117,14 +119,14 @@ impl Controller {
             alignment: Alignment::default(),
             catch_up: CatchUp::default(),
             feedforward: Feedforward::new(machine),
-            cascades: core::array::from_fn(|index| machine.axes.get(index).and_then(cascade)),
-            drive: match machine.axes[0].motor {
+            cascades: core::array::from_fn(|index| machine.actuators.get(index).and_then(cascade)),
+            drive: match machine.actuators[0].motor {
                 Motor::Dc(_) => CommandMode::Voltage,
                 Motor::Stepper(_) => CommandMode::Position,
             },
             supervision: Supervision::new(machine),
             standing: Standing::new(machine),
-            enabled_at: AxisArray::default(),
+            enabled_at: ActuatorArray::default(),
             statistics: Statistics::new(machine),
             playing: 0,
             completed: false,
@@ -178,7 +180,7 @@ impl Controller {
             _ => &outputs.command.voltage,
         };
         if let Some(index) = targets.iter().position(|target| !target.is_finite()) {
-            let fault = Fault::new(FaultCode::NotFinite).on(index);
+            let fault = Fault::new(FaultCode::NotFinite).on_actuator(index);
             self.fail(Finding::lost(fault.with(FaultQuantity::Number, targets[index])), now);
             self.command(now, inputs, &mut outputs.command);
         }
@@ -333,13 +335,13 @@ impl Controller {
     /// Goes on by one cycle along the stream, or stands.
     fn advance(&mut self, feedback: &Feedback) {
         if !self.state.follows() {
-            let is_known = |values: &AxisArray| values.iter().all(|value| value.is_finite());
+            let is_known = |values: &ActuatorArray| values.iter().all(|value| value.is_finite());
             let resting = if is_known(&feedback.position) {
                 let (angle, tool) = (feedback.position, self.tool_measured(feedback));
                 // Known all the time, so that the weight is at hand when the power, and with it the load, comes.
                 let weight = *self.standing.torque(&angle);
                 let bears = matches!(self.state, State::Enabling { .. });
-                let torque = if bears { weight } else { AxisArray::default() };
+                let torque = if bears { weight } else { ActuatorArray::default() };
                 Planned { angle, torque, tool, ..Planned::default() }
             } else {
                 let Planned { angle, tool, .. } = *self.feedforward.now();

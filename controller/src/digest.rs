@@ -20,8 +20,8 @@ impl Digest {
         Self(SPREAD)
     }
 
-    /// Adds a command for a machine with `axes` axes.
-    pub fn add(&mut self, command: &Command, axes: usize) {
+    /// Adds a command for a machine with so many `actuators`.
+    pub fn add(&mut self, command: &Command, actuators: usize) {
         let laser = &command.laser;
         self.word(u64::from(command.mode) << 32 | u64::from(laser.edge_count));
         self.word(command.outputs);
@@ -32,7 +32,7 @@ impl Digest {
             self.word(edge.power.to_bits());
         }
         for targets in [&command.position, &command.velocity, &command.effort] {
-            for target in targets.iter().take(axes) {
+            for target in targets.iter().take(actuators) {
                 self.word(target.to_bits());
             }
         }

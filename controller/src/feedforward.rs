@@ -15,9 +15,9 @@ use crate::catch_up::CatchUp;
 use crate::lookahead::Lookahead;
 use crate::player::Instant;
 use crate::winding::Winding;
-use machine::{Axis, Machine, Motor};
+use machine::{Actuator, Machine, Motor};
 use messages::time::CYCLE_TIME;
-use messages::{AxisArray, MAX_AXES};
+use messages::{ActuatorArray, MAX_ACTUATORS};
 
 /// Planned speed below which a motor counts as standing [rad/s]: less than a count of any usual
 /// encoder in a minute. However slowly it creeps above that, friction is against it.
@@ -27,11 +27,11 @@ const STANDING: f64 = machine::Friction::STANDING;
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Planned {
     /// Angle [rad].
-    pub angle: AxisArray,
+    pub angle: ActuatorArray,
     /// Speed, the exact derivative [rad/s].
-    pub speed: AxisArray,
+    pub speed: ActuatorArray,
     /// Torque without Coulomb friction [N·m].
-    pub torque: AxisArray,
+    pub torque: ActuatorArray,
     /// Where the tool shall be, machine frame [m].
     pub tool: [f64; 3],
 }
@@ -51,7 +51,7 @@ pub struct Target {
 /// Turns the stream into references and voltages, keeping the last four instants.
 #[derive(Debug, Clone)]
 pub struct Feedforward {
-    axes: Vec<Axis>,
+    actuators: Vec<Actuator>,
     windings: Vec<Option<Winding>>,
     before: Planned,
     now: Planned,
@@ -64,8 +64,10 @@ impl Feedforward {
     pub fn new(machine: &Machine) -> Self {
         let resting = Planned { tool: machine.home, ..Planned::default() };
         Self {
-            axes: machine.axes.clone(),
-            windings: machine.axes.iter().map(|axis| axis.motor.dc().map(Winding::new)).collect(),
+            actuators: machine.actuators.clone(),
+            windings: (machine.actuators.iter())
+                .map(|actuator| actuator.motor.dc().map(Winding::new))
+                .collect(),
             before: resting,
             now: resting,
             next: resting,
@@ -105,10 +107,10 @@ impl Feedforward {
 
     /// Rests where `resting` is from now on, as if it always had. The voltage that this takes is given
     /// as soon as the motors are powered: `current` is what flows then [A], `None` before.
-    pub fn rest_at(&mut self, resting: Planned, current: Option<&AxisArray>) {
+    pub fn rest_at(&mut self, resting: Planned, current: Option<&ActuatorArray>) {
         (self.before, self.now, self.next, self.after) = (resting, resting, resting, resting);
-        for (index, axis) in self.axes.iter().enumerate() {
-            let voltage = self.voltage(index, axis);
+        for (index, actuator) in self.actuators.iter().enumerate() {
+            let voltage = self.voltage(index, actuator);
             let Some(winding) = &mut self.windings[index] else { continue };
             match current {
                 Some(current) => winding.rest(current[index], Some(voltage)),
@@ -119,8 +121,8 @@ impl Feedforward {
 
     /// Goes on by one cycle, to `planned` at its end.
     pub fn advance(&mut self, planned: Planned) {
-        for (index, axis) in self.axes.iter().enumerate() {
-            let voltage = self.voltage(index, axis);
+        for (index, actuator) in self.actuators.iter().enumerate() {
+            let voltage = self.voltage(index, actuator);
             let Self { next, after, windings, .. } = self;
             let Some(winding) = &mut windings[index] else { continue };
             winding.advance(
@@ -143,13 +145,13 @@ impl Feedforward {
         let (rate, change) = (instant.rate, instant.rate_change);
         let mut planned = Planned { tool: from.tool, ..Planned::default() };
         if fraction == 0.0 {
-            for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
+            for (index, actuator) in self.actuators.iter().enumerate().take(MAX_ACTUATORS) {
                 let slope = |from: f64, to: f64| (to - from) / (2.0 * CYCLE_TIME);
                 let lead_speed = slope(earlier.lead[index], to.lead[index]);
                 let static_speed = slope(earlier.static_lead[index], to.static_lead[index]);
-                let joint = Joint {
-                    position: from.position[index],
-                    velocity: from.velocity[index],
+                let demand = Demand {
+                    position: from.position[actuator.axis],
+                    velocity: from.velocity[actuator.axis],
                     lead: from.lead[index],
                     lead_speed,
                     static_lead: from.static_lead[index],
@@ -159,18 +161,18 @@ impl Feedforward {
                     standing: from.static_effort[index],
                     momentum: from.momentum[index],
                 };
-                planned.put(index, axis, &joint, rate, change);
+                planned.put(index, actuator, &demand, rate, change);
             }
             return planned;
         }
         let later = lookahead.setpoint(sequence + 2);
         let linear = |from: f64, to: f64| from + (to - from) * fraction;
-        for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
+        for (index, actuator) in self.actuators.iter().enumerate().take(MAX_ACTUATORS) {
             let (position, velocity) = hermite(
-                from.position[index],
-                from.velocity[index] * CYCLE_TIME,
-                to.position[index],
-                to.velocity[index] * CYCLE_TIME,
+                from.position[actuator.axis],
+                from.velocity[actuator.axis] * CYCLE_TIME,
+                to.position[actuator.axis],
+                to.velocity[actuator.axis] * CYCLE_TIME,
                 fraction,
             );
             let (lead, lead_speed) = hermite(
@@ -187,7 +189,7 @@ impl Feedforward {
                 (later.static_lead[index] - from.static_lead[index]) / 2.0,
                 fraction,
             );
-            let joint = Joint {
+            let demand = Demand {
                 position,
                 velocity: velocity / CYCLE_TIME,
                 lead,
@@ -199,7 +201,7 @@ impl Feedforward {
                 standing: linear(from.static_effort[index], to.static_effort[index]),
                 momentum: linear(from.momentum[index], to.momentum[index]),
             };
-            planned.put(index, axis, &joint, rate, change);
+            planned.put(index, actuator, &demand, rate, change);
         }
         let around: [&[f64; 3]; 8] = core::array::from_fn(|index| {
             &lookahead.setpoint((sequence + index as u64).saturating_sub(3)).tool
@@ -212,21 +214,21 @@ impl Feedforward {
         planned
     }
 
-    /// References and voltage for the axis with this index.
-    pub fn reference(&self, index: usize, axis: &Axis) -> Reference {
+    /// References and voltage for the actuator with this index.
+    pub fn reference(&self, index: usize, actuator: &Actuator) -> Reference {
         Reference {
             position: self.now.angle[index],
             velocity: (self.now.angle[index] - self.before.angle[index]) / CYCLE_TIME,
             current: self.windings[index].as_ref().map_or(0.0, Winding::now),
-            voltage: self.voltage(index, axis),
+            voltage: self.voltage(index, actuator),
         }
     }
 
     /// The voltage over the cycle in which the command acts; 0 for a stepper, whose driver has its
     /// own current loop.
-    fn voltage(&self, index: usize, axis: &Axis) -> f64 {
-        let Some(motor) = axis.motor.dc() else { return 0.0 };
-        let friction = axis.friction.coulomb / motor.torque_constant;
+    fn voltage(&self, index: usize, actuator: &Actuator) -> f64 {
+        let Some(motor) = actuator.motor.dc() else { return 0.0 };
+        let friction = actuator.friction.coulomb / motor.torque_constant;
         let current = |planned: &Planned| planned.torque[index] / motor.torque_constant;
         let (first, last) = (current(&self.next), current(&self.after));
         let [from, mean, to] = self.directions(index);
@@ -236,17 +238,17 @@ impl Feedforward {
         motor.voltage(mean_current, current_change / CYCLE_TIME, angle_change / CYCLE_TIME)
     }
 
-    /// Targets for the axis with this index.
-    pub fn target(&self, index: usize, axis: &Axis) -> Target {
+    /// Targets for the actuator with this index.
+    pub fn target(&self, index: usize, actuator: &Actuator) -> Target {
         let [_, mean, _] = self.directions(index);
         let torque = (self.next.torque[index] + self.after.torque[index]) / 2.0;
         Target {
             position: self.after.angle[index],
-            velocity: match axis.motor {
+            velocity: match actuator.motor {
                 Motor::Dc(_) => (self.after.angle[index] - self.next.angle[index]) / CYCLE_TIME,
                 Motor::Stepper(_) => self.after.speed[index],
             },
-            effort: torque + axis.friction.coulomb * mean,
+            effort: torque + actuator.friction.coulomb * mean,
         }
     }
 
@@ -269,8 +271,9 @@ impl Feedforward {
     }
 }
 
-/// The stream's demands on one joint at one instant, at the planned rate.
-struct Joint {
+/// The stream's demands on one actuator at one instant, at the planned rate: the motion of its joint, and what is
+/// its own.
+struct Demand {
     position: f64,
     velocity: f64,
     lead: f64,
@@ -288,25 +291,25 @@ impl Planned {
     fn coasted(&self, cycles: u64) -> Self {
         let time = cycles as f64 * CYCLE_TIME;
         Self {
-            angle: core::array::from_fn(|axis| self.angle[axis] + self.speed[axis] * time),
+            angle: core::array::from_fn(|index| self.angle[index] + self.speed[index] * time),
             ..*self
         }
     }
 
     /// Joint to motor, at `rate` and its `change`.
-    fn put(&mut self, index: usize, axis: &Axis, joint: &Joint, rate: f64, change: f64) {
+    fn put(&mut self, index: usize, actuator: &Actuator, demand: &Demand, rate: f64, change: f64) {
         let square = rate * rate;
-        let lead = joint.static_lead
-            + (joint.lead - joint.static_lead) * square
-            + joint.lead_momentum * change;
-        let lead_speed = joint.static_speed + (joint.lead_speed - joint.static_speed) * square;
-        let speed = (joint.velocity + lead_speed) * rate / axis.ratio;
-        self.angle[index] = (joint.position + lead) / axis.ratio;
+        let lead = demand.static_lead
+            + (demand.lead - demand.static_lead) * square
+            + demand.lead_momentum * change;
+        let lead_speed = demand.static_speed + (demand.lead_speed - demand.static_speed) * square;
+        let speed = (demand.velocity + lead_speed) * rate / actuator.ratio;
+        self.angle[index] = (demand.position + lead) / actuator.ratio;
         self.speed[index] = speed;
-        self.torque[index] = joint.standing
-            + (joint.effort - joint.standing) * square
-            + joint.momentum * change
-            + axis.friction.viscous * speed;
+        self.torque[index] = demand.standing
+            + (demand.effort - demand.standing) * square
+            + demand.momentum * change
+            + actuator.friction.viscous * speed;
     }
 }
 

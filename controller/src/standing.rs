@@ -4,9 +4,9 @@
 use core::fmt;
 
 use machine::kinematics::{Joints, Mechanism};
-use machine::{Axis, Machine, MechanismVisitor};
+use machine::{Actuator, Machine, MechanismVisitor};
 use messages::time::CYCLE_TIME;
-use messages::{AxisArray, MAX_AXES};
+use messages::{ActuatorArray, MAX_ACTUATORS};
 
 /// Encoder counts that an axis at rest may be off, or move in a cycle.
 pub const STANDING_COUNTS: f64 = 1.5;
@@ -20,21 +20,21 @@ const RETRY: u32 = 100;
 
 /// The machine at rest, as its file says it is.
 pub struct Standing {
-    axes: usize,
+    actuators: usize,
     weight: Box<dyn Weight>,
     /// What the weight took where it was asked for last [N·m].
-    torque: AxisArray,
+    torque: ActuatorArray,
     /// Way of the tool per radian of each motor there [m/rad].
-    lever: AxisArray,
+    lever: ActuatorArray,
     /// The same at home.
-    lever_at_home: AxisArray,
+    lever_at_home: ActuatorArray,
     /// What friction, brakes and teeth hold without power [N·m].
-    unpowered: AxisArray,
+    unpowered: ActuatorArray,
     /// How far the tool may be away [m].
     tolerance: f64,
     /// How far a motor may be away that moves no tool, and the least that any may [rad].
-    most: AxisArray,
-    counts: AxisArray,
+    most: ActuatorArray,
+    counts: ActuatorArray,
     /// Cycles in which the mechanism is not asked.
     pause: u32,
     release: u32,
@@ -60,29 +60,31 @@ impl Strayed {
 impl Standing {
     /// Of this machine.
     pub fn new(machine: &Machine) -> Self {
-        let [mut most, mut counts, mut unpowered] = [[0.0; MAX_AXES]; 3];
-        for (index, axis) in machine.axes.iter().enumerate().take(MAX_AXES) {
-            most[index] = axis.limits.following_error / axis.ratio;
-            counts[index] = STANDING_COUNTS * axis.encoder.resolution();
-            let teeth = axis.motor.stepper().map_or(0.0, |motor| motor.detent_torque);
-            unpowered[index] = axis.friction.coulomb + axis.brake.torque + teeth;
+        let [mut most, mut counts, mut unpowered] = [[0.0; MAX_ACTUATORS]; 3];
+        for (index, (actuator, axis)) in machine.drives().enumerate().take(MAX_ACTUATORS) {
+            most[index] = axis.limits.following_error / actuator.ratio.abs();
+            counts[index] = STANDING_COUNTS * actuator.encoder.resolution();
+            let teeth = actuator.motor.stepper().map_or(0.0, |motor| motor.detent_torque);
+            unpowered[index] = actuator.friction.coulomb + actuator.brake.torque + teeth;
         }
         let mut standing = Self {
-            axes: machine.axes.len().min(MAX_AXES),
+            actuators: machine.actuators.len().min(MAX_ACTUATORS),
             weight: machine.mechanism.visit(OfMechanism(machine)),
-            torque: [0.0; MAX_AXES],
-            lever: [0.0; MAX_AXES],
-            lever_at_home: [0.0; MAX_AXES],
+            torque: [0.0; MAX_ACTUATORS],
+            lever: [0.0; MAX_ACTUATORS],
+            lever_at_home: [0.0; MAX_ACTUATORS],
             unpowered,
             tolerance: machine.path.tolerance,
             most,
             counts,
             pause: 0,
-            release: release(&machine.axes),
+            release: release(&machine.actuators),
         };
-        let home = machine.axes.iter().zip(&machine.home_joints);
-        let mut angle = [0.0; MAX_AXES];
-        angle.iter_mut().zip(home).for_each(|(angle, (axis, joint))| *angle = joint / axis.ratio);
+        let mut angle = [0.0; MAX_ACTUATORS];
+        for (angle, actuator) in angle.iter_mut().zip(&machine.actuators) {
+            let joint = machine.home_joints.get(actuator.axis).copied().unwrap_or_default();
+            *angle = joint / actuator.ratio;
+        }
         standing.torque(&angle);
         standing.lever_at_home = standing.lever;
         standing
@@ -90,7 +92,7 @@ impl Standing {
 
     /// Torques that hold the motors at `angle` [rad] against gravity [N·m]. Where the mechanism cannot
     /// be, those of the place before.
-    pub fn torque(&mut self, angle: &AxisArray) -> &AxisArray {
+    pub fn torque(&mut self, angle: &ActuatorArray) -> &ActuatorArray {
         self.pause = self.pause.saturating_sub(1);
         if self.pause == 0 {
             match self.weight.at(angle) {
@@ -103,29 +105,29 @@ impl Standing {
 
     /// The motor that has sunk furthest from `place` [rad], by more than some counts, of those that nothing
     /// holds against their weight without power.
-    pub fn sunk(&self, place: &AxisArray, angle: &AxisArray) -> Option<Strayed> {
+    pub fn sunk(&self, place: &ActuatorArray, angle: &ActuatorArray) -> Option<Strayed> {
         let sinks = |index: &usize| self.torque[*index].abs() > self.unpowered[*index];
         let of = |index: usize| self.strayed_by(index, place, angle, self.counts[index]);
-        worst((0..self.axes).filter(sinks).map(of))
+        worst((0..self.actuators).filter(sinks).map(of))
     }
 
     /// The motor that is furthest from `place` [rad] in what it may be away, if it is further than that:
     /// what moves the tool by the path's tolerance, here or at home, but some counts at least.
-    pub fn strayed(&self, place: &AxisArray, angle: &AxisArray) -> Option<Strayed> {
+    pub fn strayed(&self, place: &ActuatorArray, angle: &ActuatorArray) -> Option<Strayed> {
         let of = |index: usize| {
             // Of an axis that moves no tool the following error is left.
             let lever = self.lever[index].max(self.lever_at_home[index]);
             let most = (self.tolerance / lever.max(f64::MIN_POSITIVE)).min(self.most[index]);
             self.strayed_by(index, place, angle, most.max(self.counts[index]))
         };
-        worst((0..self.axes).map(of))
+        worst((0..self.actuators).map(of))
     }
 
     fn strayed_by(
         &self,
         index: usize,
-        place: &AxisArray,
-        angle: &AxisArray,
+        place: &ActuatorArray,
+        angle: &ActuatorArray,
         limit: f64,
     ) -> Strayed {
         Strayed { index, distance: (angle[index] - place[index]).abs(), limit }
@@ -150,9 +152,10 @@ impl fmt::Debug for Standing {
     }
 }
 
-/// Cycles that the slowest brake of `axes` takes.
-fn release(axes: &[Axis]) -> u32 {
-    let brakes = axes.iter().map(|axis| &axis.brake).filter(|brake| brake.torque > 0.0);
+/// Cycles that the slowest brake of `actuators` takes.
+fn release(actuators: &[Actuator]) -> u32 {
+    let brakes =
+        actuators.iter().map(|actuator| &actuator.brake).filter(|brake| brake.torque > 0.0);
     let slowest = brakes.map(|brake| brake.release).reduce(f64::max);
     slowest.map_or(0, |release| (release / CYCLE_TIME).ceil() as u32 + RELEASE_MARGIN)
 }
@@ -161,27 +164,32 @@ fn release(axes: &[Axis]) -> u32 {
 trait Weight: Send {
     /// Torques that hold motors at `angle` [rad], and the way of the tool per radian of each; `None` where
     /// the mechanism cannot be.
-    fn at(&mut self, angle: &AxisArray) -> Option<(AxisArray, AxisArray)>;
+    fn at(&mut self, angle: &ActuatorArray) -> Option<(ActuatorArray, ActuatorArray)>;
 }
 
 struct Of<const N: usize, M: Mechanism<N>> {
     mechanism: M,
-    ratio: [f64; N],
+    actuators: Vec<Actuator>,
     /// Where it was last: it goes on from there.
     near: Option<M::ChainState>,
 }
 
 impl<const N: usize, M: Mechanism<N>> Weight for Of<N, M> {
-    fn at(&mut self, angle: &AxisArray) -> Option<(AxisArray, AxisArray)> {
+    fn at(&mut self, angle: &ActuatorArray) -> Option<(ActuatorArray, ActuatorArray)> {
         // What springs have the motors ahead moves no weight to speak of.
-        let joints = Joints::from_fn(|row, _| self.ratio[row] * angle[row]);
+        let mut joints = Joints::<N>::zeros();
+        for (actuator, angle) in self.actuators.iter().zip(angle) {
+            joints[actuator.axis] += actuator.share * (actuator.ratio * angle);
+        }
         let chain = self.mechanism.solve(&joints, self.mechanism.branch(), self.near.as_ref());
         let chain = chain.ok()?;
         let (effort, jacobian) = (self.mechanism.gravity(&chain), self.mechanism.jacobian(&chain));
-        let [mut torque, mut lever] = [[0.0; MAX_AXES]; 2];
-        for row in 0..N.min(MAX_AXES) {
-            torque[row] = self.ratio[row] * effort[row];
-            lever[row] = self.ratio[row].abs() * jacobian.fixed_view::<3, 1>(0, row).norm();
+        let [mut torque, mut lever] = [[0.0; MAX_ACTUATORS]; 2];
+        for (row, actuator) in self.actuators.iter().enumerate() {
+            let Actuator { axis, ratio, share, .. } = *actuator;
+            torque[row] = ratio * (share * effort[axis]);
+            // Of several on an axis each counts as if it moved the joint alone.
+            lever[row] = ratio.abs() * jacobian.fixed_view::<3, 1>(0, axis).norm();
         }
         let is_known = torque.iter().chain(&lever).all(|value| value.is_finite());
         is_known.then(|| {
@@ -198,8 +206,9 @@ impl MechanismVisitor for OfMechanism<'_> {
     type Output = Box<dyn Weight>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let ratio = core::array::from_fn(|row| self.0.axes.get(row).map_or(1.0, |axis| axis.ratio));
-        Box::new(Of { mechanism, ratio, near: None })
+        let own = |actuator: &&Actuator| actuator.axis < N;
+        let actuators = self.0.actuators.iter().take(MAX_ACTUATORS).filter(own).cloned().collect();
+        Box::new(Of { mechanism, actuators, near: None })
     }
 }
 
@@ -213,13 +222,17 @@ mod tests {
         Machine::load(&folder.join(name), &[]).unwrap()
     }
 
+    fn array(values: &[f64]) -> ActuatorArray {
+        core::array::from_fn(|index| values.get(index).copied().unwrap_or_default())
+    }
+
     #[test]
     fn a_slide_bears_its_weight_and_turning_joints_nothing() {
         let machine = machine("serial.toml");
         let mut standing = Standing::new(&machine);
         // 0.5 kg on a screw of 10 mm/rev.
         let weight = 0.5 * 9.80665 * 10e-3 / core::f64::consts::TAU;
-        for angle in [[0.0; MAX_AXES], [1.0, 40.0, -30.0, 0.0, 0.0, 0.0, 0.0, 0.0]] {
+        for angle in [[0.0; MAX_ACTUATORS], array(&[1.0, 40.0, -30.0])] {
             let torque = standing.torque(&angle);
             assert!(torque[0].abs() + torque[1].abs() < 1e-12, "{torque:?}");
             assert!((torque[2] - weight).abs() < 1e-4 * weight, "{torque:?} not {weight}");
@@ -227,11 +240,11 @@ mod tests {
         assert_eq!(standing.release(), 22, "20 ms");
         // 5 µm of the tool, on a screw of 10 mm/rev.
         let tolerance = 5e-6 / (10e-3 / core::f64::consts::TAU);
-        let angle = |distance: f64| [0.0, 0.0, distance, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let strayed = |distance: f64| standing.strayed(&[0.0; MAX_AXES], &angle(distance));
+        let angle = |distance: f64| array(&[0.0, 0.0, distance]);
+        let strayed = |distance: f64| standing.strayed(&[0.0; MAX_ACTUATORS], &angle(distance));
         assert_eq!(strayed(0.99 * tolerance), None);
         let beyond = strayed(-1.01 * tolerance).unwrap();
-        assert_eq!(standing.sunk(&[0.0; MAX_AXES], &angle(1.0)), None, "its brake holds it");
+        assert_eq!(standing.sunk(&[0.0; MAX_ACTUATORS], &angle(1.0)), None, "its brake holds it");
         assert_eq!(beyond.index, 2);
         assert!((beyond.distance - 1.01 * tolerance).abs() < 1e-12);
         assert!((beyond.limit - tolerance).abs() < 1e-12);
@@ -240,18 +253,18 @@ mod tests {
     #[test]
     fn an_axis_that_nothing_holds_may_move_by_no_more_than_counts() {
         let mut machine = machine("serial.toml");
-        machine.axes[2].brake.torque = 0.0;
+        machine.actuators[2].brake.torque = 0.0;
         let standing = Standing::new(&machine);
-        let two_counts = 2.0 * machine.axes[2].encoder.resolution();
-        let angle = [0.0, 0.0, -two_counts, 0.0, 0.0, 0.0, 0.0, 0.0];
-        assert_eq!(standing.strayed(&[0.0; MAX_AXES], &angle), None);
-        assert_eq!(standing.sunk(&[0.0; MAX_AXES], &angle).unwrap().index, 2);
+        let two_counts = 2.0 * machine.actuators[2].encoder.resolution();
+        let angle = array(&[0.0, 0.0, -two_counts]);
+        assert_eq!(standing.strayed(&[0.0; MAX_ACTUATORS], &angle), None);
+        assert_eq!(standing.sunk(&[0.0; MAX_ACTUATORS], &angle).unwrap().index, 2);
     }
 
     #[test]
     fn what_cannot_be_keeps_the_torque_before() {
         let mut standing = Standing::new(&machine("tri_planar.toml"));
-        let before = *standing.torque(&[f64::NAN; MAX_AXES]);
+        let before = *standing.torque(&[f64::NAN; MAX_ACTUATORS]);
         assert!(before.iter().all(|torque| torque.is_finite()));
         assert!(before.iter().any(|torque| *torque != 0.0), "{before:?}");
     }
@@ -259,7 +272,7 @@ mod tests {
     #[test]
     fn a_machine_in_the_plane_bears_no_weight_and_waits_for_no_brake() {
         let mut standing = Standing::new(&Machine::builtin());
-        assert_eq!(*standing.torque(&[3.0; MAX_AXES]), [0.0; MAX_AXES]);
+        assert_eq!(*standing.torque(&[3.0; MAX_ACTUATORS]), [0.0; MAX_ACTUATORS]);
         assert_eq!(standing.release(), 0);
     }
 }

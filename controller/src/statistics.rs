@@ -4,9 +4,10 @@ use crate::cascade::Drive;
 use crate::digest::Digest;
 use crate::feedforward::Planned;
 use crate::player::Instant;
-use machine::{Axis, Machine};
+use machine::{Actuator, Axis, Machine};
 use messages::{
-    Command, ControllerReport, Cycle, Fault, Feedback, MAX_AXES, RealtimeFacts, Setpoint,
+    Command, ControllerReport, Cycle, Fault, Feedback, MAX_ACTUATORS, MAX_AXES, RealtimeFacts,
+    Setpoint,
 };
 
 /// An angle beyond every motor's, whose square is still a number [rad].
@@ -18,6 +19,8 @@ pub struct Statistics {
     per_path_acceleration: f64,
     per_path_jerk: f64,
     axes: Vec<Shares>,
+    /// Reciprocal current limits of the motors, 0 of a stepper.
+    per_current: Vec<f64>,
     report: ControllerReport,
     digest: Digest,
 }
@@ -28,7 +31,6 @@ struct Shares {
     per_velocity: f64,
     per_acceleration: f64,
     per_jerk: f64,
-    per_current: f64,
 }
 
 impl Statistics {
@@ -38,12 +40,14 @@ impl Statistics {
             per_velocity: 1.0 / axis.velocity_limit().plan,
             per_acceleration: 1.0 / axis.acceleration_limit().plan,
             per_jerk: 1.0 / axis.jerk_limit().plan,
-            per_current: axis.motor.dc().map_or(0.0, |motor| 1.0 / motor.current),
         };
+        let per_current =
+            |actuator: &Actuator| actuator.motor.dc().map_or(0.0, |motor| 1.0 / motor.current);
         Self {
             per_path_acceleration: 1.0 / machine.path.acceleration,
             per_path_jerk: 1.0 / machine.path.jerk,
             axes: machine.axes.iter().map(shares).collect(),
+            per_current: machine.actuators.iter().map(per_current).collect(),
             report: ControllerReport::default(),
             digest: Digest::new(),
         }
@@ -69,8 +73,8 @@ impl Statistics {
         report.last_cycle = feedback.cycle;
         // With those in between that drives skipped.
         report.cycles = (feedback.cycle.0 + 1).saturating_sub(report.first_cycle.0);
-        self.digest.add(command, self.axes.len());
-        for index in 0..self.axes.len().min(MAX_AXES) {
+        self.digest.add(command, self.per_current.len());
+        for index in 0..self.per_current.len().min(MAX_ACTUATORS) {
             let error = (now.angle[index] - feedback.position[index]).abs();
             // What is no angle ends the run as a fault, and would leave no number in the summary.
             if error > BEYOND_ANGLE || error.is_nan() {
@@ -83,10 +87,10 @@ impl Statistics {
 
     /// Counts the current asked of the motor with this index.
     pub fn drive(&mut self, index: usize, drive: &Drive) {
-        if let (Some(axis), Some(most)) =
-            (self.axes.get(index), self.report.effort_use.get_mut(index))
+        if let (Some(per_current), Some(most)) =
+            (self.per_current.get(index), self.report.effort_use.get_mut(index))
         {
-            *most = most.max(drive.current.abs() * axis.per_current);
+            *most = most.max(drive.current.abs() * per_current);
         }
     }
 

@@ -7,11 +7,14 @@ use crate::ramp::{LARGEST_CHANGE, LARGEST_TURN};
 use crate::standing::STANDING_COUNTS;
 use machine::trip::Limit;
 use machine::trip::following::{CREEP, DISCONTINUITY, LEAD_STEP};
-use machine::{Axis, DcMotor, Machine, StallTolerance};
+use machine::{Actuator, Axis, DcMotor, Machine, StallTolerance};
 use messages::feedback::status;
 use messages::setpoint::flags;
 use messages::time::CYCLE_TIME;
-use messages::{AxisArray, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, Setpoint};
+use messages::{
+    ActuatorArray, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_ACTUATORS, MAX_AXES,
+    Setpoint,
+};
 
 /// Whether the axes can still be trusted to follow the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,11 +65,12 @@ impl Elapsed {
 #[derive(Debug, Clone)]
 pub struct Supervision {
     axes: Vec<Axis>,
+    actuators: Vec<Actuator>,
     tolerance: StallTolerance,
     seen: Option<Seen>,
     /// Cycles since the last that was in time.
     late: u64,
-    heating: AxisArray,
+    heating: ActuatorArray,
     standing: u32,
 }
 
@@ -83,10 +87,11 @@ impl Supervision {
     pub fn new(machine: &Machine) -> Self {
         Self {
             axes: machine.axes.clone(),
+            actuators: machine.actuators.clone(),
             tolerance: machine.stall,
             seen: None,
             late: 0,
-            heating: [0.0; MAX_AXES],
+            heating: [0.0; MAX_ACTUATORS],
             standing: 0,
         }
     }
@@ -96,7 +101,7 @@ impl Supervision {
         self.late = 0;
     }
 
-    /// Cycles in a row in which no axis moved by more than an encoder count or so.
+    /// Cycles in a row in which no motor moved by more than an encoder count or so.
     pub fn standing(&self) -> u32 {
         self.standing
     }
@@ -118,8 +123,8 @@ impl Supervision {
         let same_run = before.filter(|before| before.epoch == seen.epoch);
         let gap = same_run.map_or(1, |before| seen.cycle.0.saturating_sub(before.cycle.0));
         self.heat(feedback, gap);
-        if let Some((index, value)) = not_finite(feedback, self.axes.len()) {
-            let fault = Fault::new(FaultCode::NotFinite).on(index);
+        if let Some((index, value)) = not_finite(feedback, self.actuators.len()) {
+            let fault = Fault::new(FaultCode::NotFinite).on_actuator(index);
             return Err(Finding::lost(fault.with(FaultQuantity::Number, value)));
         }
         let Some(before) = before else { return Ok(Elapsed::ONE) };
@@ -158,41 +163,85 @@ impl Supervision {
         Ok(())
     }
 
-    /// Whether the axes follow `angle` [rad at the motor] inside their limits, and are cool.
+    /// Whether the actuators follow `angle` [rad at the motor] inside the limits of their axes, those of
+    /// one axis together, and are cool.
     ///
     /// # Errors
-    /// Following error, soft limit or overload, with the axis.
-    pub fn motion(&self, feedback: &Feedback, angle: &AxisArray) -> Result<(), Finding> {
+    /// Following error, soft limit, racking or overload, with the actuator, or with the axis.
+    pub fn motion(&self, feedback: &Feedback, angle: &ActuatorArray) -> Result<(), Finding> {
         // A winding stays too warm until the axes rest: that must not hide the loss of an axis.
         let mut overload = None;
-        for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
+        for (axis_index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
             let limits = &axis.limits;
-            let measured = feedback.position[index] * axis.ratio;
-            let error = (angle[index] * axis.ratio - measured).abs();
-            if error > limits.following_error || error.is_nan() {
-                let fault = Fault::new(FaultCode::FollowingError).on(index);
-                let quantity = FaultQuantity::FollowingError;
-                return Err(Finding::lost(fault.beyond(quantity, error, limits.following_error)));
+            let mut joint = 0.0;
+            for (actuator, index) in
+                axis.driven_by(&self.actuators).iter().zip(axis.actuators.clone())
+            {
+                let measured = feedback.position[index] * actuator.ratio;
+                joint += actuator.share * measured;
+                let error = (angle[index] * actuator.ratio - measured).abs();
+                if error > limits.following_error || error.is_nan() {
+                    let fault = Fault::new(FaultCode::FollowingError).on_actuator(index);
+                    let quantity = FaultQuantity::FollowingError;
+                    return Err(Finding::lost(fault.beyond(
+                        quantity,
+                        error,
+                        limits.following_error,
+                    )));
+                }
+                if let Some(limit) = actuator.motor.dc().and_then(DcMotor::heating_limit) {
+                    let heating = self.heating[index];
+                    if heating > limit.trip * limit.trip {
+                        let fault = Fault::new(FaultCode::Overload).on_actuator(index);
+                        let (quantity, value) = (FaultQuantity::Heating, heating.sqrt());
+                        let finding = Finding::sound(fault.beyond(quantity, value, limit.trip));
+                        overload.get_or_insert(finding);
+                    }
+                }
             }
             // A plan may go right up to the limit, and the axis follows it with some error.
             let [lower, upper] = limits.position;
             let margin = limits.following_error;
-            if measured < lower - margin || measured > upper + margin {
-                let limit = if measured < lower { lower } else { upper };
-                let fault = Fault::new(FaultCode::PositionLimit).on(index);
-                return Err(Finding::lost(fault.beyond(FaultQuantity::Position, measured, limit)));
+            if joint < lower - margin || joint > upper + margin {
+                let limit = if joint < lower { lower } else { upper };
+                let fault = Fault::new(FaultCode::PositionLimit).on_axis(axis_index);
+                return Err(Finding::lost(fault.beyond(FaultQuantity::Position, joint, limit)));
             }
-            if let Some(limit) = axis.motor.dc().and_then(DcMotor::heating_limit) {
-                let heating = self.heating[index];
-                if heating > limit.trip * limit.trip {
-                    let fault = Fault::new(FaultCode::Overload).on(index);
-                    let (quantity, value) = (FaultQuantity::Heating, heating.sqrt());
-                    let finding = Finding::sound(fault.beyond(quantity, value, limit.trip));
-                    overload.get_or_insert(finding);
-                }
-            }
+            self.squareness(axis, &feedback.position)?;
         }
         overload.map_or(Ok(()), Err)
+    }
+
+    /// Whether the actuators of each axis are together, with the motors at `angle` [rad].
+    ///
+    /// # Errors
+    /// One that is too far from another one of its axis.
+    pub fn square(&self, angle: &ActuatorArray) -> Result<(), Finding> {
+        self.axes.iter().try_for_each(|axis| self.squareness(axis, angle))
+    }
+
+    fn squareness(&self, axis: &Axis, angle: &ActuatorArray) -> Result<(), Finding> {
+        let own = axis.driven_by(&self.actuators);
+        if own.len() < 2 {
+            return Ok(());
+        }
+        let limit = axis.limits.racking;
+        let places =
+            || axis.actuators.clone().zip(own).map(|(index, it)| (index, angle[index] * it.ratio));
+        let lowest = places().fold(f64::INFINITY, |lowest, (_, place)| lowest.min(place));
+        let highest = places().fold(f64::NEG_INFINITY, |highest, (_, place)| highest.max(place));
+        let racking = highest - lowest;
+        if racking <= limit {
+            return Ok(());
+        }
+        // The one farther from where all of them are in the mean is more likely the one that is lost.
+        let mean: f64 = places().zip(own).map(|((_, place), it)| it.share * place).sum();
+        let off = |place: f64| (place - mean).abs();
+        let (index, _) = places().fold((axis.actuators.start, -1.0), |worst, (index, place)| {
+            if off(place) > worst.1 { (index, off(place)) } else { worst }
+        });
+        let fault = Fault::new(FaultCode::Racking).on_actuator(index);
+        Err(Finding::lost(fault.beyond(FaultQuantity::Racking, racking, limit)))
     }
 
     /// Whether a setpoint can be played.
@@ -216,24 +265,17 @@ impl Supervision {
                 setpoint.velocity[index],
                 setpoint.acceleration[index],
                 setpoint.jerk[index],
-                setpoint.lead[index],
-                setpoint.lead_momentum[index],
-                setpoint.static_lead[index],
-                setpoint.effort[index],
-                setpoint.static_effort[index],
-                setpoint.momentum[index],
             ];
             if let Some(value) = numbers.iter().find(|value| !value.is_finite()) {
-                let fault = not_finite.on(index).with(FaultQuantity::Number, *value);
+                let fault = not_finite.on_axis(index).with(FaultQuantity::Number, *value);
                 return Err(Finding::sound(fault));
             }
-            let [position, velocity, acceleration, jerk, _, _, _, effort, ..] = numbers;
+            let [position, velocity, acceleration, jerk] = numbers;
             let [lower, upper] = limits.position;
             let sizes = [
                 (FaultQuantity::Velocity, velocity, axis.velocity_limit()),
                 (FaultQuantity::Acceleration, acceleration, axis.acceleration_limit()),
                 (FaultQuantity::Jerk, jerk, axis.jerk_limit()),
-                (FaultQuantity::Torque, effort, axis.effort_limit(velocity / axis.ratio)),
             ];
             let too_large = sizes.iter().find(|(_, value, limit)| value.abs() > limit.trip);
             let nearest = position.max(lower).min(upper);
@@ -243,8 +285,34 @@ impl Supervision {
                 Some((quantity, value, limit)) => (*quantity, *value, limit.plan),
             };
             let (quantity, value, limit) = broken;
-            let fault = Fault::new(FaultCode::SetpointLimit).on(index);
+            let fault = Fault::new(FaultCode::SetpointLimit).on_axis(index);
             return Err(Finding::sound(fault.beyond(quantity, value, limit)));
+        }
+        self.efforts(setpoint)
+    }
+
+    /// Whether the motors can bear what `setpoint` asks of them.
+    fn efforts(&self, setpoint: &Setpoint) -> Result<(), Finding> {
+        for (index, actuator) in self.actuators.iter().enumerate().take(MAX_ACTUATORS) {
+            let numbers = [
+                setpoint.lead[index],
+                setpoint.lead_momentum[index],
+                setpoint.static_lead[index],
+                setpoint.effort[index],
+                setpoint.static_effort[index],
+                setpoint.momentum[index],
+            ];
+            if let Some(value) = numbers.iter().find(|value| !value.is_finite()) {
+                let fault = Fault::new(FaultCode::NotFinite).on_actuator(index);
+                return Err(Finding::sound(fault.with(FaultQuantity::Number, *value)));
+            }
+            let effort = setpoint.effort[index];
+            let limit = actuator.effort_limit(setpoint.velocity[actuator.axis] / actuator.ratio);
+            if effort.abs() > limit.trip {
+                let fault = Fault::new(FaultCode::SetpointLimit).on_actuator(index);
+                let fault = fault.beyond(FaultQuantity::Torque, effort, limit.plan);
+                return Err(Finding::sound(fault));
+            }
         }
         Ok(())
     }
@@ -272,7 +340,22 @@ impl Supervision {
             let moved = setpoint.position[index] - before.position[index];
             let jump = if starts { 0.0 } else { moved - speeds / 2.0 * CYCLE_TIME };
             let creep = if rests { setpoint.velocity[index] * CYCLE_TIME } else { 0.0 };
-            let step = |of: fn(&Setpoint) -> &AxisArray| of(setpoint)[index] - of(before)[index];
+            let steps = [
+                (FaultQuantity::Jump, jump, DISCONTINUITY * unit),
+                (FaultQuantity::Creep, creep, CREEP * unit),
+            ];
+            let broken = steps.iter().find(|(_, value, limit)| value.abs() > *limit);
+            if let Some((quantity, value, limit)) = broken {
+                let fault = Fault::new(FaultCode::SetpointLimit).on_axis(index);
+                return Err(Finding::sound(fault.beyond(*quantity, *value, *limit)));
+            }
+        }
+        for (index, actuator) in self.actuators.iter().enumerate().take(MAX_ACTUATORS) {
+            let limit = LEAD_STEP * self.axes[actuator.axis].limits.following_error;
+            let before = before.unwrap_or(setpoint);
+            let rests = ends || starts;
+            let step =
+                |of: fn(&Setpoint) -> &ActuatorArray| of(setpoint)[index] - of(before)[index];
             // What is left of the lead in a hold, and what a change of the rate adds to it.
             let at_rest = setpoint.lead[index] - setpoint.static_lead[index];
             let momentum = setpoint.lead_momentum[index];
@@ -286,15 +369,9 @@ impl Supervision {
             let lead = leads.into_iter().fold(0.0, |largest: f64, lead| {
                 if lead.abs() > largest.abs() { lead } else { largest }
             });
-            let steps = [
-                (FaultQuantity::Jump, jump, DISCONTINUITY * unit),
-                (FaultQuantity::LeadJump, lead, LEAD_STEP * unit),
-                (FaultQuantity::Creep, creep, CREEP * unit),
-            ];
-            let broken = steps.iter().find(|(_, value, limit)| value.abs() > *limit);
-            if let Some((quantity, value, limit)) = broken {
-                let fault = Fault::new(FaultCode::SetpointLimit).on(index);
-                return Err(Finding::sound(fault.beyond(*quantity, *value, *limit)));
+            if lead.abs() > limit {
+                let fault = Fault::new(FaultCode::SetpointLimit).on_actuator(index);
+                return Err(Finding::sound(fault.beyond(FaultQuantity::LeadJump, lead, limit)));
             }
         }
         Ok(())
@@ -311,13 +388,15 @@ impl Supervision {
         }
     }
 
-    /// The first axis that moves by more than an encoder count or so in a cycle, with its speed and what
+    /// The first actuator that moves by more than an encoder count or so in a cycle, with its speed and what
     /// counts as standing [joint units/s].
     pub fn moving(&self, feedback: &Feedback) -> Option<(usize, f64, f64)> {
-        self.axes.iter().zip(&feedback.velocity).enumerate().find_map(|(index, (axis, speed))| {
-            let limit = STANDING_COUNTS * axis.encoder.resolution();
+        let mut drives = self.actuators.iter().zip(&feedback.velocity).enumerate();
+        drives.find_map(|(index, (actuator, speed))| {
+            let limit = STANDING_COUNTS * actuator.encoder.resolution();
             let stands = speed.abs() * CYCLE_TIME <= limit;
-            (!stands).then(|| (index, speed.abs() * axis.ratio, limit / CYCLE_TIME * axis.ratio))
+            let ratio = actuator.ratio.abs();
+            (!stands).then(|| (index, speed.abs() * ratio, limit / CYCLE_TIME * ratio))
         })
     }
 
@@ -333,9 +412,9 @@ fn impossible_light(setpoint: &Setpoint) -> Fault {
     Fault::new(FaultCode::SetpointLimit).with(FaultQuantity::Light, sequence)
 }
 
-/// The first measured number that is not finite, with its axis.
-fn not_finite(feedback: &Feedback, axes: usize) -> Option<(usize, f64)> {
-    (0..axes.min(MAX_AXES)).find_map(|index| {
+/// The first measured number that is not finite, with its actuator.
+fn not_finite(feedback: &Feedback, actuators: usize) -> Option<(usize, f64)> {
+    (0..actuators.min(MAX_ACTUATORS)).find_map(|index| {
         let measured =
             [feedback.position[index], feedback.velocity[index], feedback.current[index]];
         measured.into_iter().find(|value| !value.is_finite()).map(|value| (index, value))

@@ -72,7 +72,7 @@ mod tests {
     #[test]
     fn the_winding_is_the_exact_answer_to_an_even_voltage_and_a_tilted_speed() {
         let machine = Machine::builtin();
-        let motor = machine.axes[0].motor.dc().unwrap();
+        let motor = machine.actuators[0].motor.dc().unwrap();
         let mut winding = Winding::new(motor);
         let (mut current, mut speed) = (0.0, 0.0);
         for cycle in 0..50 {

@@ -31,8 +31,8 @@ fn assert_no_step_allocates(machine: &Machine, speed: f64) {
     let mut controller = Controller::new(machine);
     let mut outputs = Outputs::default();
     let mut feedback = Feedback { status: status::POWERED, ..Feedback::default() };
-    for (index, axis) in machine.axes.iter().enumerate().take(2) {
-        feedback.position[index] = support::home(machine)[index] / axis.ratio;
+    for (index, actuator) in machine.actuators.iter().enumerate().take(2) {
+        feedback.position[index] = support::home(machine)[index] / actuator.ratio;
     }
     let mut sent = 0;
     let mut seen = [0; 7];

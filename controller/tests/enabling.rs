@@ -11,8 +11,8 @@ use messages::feedback::status;
 use messages::math;
 use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
 use messages::{
-    AxisArray, Command, CommandMode, ControllerState, FaultCode, FaultQuantity, Feedback,
-    OperatorRequest, OperatorVerb,
+    ActuatorArray, Command, CommandMode, ControllerState, FaultCode, FaultQuantity, Feedback,
+    MAX_ACTUATORS, OperatorRequest, OperatorVerb,
 };
 use runtime::allocation::{Allocations, CountingAllocator};
 
@@ -34,7 +34,7 @@ struct Rig {
     feedback: Feedback,
     outputs: Outputs,
     /// Where the motors stand at home [rad].
-    home: AxisArray,
+    home: ActuatorArray,
     /// When the power is on.
     power: Power,
 }
@@ -50,9 +50,9 @@ enum Power {
 
 impl Rig {
     fn new(machine: &Machine) -> Self {
-        let mut home = AxisArray::default();
-        let joints = machine.axes.iter().zip(&machine.home_joints);
-        home.iter_mut().zip(joints).for_each(|(angle, (axis, joint))| *angle = joint / axis.ratio);
+        let mut home = ActuatorArray::default();
+        let joints = machine.actuators.iter().zip(&machine.home_joints);
+        home.iter_mut().zip(joints).for_each(|(angle, (it, joint))| *angle = joint / it.ratio);
         let feedback = Feedback { epoch: 5, position: home, ..Feedback::default() };
         let controller = Controller::new(machine);
         Self { controller, feedback, outputs: Outputs::default(), home, power: Power::Asked }
@@ -99,11 +99,11 @@ impl Rig {
             .unwrap()
     }
 
-    /// The axis, quantity, value and limit of the fault.
-    fn fault(&self) -> (u32, FaultQuantity, f64, f64) {
+    /// The actuator, quantity, value and limit of the fault.
+    fn fault(&self) -> (u16, FaultQuantity, f64, f64) {
         let fault = &self.outputs.command.fault;
         assert_eq!(fault.code(), FaultCode::DriveFault);
-        (fault.axis, fault.quantity(), fault.value, fault.limit().unwrap())
+        (fault.actuator, fault.quantity(), fault.value, fault.limit().unwrap())
     }
 }
 
@@ -114,11 +114,11 @@ fn serial() -> Machine {
 #[test]
 fn the_weight_is_borne_from_the_first_voltage_on() {
     let machine = serial();
-    let motor = *machine.axes[SLIDE].motor.dc().unwrap();
-    let torque = 0.5 * 9.80665 * machine.axes[SLIDE].ratio;
+    let motor = *machine.actuators[SLIDE].motor.dc().unwrap();
+    let torque = 0.5 * 9.80665 * machine.actuators[SLIDE].ratio;
     let volts = motor.voltage(torque / motor.torque_constant, 0.0, 0.0);
     let mut rig = Rig::new(&machine);
-    assert_eq!(rig.cycle(None, 0.0).voltage, [0.0; 8], "unpowered");
+    assert_eq!(rig.cycle(None, 0.0).voltage, [0.0; MAX_ACTUATORS], "unpowered");
     let mut current = 0.0;
     for cycle in 0..200 {
         let verb = (cycle == 0).then_some(OperatorVerb::Enable);
@@ -143,19 +143,19 @@ fn the_weight_is_borne_from_the_first_voltage_on() {
 fn it_waits_for_the_slowest_brake() {
     let mut machine = serial();
     assert_eq!(Rig::asked(&machine).enabling(|_| 0.0), 1 + RELEASE + STANDING);
-    machine.axes[0].brake = HoldingBrake { torque: 0.1, release: 0.2 };
+    machine.actuators[0].brake = HoldingBrake { torque: 0.1, release: 0.2 };
     assert_eq!(Rig::asked(&machine).enabling(|_| 0.0), 1 + 202 + STANDING);
-    machine.axes.iter_mut().for_each(|axis| axis.brake.release = 0.0);
+    machine.actuators.iter_mut().for_each(|it| it.brake.release = 0.0);
     assert_eq!(Rig::asked(&machine).enabling(|_| 0.0), 1 + 2 + STANDING);
     // Without a brake there is nothing to wait for.
-    machine.axes.iter_mut().for_each(|axis| axis.brake.torque = 0.0);
+    machine.actuators.iter_mut().for_each(|it| it.brake.torque = 0.0);
     assert_eq!(Rig::asked(&machine).enabling(|_| 0.0), 1 + STANDING);
 }
 
 #[test]
 fn an_axis_that_gives_way_is_waited_for_until_it_has_come_back() {
     let machine = serial();
-    let ratio = machine.axes[SLIDE].ratio;
+    let ratio = machine.actuators[SLIDE].ratio;
     // The brake opens, and it sinks by 40 µm in 20 ms, and comes back in 200.
     let back = 10 + 20 + 200;
     let away = |cycle: usize| match cycle {
@@ -173,43 +173,43 @@ fn an_axis_that_gives_way_is_waited_for_until_it_has_come_back() {
 #[test]
 fn an_axis_that_stays_away_or_moves_on_is_named() {
     let machine = serial();
-    let ratio = machine.axes[SLIDE].ratio;
+    let ratio = machine.actuators[SLIDE].ratio;
     let mut rig = Rig::asked(&machine);
     let ended = rig.enabling(|cycle| if cycle < 10 { 0.0 } else { -6e-6 / ratio });
     assert!((1000..1050).contains(&ended), "{ended}");
     let (axis, quantity, value, limit) = rig.fault();
-    assert_eq!((axis, quantity), (SLIDE as u32 + 1, FaultQuantity::HoldDistance));
+    assert_eq!((axis, quantity), (SLIDE as u16 + 1, FaultQuantity::HoldDistance));
     assert!((value - 6e-6).abs() < 1e-9 && (limit - 5e-6).abs() < 1e-9, "{value} {limit}");
 
     // Within the tolerance, but by two counts there and back in every cycle.
-    let count = machine.axes[SLIDE].encoder.resolution();
+    let count = machine.actuators[SLIDE].encoder.resolution();
     let mut rig = Rig::asked(&machine);
     rig.enabling(|cycle| if cycle < 10 || cycle % 2 == 0 { 0.0 } else { 2.0 * count });
     let (axis, quantity, value, limit) = rig.fault();
-    assert_eq!((axis, quantity), (SLIDE as u32 + 1, FaultQuantity::Velocity));
+    assert_eq!((axis, quantity), (SLIDE as u16 + 1, FaultQuantity::Velocity));
     assert!((value / limit - 2.0 / 1.5).abs() < 1e-6, "{value} {limit}");
 }
 
 #[test]
 fn an_axis_that_sinks_before_the_power_comes_is_named_at_once() {
     let mut machine = serial();
-    let count = machine.axes[SLIDE].encoder.resolution();
+    let count = machine.actuators[SLIDE].encoder.resolution();
     // With its brake, two counts are no more than where the brake lets it rest.
     assert_eq!(Rig::asked(&machine).enabling(|_| -2.0 * count), 2 + RELEASE + STANDING);
-    machine.axes[SLIDE].brake.torque = 0.0;
+    machine.actuators[SLIDE].brake.torque = 0.0;
     let mut rig = Rig::asked(&machine);
     assert_eq!(rig.enabling(|_| -2.0 * count), 1);
     let (axis, quantity, value, limit) = rig.fault();
-    assert_eq!((axis, quantity), (SLIDE as u32 + 1, FaultQuantity::HoldDistance));
-    let counts = [value, limit].map(|distance| distance / machine.axes[SLIDE].ratio / count);
+    assert_eq!((axis, quantity), (SLIDE as u16 + 1, FaultQuantity::HoldDistance));
+    let counts = [value, limit].map(|distance| distance / machine.actuators[SLIDE].ratio / count);
     assert!((counts[0] - 2.0).abs() < 1e-6 && (counts[1] - 1.5).abs() < 1e-6, "{counts:?}");
 }
 
 #[test]
 fn a_motor_that_has_power_already_is_given_its_weight_first() {
     let machine = serial();
-    let motor = *machine.axes[SLIDE].motor.dc().unwrap();
-    let torque = 0.5 * 9.80665 * machine.axes[SLIDE].ratio;
+    let motor = *machine.actuators[SLIDE].motor.dc().unwrap();
+    let torque = 0.5 * 9.80665 * machine.actuators[SLIDE].ratio;
     let volts = motor.voltage(torque / motor.torque_constant, 0.0, 0.0);
     let mut rig = Rig::new(&machine);
     rig.power = Power::Always;
@@ -226,7 +226,7 @@ fn a_motor_that_has_power_already_is_given_its_weight_first() {
 #[test]
 fn an_axis_that_is_moved_before_the_power_comes_is_waited_for() {
     let machine = serial();
-    let ratio = machine.axes[SLIDE].ratio;
+    let ratio = machine.actuators[SLIDE].ratio;
     let mut rig = Rig::asked(&machine);
     // Pushed by 1 mm through its brake, from before the power comes on.
     let ended = rig.enabling(|cycle| 20e-6 * cycle.min(50) as f64 / ratio);
@@ -242,7 +242,7 @@ fn what_fails_before_the_power_comes_stays_without() {
     rig.enabling(|_| 0.0);
     let command = &rig.outputs.command;
     assert_eq!(command.state(), ControllerState::Faulted);
-    assert_eq!((command.mode(), command.voltage), (CommandMode::Disabled, [0.0; 8]));
+    assert_eq!((command.mode(), command.voltage), (CommandMode::Disabled, [0.0; MAX_ACTUATORS]));
     let (_, quantity, _, limit) = rig.fault();
     assert_eq!((quantity, limit), (FaultQuantity::Cycles, 1000.0 + RELEASE as f64));
 }
@@ -262,7 +262,7 @@ fn no_voltage_is_given_where_a_position_is_no_number() {
             _ => None,
         };
         let command = rig.cycle(verb, f64::NAN);
-        assert_eq!(command.voltage, [0.0; 8], "{cycle}");
+        assert_eq!(command.voltage, [0.0; MAX_ACTUATORS], "{cycle}");
         states.push(command.state());
     }
     assert_eq!(states[1100], ControllerState::Disabled);

@@ -27,14 +27,14 @@ fn marking(machine: &Machine, job: &Job) -> Bench {
 }
 
 /// After one cycle with `spoil`: dark at once, then at rest and latched with `code`.
-fn check(code: FaultCode, axis: u32, mode: CommandMode, spoil: impl Fn(&mut Feedback) + Copy) {
+fn check(code: FaultCode, actuator: u16, mode: CommandMode, spoil: impl Fn(&mut Feedback) + Copy) {
     let machine = Machine::builtin();
     let job = two_marks(&machine, 0.25, 0.5);
     let mut bench = marking(&machine, &job);
     bench.cycle(Some(&job), None, spoil);
     let command = bench.last().command;
     assert!(!command.laser.is_lit(), "{code:?}: lit in the very next command");
-    assert_eq!((command.fault.code(), command.fault.axis), (code, axis));
+    assert_eq!((command.fault.code(), command.fault.actuator), (code, actuator));
     assert_eq!((command.state(), command.mode()), (ControllerState::Stopping, mode), "{code:?}");
     settle(&mut bench, &job, code);
 }
@@ -246,8 +246,8 @@ fn what_drives_found_in_a_stall_comes_before_the_gap_that_it_left() {
 #[test]
 fn an_overloaded_winding_stops_the_machine() {
     let mut machine = Machine::builtin();
-    for axis in &mut machine.axes {
-        axis.motor.dc_mut().unwrap().continuous_current = Some(0.05);
+    for actuator in &mut machine.actuators {
+        actuator.motor.dc_mut().unwrap().continuous_current = Some(0.05);
     }
     let job = two_marks(&machine, 0.25, 0.5);
     let mut bench = Bench::enabled(&machine);
@@ -268,7 +268,7 @@ fn an_overloaded_winding_stops_the_machine() {
 #[test]
 fn an_overload_hides_no_axis_that_is_lost() {
     let mut machine = Machine::builtin();
-    machine.axes[0].motor.dc_mut().unwrap().continuous_current = Some(0.05);
+    machine.actuators[0].motor.dc_mut().unwrap().continuous_current = Some(0.05);
     let job = two_marks(&machine, 0.25, 0.5);
     let mut bench = Bench::enabled(&machine);
     assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
@@ -312,6 +312,6 @@ fn a_stream_must_start_where_the_axes_stand() {
     assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
     bench.until(Some(&job), ControllerState::Faulted, 60);
     let fault = bench.last().command.fault;
-    assert_eq!((fault.code(), fault.axis), (FaultCode::StreamStart, 2));
+    assert_eq!((fault.code(), fault.actuator), (FaultCode::StreamStart, 2));
     assert!((fault.value - 1e-4).abs() < 2e-6, "{} m", fault.value);
 }

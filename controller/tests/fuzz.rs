@@ -58,8 +58,8 @@ fn play(machine: &Machine, job: &Job, doubts: u64, random: &mut SplitMix64) -> (
     let mut controller = Controller::new(machine);
     let mut outputs = Outputs::default();
     let mut feedback = Feedback { epoch: 3, status: status::POWERED, ..Feedback::default() };
-    for (index, axis) in machine.axes.iter().enumerate().take(2) {
-        feedback.position[index] = home(machine)[index] / axis.ratio;
+    for (index, actuator) in machine.actuators.iter().enumerate().take(2) {
+        feedback.position[index] = home(machine)[index] / actuator.ratio;
     }
     let (mut sent, mut lit, mut seen) = (0, 0, [0; 7]);
     // Whether all setpoints that came in were the job's.

@@ -96,8 +96,8 @@ fn stream_time_goes_on_with_the_time_and_no_reference_jumps() {
     let after = bench.last().command;
     assert!((after.stream_time - before.stream_time - 9e-3).abs() < 1e-9);
     // No faster than the plan's speed at the path's limit of 0.25 m/s.
-    for (index, axis) in machine.axes.iter().enumerate() {
-        let moved = (after.reference[index] - before.reference[index]) * axis.ratio;
+    for (index, actuator) in machine.actuators.iter().enumerate() {
+        let moved = (after.reference[index] - before.reference[index]) * actuator.ratio;
         assert!(moved.abs() <= 0.36 * 9e-3, "axis {index} moved by {moved} m");
     }
     finish(&mut bench, &job, "in the dark");
@@ -113,7 +113,7 @@ fn standing_axes_bear_a_stall_unmoved() {
         assert_eq!(bench.state(), ControllerState::Idle);
     }
     let error = bench.last().command.following_error;
-    let count = machine.axes[0].encoder.resolution();
+    let count = machine.actuators[0].encoder.resolution();
     assert!(error.iter().all(|error| error.abs() <= 1.01 * count), "{error:?}");
 }
 

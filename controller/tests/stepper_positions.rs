@@ -13,8 +13,8 @@ use messages::feedback::status;
 use messages::setpoint::flags;
 use messages::time::CYCLE_PERIOD;
 use messages::{
-    AxisArray, CommandMode, ControllerState, Feedback, MAX_AXES, Nanoseconds, OperatorRequest,
-    OperatorVerb, Setpoint,
+    ActuatorArray, CommandMode, ControllerState, Feedback, MAX_ACTUATORS, Nanoseconds,
+    OperatorRequest, OperatorVerb, Setpoint,
 };
 use support::Move;
 
@@ -41,7 +41,7 @@ fn setpoints(machine: &Machine) -> Vec<Setpoint> {
             position = path.at(path.duration())[0] - position;
             [velocity, acceleration, jerk] = [-velocity, -acceleration, -jerk];
         }
-        let axis = &machine.axes[0];
+        let axis = &machine.actuators[0];
         let mut setpoint = Setpoint { stream: 1, sequence, ..Setpoint::default() };
         setpoint.position[..2].copy_from_slice(&[home_x + position, home_y]);
         setpoint.tool = [home_x + position, home_y, 0.0];
@@ -76,17 +76,17 @@ struct Drivers {
     state: ControllerState,
     ticket: u32,
     /// Positions and speeds at the end of the command before the newest [rad, rad/s].
-    position_before: AxisArray,
-    velocity_before: AxisArray,
-    newest: (AxisArray, AxisArray),
+    position_before: ActuatorArray,
+    velocity_before: ActuatorArray,
+    newest: (ActuatorArray, ActuatorArray),
     /// How far the drivers are ahead of the measurement that comes, after a stall [rad].
-    ahead: AxisArray,
+    ahead: ActuatorArray,
 }
 
 impl Drivers {
     fn new(machine: &Machine) -> Self {
         let mut feedback = Feedback { epoch: 5, ..Feedback::default() };
-        for (axis, motor) in machine.axes.iter().enumerate() {
+        for (axis, motor) in machine.actuators.iter().enumerate() {
             let ahead = if axis == 1 { LEAD } else { 0.0 };
             feedback.position[axis] = (machine.home[axis] + ahead) / motor.ratio;
         }
@@ -98,10 +98,10 @@ impl Drivers {
             told: Vec::new(),
             state: ControllerState::default(),
             ticket: 0,
-            position_before: [0.0; MAX_AXES],
-            velocity_before: [0.0; MAX_AXES],
-            newest: ([0.0; MAX_AXES], [0.0; MAX_AXES]),
-            ahead: [0.0; MAX_AXES],
+            position_before: [0.0; MAX_ACTUATORS],
+            velocity_before: [0.0; MAX_ACTUATORS],
+            newest: ([0.0; MAX_ACTUATORS], [0.0; MAX_ACTUATORS]),
+            ahead: [0.0; MAX_ACTUATORS],
         }
     }
 
@@ -125,7 +125,7 @@ impl Drivers {
         for (position, ahead) in self.feedback.position.iter_mut().zip(&self.ahead) {
             *position -= ahead;
         }
-        self.ahead = [0.0; MAX_AXES];
+        self.ahead = [0.0; MAX_ACTUATORS];
         let end = (self.sent + self.controller.room().min(64)).min(setpoints.len());
         let request = verb.map(|verb| {
             self.ticket += 1;
@@ -163,7 +163,7 @@ impl Drivers {
         for (velocity, (before, now)) in self.feedback.velocity.iter_mut().zip(moved) {
             *velocity = (now - before) / 1e-3;
         }
-        let joint = |axis: usize| command.position[axis] * self.machine.axes[axis].ratio;
+        let joint = |axis: usize| command.position[axis] * self.machine.actuators[axis].ratio;
         self.told.push([joint(0), joint(1)]);
     }
 
@@ -178,7 +178,8 @@ impl Drivers {
             for (position, speed) in self.feedback.position.iter_mut().zip(&coasting) {
                 *position += speed * 1e-3;
             }
-            let joint = |axis: usize| self.feedback.position[axis] * self.machine.axes[axis].ratio;
+            let ratio = |axis: usize| self.machine.actuators[axis].ratio;
+            let joint = |axis: usize| self.feedback.position[axis] * ratio(axis);
             self.told.push([joint(0), joint(1)]);
         }
         // What is measured is where they are at the deadline: a cycle before the end of all that.
@@ -293,7 +294,7 @@ fn a_stream_that_a_stall_met_at_its_end_is_over_when_its_steppers_stand_on_it() 
         drivers.until(&setpoints, ControllerState::Idle);
         for _ in 0..100 {
             drivers.cycle(&setpoints, None);
-            assert_eq!(drivers.newest.1, [0.0; MAX_AXES], "{before_the_end}");
+            assert_eq!(drivers.newest.1, [0.0; MAX_ACTUATORS], "{before_the_end}");
         }
         let stands = drivers.told.last().unwrap()[0] - machine.home[0];
         assert!((stands - 0.06).abs() < 1e-9, "{stands} at {before_the_end}");

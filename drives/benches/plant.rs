@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use criterion::{Criterion, criterion_group, criterion_main};
 use drives::{Actuation, Freshness, Measurement, PlantOptions, SimulatedPlant};
 use machine::{Machine, Motor};
-use messages::{CommandMode, MAX_AXES, axis::axis_array};
+use messages::{CommandMode, MAX_AXES, axis::actuator_array};
 
 fn machine_files() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../machines");
@@ -29,7 +29,7 @@ fn cycles(criterion: &mut Criterion) {
     for file in machine_files() {
         let name = file.file_stem().unwrap().to_string_lossy().into_owned();
         let machine = Machine::load(&file, &[]).unwrap();
-        let stepping = matches!(machine.axes[0].motor, Motor::Stepper(_));
+        let stepping = matches!(machine.actuators[0].motor, Motor::Stepper(_));
         let mut measurement = Measurement::default();
         group.bench_function(name, |bencher| {
             bencher.iter_custom(|cycles| {
@@ -50,7 +50,7 @@ fn cycles(criterion: &mut Criterion) {
                             } else {
                                 CommandMode::Voltage
                             },
-                            voltage: axis_array(&[0.5 * side; MAX_AXES]),
+                            voltage: actuator_array(&[0.5 * side; MAX_AXES]),
                             position: home.map(|angle| angle + 0.02 * side),
                             ..Actuation::DISABLED
                         };

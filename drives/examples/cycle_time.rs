@@ -8,7 +8,7 @@ use std::time::Instant;
 use drives::plant::PlantError;
 use drives::{Actuation, Freshness, Measurement, PlantOptions, SimulatedPlant};
 use machine::Machine;
-use messages::{CommandMode, axis::axis_array};
+use messages::{CommandMode, axis::actuator_array};
 
 fn main() -> Result<(), PlantError> {
     let mut port = SimulatedPlant::new(&Machine::builtin(), PlantOptions::default())?;
@@ -21,7 +21,7 @@ fn main() -> Result<(), PlantError> {
             let actuation = Actuation {
                 freshness: Freshness::Fresh,
                 mode: CommandMode::Voltage,
-                voltage: axis_array(&[volts, 0.5 * volts]),
+                voltage: actuator_array(&[volts, 0.5 * volts]),
                 ..Actuation::DISABLED
             };
             port.exchange(&actuation, &mut measurement);

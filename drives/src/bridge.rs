@@ -23,8 +23,8 @@
 use machine::StallTolerance;
 use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
 use messages::{
-    AxisArray, Command, CommandMode, Cycle, DrivesReport, Fault, FaultCode, Feedback, MAX_AXES,
-    Nanoseconds, RealtimeFacts, StallCause, feedback::status,
+    ActuatorArray, Command, CommandMode, Cycle, DrivesReport, Fault, FaultCode, Feedback,
+    MAX_ACTUATORS, Nanoseconds, RealtimeFacts, StallCause, feedback::status,
 };
 
 use crate::port::{Actuation, Freshness, Measurement, Port, Power};
@@ -121,11 +121,11 @@ impl core::fmt::Debug for Bridge {
 impl Bridge {
     /// A bridge to `port`, unpowered, dark, before its first cycle, which is number 0.
     pub fn new(port: Box<dyn Port + Send>, options: BridgeOptions) -> Self {
-        let axes = port.axes();
+        let actuators = port.actuators();
         Self {
             port,
             options,
-            watchdog: Watchdog::new(axes, options.stall),
+            watchdog: Watchdog::new(actuators, options.stall),
             permission: GatePermission::Granted,
             phase: Phase::Unstarted,
             latched: None,
@@ -379,12 +379,12 @@ impl Bridge {
     /// that lies `skipped` cycles further back than usual.
     fn describe(&mut self, first: bool, skipped: u64) {
         let measured = &self.measurement;
-        let axes = self.port.axes().min(MAX_AXES);
-        let mut velocity: AxisArray = [0.0; MAX_AXES];
+        let actuators = self.port.actuators().min(MAX_ACTUATORS);
+        let mut velocity: ActuatorArray = [0.0; MAX_ACTUATORS];
         let moved = measured.counts != self.feedback.counts;
         if !first {
             let pairs = measured.position.iter().zip(&self.feedback.position);
-            for (velocity, (now, before)) in velocity.iter_mut().zip(pairs).take(axes) {
+            for (velocity, (now, before)) in velocity.iter_mut().zip(pairs).take(actuators) {
                 *velocity = (now - before) / (CYCLE_TIME * (1.0 + skipped as f64));
             }
         }

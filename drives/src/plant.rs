@@ -17,6 +17,8 @@
 //!   are asked, to the nanosecond.
 //! - A brake holds the shaft of an unpowered motor as friction does. It closes at once, and holds on for
 //!   its `brake_release` after the power has come.
+//! - Several motors on an axis pull its joint by a spring each, their shares of the transmission's. The
+//!   machine comes up with each of them at its home reference, out of square by what the machine file has.
 //! - Backlash is a gap without friction between motor and spring: in it the load coasts.
 //! - There is no measurement noise and no thermal model.
 //!
@@ -39,12 +41,12 @@ pub mod winding;
 use machine::kinematics::{Joints, KinematicsError};
 use machine::motor::BeyondTorque;
 use machine::transmission::equilibrium;
-use machine::{Axis, LaserSource, Machine, Mechanism, MechanismVisitor};
+use machine::{Actuator, Axis, LaserSource, Machine, Mechanism, MechanismVisitor};
 use messages::random::SplitMix64;
 use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
 use messages::{
-    AxisArray, CommandMode, Fault, FaultCode, FaultQuantity, GateEdge, LaserCycle, MAX_AXES,
-    Nanoseconds,
+    ActuatorArray, CommandMode, Fault, FaultCode, FaultQuantity, GateEdge, LaserCycle,
+    MAX_ACTUATORS, Nanoseconds,
 };
 use nalgebra::SVector;
 
@@ -95,9 +97,15 @@ pub enum PlantError {
         /// Axes given.
         found: usize,
     },
-    /// More axes than a sample holds.
-    #[error("{0} axes, and a sample holds {MAX_AXES}")]
-    TooManyAxes(usize),
+    /// More actuators than a sample holds.
+    #[error("{0} actuators, and a sample holds {MAX_ACTUATORS}")]
+    TooManyActuators(usize),
+    /// The actuators are not those of the axes.
+    #[error("the actuators are not those of the axes, one or several for each in turn")]
+    Actuators,
+    /// Several motors on a joint, with nothing elastic between them.
+    #[error("several motors drive a joint rigidly, or with backlash: nothing says what each bears")]
+    Pair,
     /// The joints cannot be at home.
     #[error("home cannot be reached: {0}")]
     Home(KinematicsError),
@@ -160,29 +168,38 @@ impl MechanismVisitor for Build<'_> {
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
         let Build { machine, options } = self;
         let home = &machine.home_joints;
-        let plant = Plant::<N, M>::new(mechanism, &machine.axes, &machine.laser, home, options)?;
+        let Machine { axes, actuators, laser, .. } = machine;
+        // One size for all machines with several motors on an axis, so that no more has to be compiled.
+        if actuators.len() == axes.len() {
+            let plant = Plant::<N, M>::new(mechanism, axes, actuators, laser, home, options)?;
+            return Ok(Box::new(plant));
+        }
+        let plant =
+            Plant::<N, M, MAX_ACTUATORS>::new(mechanism, axes, actuators, laser, home, options)?;
         Ok(Box::new(plant))
     }
 }
 
-/// A plant with its mechanism known.
+/// A plant with its mechanism known, and room for `A` motors: as many as axes, or [`MAX_ACTUATORS`].
 #[derive(Debug, Clone)]
-pub struct Plant<const N: usize, M: Mechanism<N>> {
-    dynamics: Dynamics<N, M>,
-    brake: Brake<N>,
+pub struct Plant<const N: usize, M: Mechanism<N>, const A: usize = N> {
+    dynamics: Dynamics<N, M, A>,
+    brake: Brake<A>,
+    /// How many motors there are.
+    motors: usize,
     /// The drivers of steppers.
-    stepping: Option<Stepping<N>>,
+    stepping: Option<Stepping<A>>,
     source: Source,
-    weights: Weights<N>,
+    weights: Weights<A>,
     substeps: u32,
     current_resolution: f64,
-    resolution: SVector<f64, N>,
-    origin: SVector<f64, N>,
+    resolution: SVector<f64, A>,
+    origin: SVector<f64, A>,
     /// Where between two counts each encoder stands at the origin, −0.5..0.5 [counts].
-    phase: SVector<f64, N>,
-    state: State<N>,
+    phase: SVector<f64, A>,
+    state: State<N, A>,
     /// Where it was a substep before.
-    passed: State<N>,
+    passed: State<N, A>,
     in_force: Option<Actuation>,
     /// What the laser did since the last exchange.
     light: LaserCycle,
@@ -193,7 +210,7 @@ pub struct Plant<const N: usize, M: Mechanism<N>> {
     fault: Fault,
 }
 
-impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
+impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
     /// A plant of `mechanism`, at rest with its joints at `home` [m or rad], unpowered and dark.
     ///
     /// # Errors
@@ -201,6 +218,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
     pub fn new(
         mechanism: M,
         axes: &[Axis],
+        actuators: &[Actuator],
         laser: &LaserSource,
         home: &[f64],
         options: PlantOptions,
@@ -209,25 +227,39 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
         if !(1e-6..=5e-5).contains(&substep) {
             return Err(PlantError::Substep(substep));
         }
-        if N > MAX_AXES {
-            return Err(PlantError::TooManyAxes(N));
+        if axes.len() != N {
+            return Err(PlantError::AxisCount { expected: N, found: axes.len() });
         }
-        let axes = <[Axis; N]>::try_from(axes.to_vec())
-            .map_err(|_| PlantError::AxisCount { expected: N, found: axes.len() })?;
+        if actuators.len() > A || actuators.len() > MAX_ACTUATORS {
+            return Err(PlantError::TooManyActuators(actuators.len()));
+        }
+        if !belong(axes, actuators) {
+            return Err(PlantError::Actuators);
+        }
         let branch = mechanism.branch();
-        let load = Joints::from_fn(|row, _| home.get(row).copied().unwrap_or(f64::NAN));
+        // On crooked references a joint stands where its springs pull it to.
+        let load = Joints::from_fn(|row, _| {
+            let home = home.get(row).copied().unwrap_or(f64::NAN);
+            let driven = axes[row].driven_by(actuators).iter();
+            home + driven.map(|actuator| actuator.share * actuator.square).sum::<f64>()
+        });
         let chain = mechanism.solve(&load, branch, None).map_err(PlantError::Home)?;
 
         let gravity = mechanism.gravity(&chain);
-        let motors = Motors::of(&axes);
-        let ahead = equilibrium::rotors_ahead(&mechanism, &axes, &gravity);
-        let angle = (load + ahead).component_div(&motors.ratio);
+        let motors = Motors::of(axes, actuators);
+        let ahead = equilibrium::rotors_ahead(&mechanism, axes, actuators, &gravity);
+        let mut angle = SVector::<f64, A>::zeros();
         let mut origin = angle;
-        for (row, axis) in axes.iter().enumerate() {
-            let ahead = equilibrium::field_ahead(axis, gravity[row]).map_err(PlantError::Hold)?;
-            origin[row] += ahead / axis.ratio;
+        for (row, actuator) in actuators.iter().enumerate() {
+            let Actuator { axis, ratio, square, .. } = *actuator;
+            // Where it stands where springs pull it alone, and as far off as its reference is.
+            let mean = load[axis] - home.get(axis).copied().unwrap_or(f64::NAN);
+            angle[row] = (load[axis] + ahead[axis] + (square - mean)) / ratio;
+            let field =
+                equilibrium::field_ahead(actuator, gravity[axis]).map_err(PlantError::Hold)?;
+            origin[row] = angle[row] + field / ratio;
         }
-        let stepping = Stepping::of(&axes, origin);
+        let stepping = Stepping::of(axes, actuators, origin);
         let field = stepping.as_ref().map(|stepping| stepping.field(angle));
         let dynamics = Dynamics::new(mechanism, motors, chain)?.with_field(field);
 
@@ -240,12 +272,15 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             load_speed: SVector::zeros(),
         };
         Ok(Self {
-            brake: Brake::of(&axes),
+            brake: Brake::of(axes, actuators),
+            motors: actuators.len(),
             source: Source::new(laser),
             weights: motors.windings.weights(CYCLE_TIME / f64::from(substeps)),
             substeps,
             current_resolution,
-            resolution: SVector::from_fn(|row, _| axes[row].encoder.resolution()),
+            resolution: SVector::from_fn(|row, _| {
+                actuators.get(row).map_or(1.0, |actuator| actuator.encoder.resolution())
+            }),
             origin,
             stepping,
             phase: SVector::from_fn(|row, _| encoder_phase(seed, row as u64)),
@@ -261,19 +296,19 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
     }
 
     /// Where the plant is, in truth.
-    pub fn state(&self) -> &State<N> {
+    pub fn state(&self) -> &State<N, A> {
         &self.state
     }
 
     /// Puts the plant elsewhere, with the power and the laser as they are.
-    pub fn place(&mut self, state: State<N>) {
+    pub fn place(&mut self, state: State<N, A>) {
         self.state = state;
         self.dynamics.couple(&mut self.state);
         self.passed = self.state;
     }
 
     /// The equations that it follows.
-    pub fn dynamics(&self) -> &Dynamics<N, M> {
+    pub fn dynamics(&self) -> &Dynamics<N, M, A> {
         &self.dynamics
     }
 
@@ -369,7 +404,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
     fn measure(&mut self, measurement: &mut Measurement) {
         *measurement = Measurement::default();
         let pulses = self.stepping.as_ref().map(Stepping::counts);
-        for row in 0..N {
+        for row in 0..self.motors {
             if let Some(pulses) = &pulses {
                 measurement.counts[row] = pulses[row];
                 measurement.position[row] =
@@ -403,7 +438,7 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
 
     /// Why this plant cannot carry `actuation` out, if it cannot.
     fn refusal(&self, actuation: &Actuation) -> Option<Fault> {
-        let targets: &[&AxisArray] = match actuation.mode {
+        let targets: &[&ActuatorArray] = match actuation.mode {
             CommandMode::Disabled | CommandMode::QuickStop => &[],
             mode if mode != self.following() => {
                 let fault = Fault::new(FaultCode::DriveFault);
@@ -413,9 +448,10 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
             _ => &[&actuation.voltage],
         };
         for values in targets {
-            if let Some(axis) = values.iter().take(N).position(|value| !value.is_finite()) {
-                let fault = Fault::new(FaultCode::NotFinite).on(axis);
-                return Some(fault.with(FaultQuantity::Number, values[axis]));
+            let mut values = values.iter().take(self.motors).enumerate();
+            if let Some((row, value)) = values.find(|(_, value)| !value.is_finite()) {
+                let fault = Fault::new(FaultCode::NotFinite).on_actuator(row);
+                return Some(fault.with(FaultQuantity::Number, *value));
             }
         }
         (!actuation.laser.is_valid()).then(|| impossible_light(&actuation.laser))
@@ -433,8 +469,8 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
 ///
 /// # Errors
 /// More than can be afforded.
-fn substeps<const N: usize, M: Mechanism<N>>(
-    dynamics: &Dynamics<N, M>,
+fn substeps<const N: usize, M: Mechanism<N>, const A: usize>(
+    dynamics: &Dynamics<N, M, A>,
     longest: f64,
 ) -> Result<u32, PlantError> {
     let (mechanical, electrical) = (dynamics.fastest(), dynamics.electrical());
@@ -449,9 +485,9 @@ fn substeps<const N: usize, M: Mechanism<N>>(
     }
 }
 
-impl<const N: usize, M: Mechanism<N>> Port for Plant<N, M> {
-    fn axes(&self) -> usize {
-        N
+impl<const N: usize, M: Mechanism<N>, const A: usize> Port for Plant<N, M, A> {
+    fn actuators(&self) -> usize {
+        self.motors
     }
 
     fn gate_resolution(&self) -> Nanoseconds {
@@ -474,7 +510,7 @@ impl<const N: usize, M: Mechanism<N>> Port for Plant<N, M> {
     }
 }
 
-impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
+impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
     /// The cycle from the last call to this one, under what is in force.
     fn cycle(&mut self) {
         let Some(in_force) = self.in_force else { return };
@@ -527,8 +563,19 @@ impl<const N: usize, M: Mechanism<N>> Plant<N, M> {
 /// The fault of a place that the mechanism cannot reach.
 fn out_of_reach(error: &KinematicsError) -> Fault {
     let fault = Fault::new(FaultCode::DriveFault);
-    let fault = error.axis.map_or(fault, |axis| fault.on(axis));
+    let fault = error.axis.map_or(fault, |axis| fault.on_axis(axis));
     fault.beyond(FaultQuantity::Mechanism, error.value, error.limit)
+}
+
+/// Whether `actuators` are those of `axes`, in their order, at least one of each.
+fn belong(axes: &[Axis], actuators: &[Actuator]) -> bool {
+    let mut next = 0;
+    axes.iter().enumerate().all(|(index, axis)| {
+        let own = axis.driven_by(actuators);
+        let follows = axis.actuators.start == next && !own.is_empty();
+        next = axis.actuators.end;
+        follows && own.iter().all(|actuator| actuator.axis == index)
+    }) && next == actuators.len()
 }
 
 /// `value` within ±`limit`.
@@ -536,11 +583,11 @@ fn saturate(value: f64, limit: f64) -> f64 {
     value.max(-limit).min(limit)
 }
 
-/// A phase −0.5..0.5 [counts] for the encoder of `axis`, 0 for seed 0.
-fn encoder_phase(seed: u64, axis: u64) -> f64 {
+/// A phase −0.5..0.5 [counts] for the encoder of `actuator`, 0 for seed 0.
+fn encoder_phase(seed: u64, actuator: u64) -> f64 {
     if seed == 0 {
         return 0.0;
     }
     let mut random = SplitMix64::new(seed);
-    (0..=axis).map(|_| random.fraction()).last().unwrap_or(0.5) - 0.5
+    (0..=actuator).map(|_| random.fraction()).last().unwrap_or(0.5) - 0.5
 }

@@ -22,7 +22,7 @@
 //!   [`CommandMode::Disabled`].
 //! - No allocation, lock, print or panic in an exchange.
 
-use messages::{AxisArray, CommandMode, Fault, LaserCycle, MAX_AXES, Nanoseconds};
+use messages::{ActuatorArray, CommandMode, Fault, LaserCycle, MAX_ACTUATORS, Nanoseconds};
 
 /// Whether an actuation comes from a command that answers the newest feedback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -42,13 +42,13 @@ pub struct Actuation {
     /// Which target the motors follow.
     pub mode: CommandMode,
     /// Target position at the end of the cycle [rad at the motor].
-    pub position: AxisArray,
+    pub position: ActuatorArray,
     /// Target velocity [rad/s at the motor].
-    pub velocity: AxisArray,
+    pub velocity: ActuatorArray,
     /// Target torque [N·m at the motor].
-    pub effort: AxisArray,
+    pub effort: ActuatorArray,
     /// Motor voltage [V].
-    pub voltage: AxisArray,
+    pub voltage: ActuatorArray,
     /// Digital outputs, one bit each.
     pub outputs: u64,
     /// The laser.
@@ -60,10 +60,10 @@ impl Actuation {
     pub const DISABLED: Self = Self {
         freshness: Freshness::Stale,
         mode: CommandMode::Disabled,
-        position: [0.0; MAX_AXES],
-        velocity: [0.0; MAX_AXES],
-        effort: [0.0; MAX_AXES],
-        voltage: [0.0; MAX_AXES],
+        position: [0.0; MAX_ACTUATORS],
+        velocity: [0.0; MAX_ACTUATORS],
+        effort: [0.0; MAX_ACTUATORS],
+        voltage: [0.0; MAX_ACTUATORS],
         outputs: 0,
         laser: LaserCycle::OFF,
     };
@@ -88,11 +88,11 @@ pub struct Measurement {
     /// Whether the motors are driven from here on.
     pub power: Power,
     /// Encoder counts since power-on.
-    pub counts: [i64; MAX_AXES],
+    pub counts: [i64; MAX_ACTUATORS],
     /// Motor position from the encoder [rad], `joint / ratio` of the machine file.
-    pub position: AxisArray,
+    pub position: ActuatorArray,
     /// Motor current [A].
-    pub current: AxisArray,
+    pub current: ActuatorArray,
     /// Tool centre point in the machine frame [m], where the port knows it.
     pub tool: Option<[f64; 3]>,
     /// Digital inputs, one bit each.
@@ -107,8 +107,9 @@ pub struct Measurement {
 
 /// Hardware, or the plant that stands for it.
 pub trait Port {
-    /// How many axes it drives, `1..=MAX_AXES`.
-    fn axes(&self) -> usize;
+    /// How many actuators it drives, `1..=MAX_ACTUATORS`, in the order of the machine file: several motors
+    /// of one axis are one each.
+    fn actuators(&self) -> usize;
 
     /// The finest step of a gate edge: an edge fires at most half of it away from its offset.
     fn gate_resolution(&self) -> Nanoseconds;

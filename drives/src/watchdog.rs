@@ -26,8 +26,8 @@
 
 use machine::StallTolerance;
 use messages::{
-    AxisArray, Command, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, MAX_EDGES,
-    Nanoseconds, axis::MAX_AXES,
+    ActuatorArray, Command, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle,
+    MAX_ACTUATORS, MAX_EDGES, Nanoseconds,
 };
 
 use crate::port::{Actuation, Freshness};
@@ -70,7 +70,7 @@ pub struct Counts {
 /// The watchdog of one bridge.
 #[derive(Debug, Clone)]
 pub struct Watchdog {
-    axes: usize,
+    actuators: usize,
     tolerated: u64,
     watch: Watch,
     /// Cycles in a row without a fresh command.
@@ -84,10 +84,10 @@ pub struct Watchdog {
 }
 
 impl Watchdog {
-    /// A watchdog over `axes` axes that waits for the first command, and bears stalls of `tolerance`.
-    pub fn new(axes: usize, tolerance: StallTolerance) -> Self {
+    /// A watchdog over `actuators` motors that waits for the first command, and bears stalls of `tolerance`.
+    pub fn new(actuators: usize, tolerance: StallTolerance) -> Self {
         Self {
-            axes: axes.min(MAX_AXES),
+            actuators: actuators.min(MAX_ACTUATORS),
             tolerated: tolerance.cycles(),
             watch: Watch::Waiting,
             misses: 0,
@@ -180,7 +180,7 @@ impl Watchdog {
             }
             Watch::Following => {
                 self.reset = command.reset;
-                if let Some(doubt) = doubt(command, self.axes) {
+                if let Some(doubt) = doubt(command, self.actuators) {
                     self.stop(doubt.at(now));
                 }
             }
@@ -259,8 +259,8 @@ fn actuation(command: &Command, mode: CommandMode) -> Actuation {
 
 /// What makes `command` impossible to carry out, if anything: a target of its mode that is not
 /// finite, or a laser cycle that makes no sense.
-fn doubt(command: &Command, axes: usize) -> Option<Fault> {
-    let targets: Option<&AxisArray> = match command.mode() {
+fn doubt(command: &Command, actuators: usize) -> Option<Fault> {
+    let targets: Option<&ActuatorArray> = match command.mode() {
         CommandMode::Disabled | CommandMode::QuickStop => None,
         CommandMode::Position => Some(&command.position),
         CommandMode::Velocity => Some(&command.velocity),
@@ -268,10 +268,10 @@ fn doubt(command: &Command, axes: usize) -> Option<Fault> {
         CommandMode::Voltage => Some(&command.voltage),
     };
     let broken = targets.and_then(|targets| {
-        targets.iter().take(axes).enumerate().find(|(_, target)| !target.is_finite())
+        targets.iter().take(actuators).enumerate().find(|(_, target)| !target.is_finite())
     });
-    if let Some((axis, target)) = broken {
-        let fault = Fault::new(FaultCode::NotFinite).on(axis);
+    if let Some((index, target)) = broken {
+        let fault = Fault::new(FaultCode::NotFinite).on_actuator(index);
         return Some(fault.with(FaultQuantity::Number, *target));
     }
     if !command.laser.is_valid() {

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
 use machine::{Machine, Motor};
-use messages::{Command, CommandMode, LaserCycle, Nanoseconds, RealtimeFacts, axis::axis_array};
+use messages::{
+    Command, CommandMode, LaserCycle, Nanoseconds, RealtimeFacts, axis::actuator_array,
+};
 use runtime::allocation::{Allocations, CountingAllocator};
 
 #[global_allocator]
@@ -26,7 +28,7 @@ fn assert_allocates_nothing(name: &str, machine: &Machine) {
     assert!(built.allocations > 0, "the counting allocator does not count");
     let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
     let mut bridge = Bridge::new(port.unwrap(), options);
-    let stepping = matches!(machine.axes[0].motor, Motor::Stepper(_));
+    let stepping = matches!(machine.actuators[0].motor, Motor::Stepper(_));
     let (follows, refused) = if stepping {
         (CommandMode::Position, CommandMode::Voltage)
     } else {
@@ -53,7 +55,7 @@ fn assert_allocates_nothing(name: &str, machine: &Machine) {
                 epoch: feedback.epoch,
                 cycle: feedback.cycle,
                 mode: mode as u32,
-                voltage: axis_array(&[side, 0.4 * side]),
+                voltage: actuator_array(&[side, 0.4 * side]),
                 position: home.map(|angle| angle + 0.02 * side),
                 laser: LaserCycle { gate: 1, power: 1.0, ..LaserCycle::OFF },
                 ..Command::default()

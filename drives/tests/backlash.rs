@@ -6,20 +6,18 @@ use drives::plant::friction;
 use drives::plant::motors::Motors;
 use drives::plant::state::{Phases, State};
 use machine::transmission::Elasticity;
-use machine::{Axis, Cartesian, CoreXy, Friction, Machine, Mechanism};
+use machine::{Cartesian, CoreXy, Friction, Machine, Mechanism};
 use nalgebra::Vector2;
 
 const SUBSTEP: f64 = 50e-6;
 const BACKLASH: f64 = 40e-6;
 
-/// The axes of the built-in machine without friction, with backlash.
-fn axes(backlash: [f64; 2]) -> [Axis; 2] {
-    let mut axes: [Axis; 2] = Machine::builtin().axes.try_into().unwrap();
-    for (axis, backlash) in axes.iter_mut().zip(backlash) {
-        axis.friction = Friction { coulomb: 0.0, viscous: 0.0 };
-        axis.backlash = backlash;
-    }
-    axes
+/// The motors of the built-in machine without friction, with backlash.
+fn motors(backlash: [f64; 2]) -> Motors<2> {
+    let Machine { mut axes, mut actuators, .. } = Machine::builtin();
+    actuators.iter_mut().for_each(|it| it.friction = Friction { coulomb: 0.0, viscous: 0.0 });
+    axes.iter_mut().zip(backlash).for_each(|(axis, backlash)| axis.backlash = backlash);
+    Motors::of(&axes, &actuators)
 }
 
 fn springs(damping: f64) -> [Elasticity; 2] {
@@ -32,9 +30,9 @@ fn carriages(damping: f64) -> Cartesian<2> {
 
 fn dynamics<M: Mechanism<2, ChainState = Vector2<f64>>>(
     mechanism: M,
-    axes: &[Axis; 2],
+    motors: Motors<2>,
 ) -> Dynamics<2, M> {
-    Dynamics::new(mechanism, Motors::of(axes), Vector2::zeros()).unwrap()
+    Dynamics::new(mechanism, motors, Vector2::zeros()).unwrap()
 }
 
 fn at_rest() -> State<2> {
@@ -46,8 +44,7 @@ fn at_rest() -> State<2> {
 #[test]
 fn a_load_lies_behind_its_gap_when_driven_and_before_it_when_braked() {
     const ACCELERATION: f64 = 0.5;
-    let axes = axes([BACKLASH, 0.0]);
-    let mut dynamics = dynamics(carriages(400.0), &axes);
+    let mut dynamics = dynamics(carriages(400.0), motors([BACKLASH, 0.0]));
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let ratio = dynamics.motors().ratio;
     let mut state = at_rest();
@@ -80,8 +77,7 @@ fn a_load_lies_behind_its_gap_when_driven_and_before_it_when_braked() {
 
 #[test]
 fn a_load_in_its_gap_coasts() {
-    let axes = axes([BACKLASH; 2]);
-    let mut dynamics = dynamics(carriages(400.0), &axes);
+    let mut dynamics = dynamics(carriages(400.0), motors([BACKLASH; 2]));
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let speed = Vector2::new(1e-3, -2e-3);
     let mut state = State { load_speed: speed, ..at_rest() };
@@ -108,8 +104,7 @@ fn energy<M: Mechanism<2, ChainState = Vector2<f64>>>(
 
 /// Carriages that bounce to and fro between undamped flanks, and crossed belts that do.
 fn bounce<M: Mechanism<2, ChainState = Vector2<f64>>>(mechanism: M) -> f64 {
-    let axes = axes([BACKLASH, BACKLASH / 3.0]);
-    let mut dynamics = dynamics(mechanism, &axes);
+    let mut dynamics = dynamics(mechanism, motors([BACKLASH, BACKLASH / 3.0]));
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let mut state = State { load_speed: Vector2::new(0.05, -0.08), ..at_rest() };
     let wound = |dynamics: &Dynamics<2, M>, state: &State<2>| {

@@ -6,7 +6,7 @@ mod shaft;
 use drives::plant::{Plant, PlantOptions};
 use drives::{Actuation, Freshness, Measurement, Port};
 use machine::{Friction, HoldingBrake, LaserSource};
-use messages::{CommandMode, axis::axis_array};
+use messages::{CommandMode, axis::actuator_array};
 use shaft::Shaft;
 
 /// Torque of the load [N·m].
@@ -14,12 +14,13 @@ const LOAD: f64 = 0.01;
 
 /// A shaft under load, its brake closed, and the voltage that holds the load.
 fn braked(brake: HoldingBrake) -> (Plant<1, Shaft>, f64) {
-    let axis = shaft::axis(2e-6, Friction { coulomb: 0.0, viscous: 0.0 });
-    let motor = *axis.motor.dc().unwrap();
-    let axes = [machine::Axis { brake, ..axis }];
+    let actuator = shaft::actuator(2e-6, Friction { coulomb: 0.0, viscous: 0.0 });
+    let motor = *actuator.motor.dc().unwrap();
+    let actuators = [machine::Actuator { brake, ..actuator }];
     let shaft = Shaft { load: LOAD, spread: 0.0 };
     let options = PlantOptions::default();
-    let plant = Plant::new(shaft, &axes, &LaserSource::IDEAL, &[0.0], options).unwrap();
+    let axes = [shaft::axis()];
+    let plant = Plant::new(shaft, &axes, &actuators, &LaserSource::IDEAL, &[0.0], options).unwrap();
     (plant, motor.voltage(LOAD / motor.torque_constant, 0.0, 0.0))
 }
 
@@ -27,7 +28,7 @@ fn driven(volts: f64) -> Actuation {
     Actuation {
         freshness: Freshness::Fresh,
         mode: CommandMode::Voltage,
-        voltage: axis_array(&[volts]),
+        voltage: actuator_array(&[volts]),
         ..Actuation::DISABLED
     }
 }

@@ -33,13 +33,14 @@ fn numbers(value: &Value) -> Vec<f64> {
 }
 
 fn motor(parameters: &Value, inertia: f64, friction: Friction, load: f64) -> Dynamics<1, Shaft> {
-    let mut axis = shaft::axis(inertia, friction);
-    let motor = axis.motor.dc_mut().unwrap();
+    let mut actuator = shaft::actuator(inertia, friction);
+    let motor = actuator.motor.dc_mut().unwrap();
     motor.resistance = number(parameters, "R");
     motor.inductance = number(parameters, "L");
     motor.torque_constant = number(parameters, "kt");
     motor.voltage = number(parameters, "U");
-    Dynamics::new(Shaft { load, spread: 0.0 }, Motors::of(&[axis]), Vector1::zeros()).unwrap()
+    let motors = Motors::of(&[shaft::axis()], &[actuator]);
+    Dynamics::new(Shaft { load, spread: 0.0 }, motors, Vector1::zeros()).unwrap()
 }
 
 fn rest() -> State<1> {

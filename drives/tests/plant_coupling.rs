@@ -13,23 +13,24 @@ use drives::plant::state::{Phases, State};
 use drives::plant::{Plant, PlantOptions, friction};
 use drives::{Actuation, Freshness, Measurement, Port};
 use machine::kinematics::Joints;
-use machine::{Axis, Friction, LaserSource, Mechanism, Pose};
-use messages::{CommandMode, FaultCode, axis::axis_array};
+use machine::{Actuator, Axis, Friction, LaserSource, Mechanism, Pose};
+use messages::{CommandMode, FaultCode, axis::actuator_array};
 use nalgebra::{Vector2, Vector3};
 
 const SUBSTEP: f64 = 50e-6;
 const FREE: f64 = f64::INFINITY;
 
 /// Geared motors without friction.
-fn axes() -> [Axis; 2] {
-    let mut axis = shaft::axis(1e-5, Friction { coulomb: 0.0, viscous: 0.0 });
-    axis.ratio = 0.05;
-    axis.gains.inertia = 1e-4;
-    [axis.clone(), axis]
+fn drives() -> (Vec<Axis>, Vec<Actuator>) {
+    let mut actuator = shaft::actuator(1e-5, Friction { coulomb: 0.0, viscous: 0.0 });
+    actuator.ratio = 0.05;
+    actuator.gains.inertia = 1e-4;
+    shaft::alike(&actuator, 2)
 }
 
 fn dynamics(arm: Arm) -> Dynamics<2, Arm> {
-    Dynamics::new(arm, Motors::of(&axes()), Vector2::new(0.0, 0.5)).unwrap()
+    let (axes, actuators) = drives();
+    Dynamics::new(arm, Motors::of(&axes, &actuators), Vector2::new(0.0, 0.5)).unwrap()
 }
 
 /// The arm swinging, its motors with it.
@@ -96,12 +97,14 @@ fn where_the_chain_ends_the_plant_jams_with_a_fault() {
     let dark = LaserSource::IDEAL;
     let pose = Pose::at(Vector3::new(0.35, 0.0, 0.0));
     let home = arm.inverse(&pose, (), &Joints::zeros()).unwrap();
-    let mut plant =
-        Plant::new(arm, &axes(), &dark, home.as_slice(), PlantOptions::default()).unwrap();
+    let (axes, actuators) = drives();
+    let mut plant: Plant<2, _> =
+        Plant::new(arm, &axes, &actuators, &dark, home.as_slice(), PlantOptions::default())
+            .unwrap();
     let push = Actuation {
         freshness: Freshness::Fresh,
         mode: CommandMode::Voltage,
-        voltage: axis_array(&[0.0, 6.0]),
+        voltage: actuator_array(&[0.0, 6.0]),
         ..Actuation::DISABLED
     };
     let mut measurement = Measurement::default();

@@ -10,8 +10,8 @@ use drives::plant::state::{Phases, State};
 use drives::plant::{Plant, PlantOptions, friction};
 use drives::{Actuation, Freshness, Measurement, Port};
 use machine::transmission::Elasticity;
-use machine::{Axis, CoreXy, Friction, LaserSource, Machine, MechanismKind};
-use messages::{CommandMode, axis::axis_array};
+use machine::{CoreXy, Friction, LaserSource, Machine, MechanismKind};
+use messages::{CommandMode, axis::actuator_array};
 use nalgebra::{Vector1, Vector2};
 use shaft::Shaft;
 
@@ -33,25 +33,35 @@ fn undamped() -> CoreXy {
     corexy
 }
 
-/// The two axes of the built-in machine with other friction.
-fn axes(friction: Friction) -> [Axis; 2] {
-    let mut axes = Machine::builtin().axes;
-    axes.iter_mut().for_each(|axis| axis.friction = friction);
-    axes.try_into().unwrap()
+/// The built-in machine with other friction.
+fn machine(friction: Friction) -> Machine {
+    let mut machine = Machine::builtin();
+    machine.actuators.iter_mut().for_each(|actuator| actuator.friction = friction);
+    machine
+}
+
+fn motors(friction: Friction) -> Motors<2> {
+    let Machine { axes, actuators, .. } = machine(friction);
+    Motors::of(&axes, &actuators)
+}
+
+/// A bare shaft's motor.
+fn bare(actuator: machine::Actuator) -> Motors<1> {
+    Motors::of(&[shaft::axis()], &[actuator])
 }
 
 const SMOOTH: Friction = Friction { coulomb: 0.0, viscous: 0.0 };
 
-fn plant(mechanism: CoreXy, axes: &[Axis]) -> Plant<2, CoreXy> {
-    Plant::new(mechanism, axes, &DARK, &Machine::builtin().home_joints, PlantOptions::default())
-        .unwrap()
+fn plant(mechanism: CoreXy, machine: &Machine) -> Plant<2, CoreXy> {
+    let Machine { axes, actuators, home_joints, .. } = machine;
+    Plant::new(mechanism, axes, actuators, &DARK, home_joints, PlantOptions::default()).unwrap()
 }
 
 fn voltage(voltage: &[f64]) -> Actuation {
     Actuation {
         freshness: Freshness::Fresh,
         mode: CommandMode::Voltage,
-        voltage: axis_array(voltage),
+        voltage: actuator_array(voltage),
         ..Actuation::DISABLED
     }
 }
@@ -84,8 +94,7 @@ fn energy(dynamics: &Dynamics<2, CoreXy>, state: &State<2>) -> f64 {
 
 #[test]
 fn a_free_elastic_plant_keeps_its_energy() {
-    let axes = axes(SMOOTH);
-    let mut dynamics = Dynamics::new(undamped(), Motors::of(&axes), Vector2::zeros()).unwrap();
+    let mut dynamics = Dynamics::new(undamped(), motors(SMOOTH), Vector2::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let mut state = State { load: Vector2::new(2e-4, -1e-4), ..at_rest() };
     let before = energy(&dynamics, &state);
@@ -100,8 +109,7 @@ fn a_free_elastic_plant_keeps_its_energy() {
 
 #[test]
 fn electrical_work_is_heat_and_stored_energy() {
-    let axes = axes(SMOOTH);
-    let mut dynamics = Dynamics::new(undamped(), Motors::of(&axes), Vector2::zeros()).unwrap();
+    let mut dynamics = Dynamics::new(undamped(), motors(SMOOTH), Vector2::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let volts = Vector2::new(6.0, -2.0);
     let resistance = dynamics.motors().windings.resistance;
@@ -126,8 +134,7 @@ fn electrical_work_is_heat_and_stored_energy() {
 
 /// Load and motor positions after 20 ms at a substep, under a voltage that reverses.
 fn swing(friction: Friction, substep: f64) -> [f64; 4] {
-    let axes = axes(friction);
-    let mut dynamics = Dynamics::new(corexy(), Motors::of(&axes), Vector2::zeros()).unwrap();
+    let mut dynamics = Dynamics::new(corexy(), motors(friction), Vector2::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(substep);
     let steps = (5e-3 / substep).round() as usize;
     let mut state = at_rest();
@@ -172,10 +179,10 @@ fn friction_does_not_lower_the_accuracy_below_a_nanometre() {
 #[test]
 fn torque_below_stiction_never_creeps() {
     let machine = Machine::builtin();
-    let motor = *machine.axes[0].motor.dc().unwrap();
+    let motor = *machine.actuators[0].motor.dc().unwrap();
     let breakaway =
-        motor.voltage(machine.axes[0].friction.coulomb / motor.torque_constant, 0.0, 0.0);
-    let mut plant = plant(corexy(), &machine.axes);
+        motor.voltage(machine.actuators[0].friction.coulomb / motor.torque_constant, 0.0, 0.0);
+    let mut plant = plant(corexy(), &machine);
     let start = *plant.state();
     for _ in 0..1000 {
         cycle(&mut plant, &voltage(&[0.99 * breakaway, -0.99 * breakaway]));
@@ -192,10 +199,9 @@ fn torque_below_stiction_never_creeps() {
 #[test]
 fn a_sliding_rotor_stops_where_and_when_friction_says() {
     let (inertia, coulomb, speed) = (2e-6, 5e-3, 97.3);
-    let axis = shaft::axis(inertia, Friction { coulomb, viscous: 0.0 });
+    let actuator = shaft::actuator(inertia, Friction { coulomb, viscous: 0.0 });
     let mut dynamics =
-        Dynamics::new(Shaft { load: 0.0, spread: 0.0 }, Motors::of(&[axis]), Vector1::zeros())
-            .unwrap();
+        Dynamics::new(Shaft { load: 0.0, spread: 0.0 }, bare(actuator), Vector1::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let zero = Vector1::zeros();
     let mut state = State {
@@ -223,9 +229,9 @@ fn a_sliding_rotor_stops_where_and_when_friction_says() {
 #[test]
 fn an_inertia_that_grows_slows_the_shaft_by_its_energy() {
     let (rotor, spread, speed) = (2e-6, 5e-6, 40.0);
-    let axis = shaft::axis(rotor, SMOOTH);
+    let actuator = shaft::actuator(rotor, SMOOTH);
     let mut dynamics =
-        Dynamics::new(Shaft { load: 0.0, spread }, Motors::of(&[axis]), Vector1::zeros()).unwrap();
+        Dynamics::new(Shaft { load: 0.0, spread }, bare(actuator), Vector1::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let zero = Vector1::zeros();
     let start = Vector1::new(speed);
@@ -245,7 +251,7 @@ fn an_inertia_that_grows_slows_the_shaft_by_its_energy() {
 fn one_motor_can_stick_while_the_other_moves_a_rigid_machine() {
     // Rigid belts couple the motors through the load: pushing one accelerates the other.
     let rigid = CoreXy { elasticity: None, ..corexy() };
-    let mut plant = plant(rigid, &Machine::builtin().axes);
+    let mut plant = plant(rigid, &Machine::builtin());
     let start = *plant.state();
     for _ in 0..10 {
         cycle(&mut plant, &voltage(&[1.2, 0.0]));
@@ -261,9 +267,9 @@ fn one_motor_can_stick_while_the_other_moves_a_rigid_machine() {
 /// Stretch of the belts over the acceleration of the load, along a direction of the tool [s²].
 fn stretch(direction: [f64; 2]) -> f64 {
     let machine = Machine::builtin();
-    let motor = *machine.axes[0].motor.dc().unwrap();
-    let ratio = machine.axes[0].ratio;
-    let mut plant = plant(corexy(), &axes(SMOOTH));
+    let motor = *machine.actuators[0].motor.dc().unwrap();
+    let ratio = machine.actuators[0].ratio;
+    let mut plant = plant(corexy(), &self::machine(SMOOTH));
     let [x, y] = direction;
     let belts = [x + y, x - y];
     // The voltage of a motor that accelerates at the load's 10 m/s², cycle by cycle.
@@ -297,8 +303,8 @@ fn belts_stretch_by_mass_over_stiffness() {
 
 /// Frequency of the load on held motors along a direction of the tool [Hz].
 fn mode(direction: [f64; 2]) -> f64 {
-    let axes = axes(Friction { coulomb: 1e3, viscous: 0.0 });
-    let mut dynamics = Dynamics::new(undamped(), Motors::of(&axes), Vector2::zeros()).unwrap();
+    let stuck = motors(Friction { coulomb: 1e3, viscous: 0.0 });
+    let mut dynamics = Dynamics::new(undamped(), stuck, Vector2::zeros()).unwrap();
     let weights = dynamics.motors().windings.weights(SUBSTEP);
     let [x, y] = direction;
     let mut state = State { load: Vector2::new(x + y, x - y) * 1e-5, ..at_rest() };
@@ -331,8 +337,8 @@ fn the_load_swings_on_its_belts_at_68_and_38_hertz() {
 #[test]
 fn voltage_and_current_saturate() {
     let machine = Machine::builtin();
-    let mut asked = plant(corexy(), &machine.axes);
-    let mut limited = plant(corexy(), &machine.axes);
+    let mut asked = plant(corexy(), &machine);
+    let mut limited = plant(corexy(), &machine);
     for _ in 0..50 {
         cycle(&mut asked, &voltage(&[1000.0, -1000.0]));
         cycle(&mut limited, &voltage(&[12.0, -12.0]));
@@ -351,10 +357,10 @@ fn voltage_and_current_saturate() {
 fn encoders_count_whole_counts_from_power_on() {
     let machine = Machine::builtin();
     let resolution = core::f64::consts::TAU / 4096.0;
-    let mut plant = plant(corexy(), &machine.axes);
+    let mut plant = plant(corexy(), &machine);
     let origin = plant.state().angle;
     let first = cycle(&mut plant, &voltage(&[3.0, -1.0]));
-    assert_eq!(first.counts, [0; 8]);
+    assert_eq!(first.counts, [0; messages::MAX_ACTUATORS]);
     assert_eq!(first.position[..2], [origin[0], origin[1]]);
     for _ in 0..50 {
         let measurement = cycle(&mut plant, &voltage(&[3.0, -1.0]));
@@ -372,22 +378,23 @@ fn encoders_count_whole_counts_from_power_on() {
 #[test]
 fn an_elastic_lift_holds_its_height_on_the_brake() {
     use machine::Cartesian;
-    let mut axis = shaft::axis(2e-6, Friction { coulomb: 1e-3, viscous: 1e-6 });
-    axis.ratio = 0.015 / core::f64::consts::TAU / 3.0;
+    let mut actuator = shaft::actuator(2e-6, Friction { coulomb: 1e-3, viscous: 1e-6 });
+    actuator.ratio = 0.015 / core::f64::consts::TAU / 3.0;
     let mass = [1.0, 1.0, 5.0];
     let spring = Elasticity { stiffness: 1e6, damping: 500.0 };
-    axis.gains.inertia = 2e-6 + 5.0 * axis.ratio * axis.ratio;
-    let axes = [axis.clone(), axis.clone(), axis];
+    actuator.gains.inertia = 2e-6 + 5.0 * actuator.ratio * actuator.ratio;
+    let (axes, actuators) = shaft::alike(&actuator, 3);
     let lift = Cartesian { elasticity: Some([spring; 3]), ..Cartesian::rigid(mass) };
-    let mut plant =
-        Plant::new(lift, &axes, &DARK, &[0.1, 0.1, 0.05], PlantOptions::default()).unwrap();
+    let mut plant: Plant<3, _> =
+        Plant::new(lift, &axes, &actuators, &DARK, &[0.1, 0.1, 0.05], PlantOptions::default())
+            .unwrap();
     let mut measurement = Measurement::default();
     for _ in 0..2000 {
         measurement = cycle(&mut plant, &Actuation::QUICK_STOP);
     }
     // Gravity asks for 0.039 N·m, far above the friction; the integral holds it to a count or two.
     let sag = 0.05 - measurement.tool.unwrap()[2];
-    let count = axes[2].encoder.resolution() * axes[2].ratio;
+    let count = actuators[2].encoder.resolution() * actuators[2].ratio;
     assert!(sag.abs() < 2.0 * count, "{sag} against counts of {count}");
     assert!(plant.state().speed[2].abs() < 1e-3, "{}", plant.state().speed[2]);
 }
@@ -395,7 +402,7 @@ fn an_elastic_lift_holds_its_height_on_the_brake() {
 #[test]
 fn two_runs_give_the_same_bits() {
     let run = || {
-        let mut plant = plant(corexy(), &Machine::builtin().axes);
+        let mut plant = plant(corexy(), &Machine::builtin());
         for index in 0..500_u32 {
             let volts = f64::from((index * 7919) % 1900) / 100.0 - 9.5;
             cycle(&mut plant, &voltage(&[volts, -0.5 * volts]));

@@ -8,7 +8,7 @@ use machine::transmission::{Elasticity, screw::at_nut};
 use machine::{Cartesian, Machine, MechanismKind};
 use messages::laser::{GateEdge, MAX_EDGES};
 use messages::time::CYCLE_PERIOD;
-use messages::{CommandMode, FaultCode, LaserCycle, MAX_AXES};
+use messages::{CommandMode, FaultCode, LaserCycle, MAX_ACTUATORS};
 
 /// A port under test, with what its machine can bear.
 struct Subject {
@@ -36,10 +36,10 @@ fn cartesian() -> Machine {
         elasticity: Some(mass.map(|mass| Elasticity::damped(at_nut(600.0, lead), mass, 0.9))),
         ..Cartesian::rigid(mass)
     });
-    for axis in &mut machine.axes {
-        axis.ratio = lead / 3.0;
-        axis.motor.dc_mut().unwrap().rotor_inertia = 2e-6 + 6.468e-6 / 9.0;
-        axis.gains.inertia = 3.94e-6;
+    for actuator in &mut machine.actuators {
+        actuator.ratio = lead / 3.0;
+        actuator.motor.dc_mut().unwrap().rotor_inertia = 2e-6 + 6.468e-6 / 9.0;
+        actuator.gains.inertia = 3.94e-6;
     }
     machine
 }
@@ -75,8 +75,8 @@ impl Subject {
     }
 
     fn driving(&self) -> Actuation {
-        let mut voltage = [0.0; MAX_AXES];
-        voltage[..self.port.axes()].fill(self.voltage);
+        let mut voltage = [0.0; MAX_ACTUATORS];
+        voltage[..self.port.actuators()].fill(self.voltage);
         Actuation {
             freshness: Freshness::Fresh,
             mode: CommandMode::Voltage,
@@ -106,12 +106,12 @@ fn pattern(gate: u32, offsets: &[u32]) -> LaserCycle {
 #[test]
 fn the_first_measurement_is_unpowered_dark_and_at_zero_counts() {
     check(|subject| {
-        assert!((1..=MAX_AXES).contains(&subject.port.axes()));
+        assert!((1..=MAX_ACTUATORS).contains(&subject.port.actuators()));
         assert!(subject.port.gate_resolution().0 >= 1);
         let measurement = subject.exchange(&Actuation::DISABLED);
         assert_eq!(measurement.power, Power::Off);
-        assert_eq!(measurement.counts, [0; MAX_AXES]);
-        assert_eq!(measurement.current, [0.0; MAX_AXES]);
+        assert_eq!(measurement.counts, [0; MAX_ACTUATORS]);
+        assert_eq!(measurement.current, [0.0; MAX_ACTUATORS]);
         assert!(!measurement.laser.is_lit() && !measurement.fault.is_some());
     });
 }
@@ -181,8 +181,8 @@ fn disabled_motors_carry_no_current_and_start_no_motion() {
         for _ in 0..50 {
             let measurement = subject.exchange(&disabled);
             assert_eq!(measurement.power, Power::Off);
-            assert_eq!(measurement.current, [0.0; MAX_AXES]);
-            assert_eq!(measurement.counts, [0; MAX_AXES]);
+            assert_eq!(measurement.current, [0.0; MAX_ACTUATORS]);
+            assert_eq!(measurement.counts, [0; MAX_ACTUATORS]);
         }
     });
 }
@@ -193,7 +193,7 @@ fn voltage_moves_every_axis() {
         let driving = subject.driving();
         let moved = subject.run(&driving, 20);
         assert_eq!(moved.power, Power::On);
-        for axis in 0..subject.port.axes() {
+        for axis in 0..subject.port.actuators() {
             assert!(moved.counts[axis] > 0 && moved.current[axis] > 0.0, "axis {axis}: {moved:?}");
         }
     });
@@ -236,7 +236,7 @@ fn numbers_that_are_not_finite_are_refused() {
     for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         check(|subject| {
             let mut actuation = subject.driving();
-            actuation.voltage[subject.port.axes() - 1] = number;
+            actuation.voltage[subject.port.actuators() - 1] = number;
             check_refusal(subject, &actuation, FaultCode::NotFinite);
         });
     }

@@ -11,7 +11,7 @@ use messages::laser::{GateEdge, LaserCycle};
 use messages::random::SplitMix64;
 use messages::{
     Command, CommandMode, Cycle, FaultCode, Feedback, Nanoseconds, RealtimeFacts, StallCause,
-    axis::axis_array,
+    axis::actuator_array,
 };
 
 const EPOCH: u64 = 77;
@@ -85,7 +85,7 @@ fn command(feedback: &Feedback, mode: CommandMode, laser: LaserCycle) -> Command
         published: feedback.published + Nanoseconds(10_000),
         stream: 1,
         mode: mode as u32,
-        voltage: axis_array(&[4.0, -2.0]),
+        voltage: actuator_array(&[4.0, -2.0]),
         laser,
         ..Command::default()
     }
@@ -303,7 +303,7 @@ fn a_hardware_port_is_told_of_passed_cycles_and_exchanges_only_once() {
     struct Listening(Arc<Mutex<Told>>);
 
     impl Port for Listening {
-        fn axes(&self) -> usize {
+        fn actuators(&self) -> usize {
             2
         }
         fn gate_resolution(&self) -> Nanoseconds {

@@ -7,9 +7,9 @@ mod shaft;
 
 use drives::plant::{Plant, PlantOptions};
 use drives::{Actuation, Freshness, Measurement, Port, Power};
-use machine::{Axis, Encoder, Friction, LaserSource, LoopGains, Motor, StepperMotor};
+use machine::{Actuator, Axis, Encoder, Friction, LaserSource, LoopGains, Motor, StepperMotor};
 use messages::time::CYCLE_TIME;
-use messages::{CommandMode, FaultCode, axis::axis_array};
+use messages::{CommandMode, FaultCode, axis::actuator_array};
 use shaft::Shaft;
 
 const DARK: LaserSource = LaserSource::IDEAL;
@@ -33,8 +33,8 @@ fn motor() -> StepperMotor {
     }
 }
 
-fn axis(motor: StepperMotor, coulomb: f64) -> Axis {
-    Axis {
+fn actuator(motor: StepperMotor, coulomb: f64) -> Actuator {
+    Actuator {
         motor: Motor::Stepper(motor),
         encoder: Encoder { counts: motor.pulses_per_turn() },
         gains: LoopGains {
@@ -43,22 +43,27 @@ fn axis(motor: StepperMotor, coulomb: f64) -> Axis {
             current: 0.0,
             inertia: motor.rotor_inertia,
         },
-        ..shaft::axis(1.0, Friction { coulomb, viscous: 1e-5 })
+        ..shaft::actuator(1.0, Friction { coulomb, viscous: 1e-5 })
     }
 }
 
 /// An axis that bears `load` [N·m].
-fn plant(axis: &Axis, load: f64) -> Plant<1, Shaft> {
+fn plant(actuator: &Actuator, load: f64) -> Plant<1, Shaft> {
+    plant_of(&shaft::axis(), actuator, load)
+}
+
+fn plant_of(axis: &Axis, actuator: &Actuator, load: f64) -> Plant<1, Shaft> {
     let shaft = Shaft { load, spread: 0.0 };
-    Plant::new(shaft, core::slice::from_ref(axis), &DARK, &[0.0], PlantOptions::default()).unwrap()
+    let (axes, actuators) = (core::slice::from_ref(axis), core::slice::from_ref(actuator));
+    Plant::new(shaft, axes, actuators, &DARK, &[0.0], PlantOptions::default()).unwrap()
 }
 
 fn to(position: f64, velocity: f64) -> Actuation {
     Actuation {
         freshness: Freshness::Fresh,
         mode: CommandMode::Position,
-        position: axis_array(&[position]),
-        velocity: axis_array(&[velocity]),
+        position: actuator_array(&[position]),
+        velocity: actuator_array(&[velocity]),
         ..Actuation::DISABLED
     }
 }
@@ -82,7 +87,7 @@ fn quintic(distance: f64, time: f64, at: f64) -> [f64; 3] {
 #[test]
 fn a_led_rotor_follows_a_move_to_within_its_pulses() {
     let (motor, coulomb) = (motor(), 0.02);
-    let mut plant = plant(&axis(motor, coulomb), 0.0);
+    let mut plant = plant(&actuator(motor, coulomb), 0.0);
     // 10 mm in 0.4 s: at most 47 mm/s, 300 kHz.
     let (distance, time) = (10.0 * core::f64::consts::PI, 0.4);
     let lead = |at: f64| {
@@ -109,13 +114,13 @@ fn a_led_rotor_follows_a_move_to_within_its_pulses() {
 #[test]
 fn a_load_is_held_at_home_and_counted_in_pulses() {
     let motor = motor();
-    let mut plant = plant(&axis(motor, 0.0), 0.25);
+    let mut plant = plant(&actuator(motor, 0.0), 0.25);
     // asin(0.25/0.5) is 30° electrical: the count starts where the magnetic axis stands, 0.6° on.
     let start = exchange(&mut plant, &Actuation::DISABLED);
     assert_eq!(start.counts[0], 0);
     assert!((start.position[0] - 0.6_f64.to_radians()).abs() < 1e-12);
     let home = start.position[0];
-    let mut plant = self::plant(&axis(motor, 0.0), 0.25);
+    let mut plant = self::plant(&actuator(motor, 0.0), 0.25);
     for _ in 0..300 {
         let measurement = exchange(&mut plant, &to(home, 0.0));
         assert_eq!((measurement.power, measurement.counts[0]), (Power::On, 0));
@@ -151,9 +156,9 @@ fn ramp(plant: &mut Plant<1, Shaft>, acceleration: f64) -> (messages::Fault, f64
 fn a_rotor_that_cannot_follow_falls_out_of_step() {
     let motor = motor();
     // 60 000 rad/s² would need 0.6 N·m.
-    let mut plant = plant(&axis(motor, 0.0), 0.0);
+    let mut plant = plant(&actuator(motor, 0.0), 0.0);
     let (fault, _) = ramp(&mut plant, 6e4);
-    assert_eq!((fault.code, fault.axis), (FaultCode::DriveFault as u32, 1));
+    assert_eq!((fault.code, fault.actuator), (FaultCode::DriveFault as u32, 1));
     assert!((fault.limit - 3.6_f64.to_radians()).abs() < 1e-12);
     assert!(fault.value > fault.limit && fault.value < 2.0 * fault.limit, "{fault:?}");
     // It brakes while the fault is latched, and starts anew after it was disabled.
@@ -172,7 +177,7 @@ fn a_rotor_that_cannot_follow_falls_out_of_step() {
 #[test]
 fn a_gentle_ramp_ends_at_the_speed_where_the_torque_does() {
     let motor = StepperMotor { voltage: 6.0, damping: 1e-3, ..motor() };
-    let mut plant = plant(&axis(motor, 0.0), 0.1);
+    let mut plant = plant(&actuator(motor, 0.0), 0.1);
     let (_, speed) = ramp(&mut plant, 200.0);
     // Load, inertia and viscous friction against the pull-out torque.
     let need = |speed: f64| 0.1 + 1e-5 * 200.0 + 1e-5 * speed;
@@ -187,9 +192,9 @@ fn a_gentle_ramp_ends_at_the_speed_where_the_torque_does() {
 #[test]
 fn a_pulse_rate_beyond_the_driver_is_refused() {
     let motor = StepperMotor { pulse_rate: 100e3, ..motor() };
-    let mut plant = plant(&axis(motor, 0.0), 0.0);
+    let mut plant = plant(&actuator(motor, 0.0), 0.0);
     let (fault, speed) = ramp(&mut plant, 2000.0);
-    assert_eq!((fault.code, fault.axis, fault.limit), (FaultCode::DriveFault as u32, 1, 100e3));
+    assert_eq!((fault.code, fault.actuator, fault.limit), (FaultCode::DriveFault as u32, 1, 100e3));
     let rate = speed * motor.pulses_per_radian();
     assert!(rate > 100e3 && rate < 106e3 && (fault.value / rate - 1.0).abs() < 1e-9, "{rate}");
 }
@@ -197,9 +202,9 @@ fn a_pulse_rate_beyond_the_driver_is_refused() {
 #[test]
 fn a_quick_stop_ramps_the_pulses_down_and_holds() {
     let motor = motor();
-    let mut axis = axis(motor, 0.0);
+    let mut axis = shaft::axis();
     axis.limits.acceleration = 500.0;
-    let mut plant = plant(&axis, 0.0);
+    let mut plant = plant_of(&axis, &actuator(motor, 0.0), 0.0);
     let mut angle = 0.0;
     for cycle in 1..=200 {
         let time = f64::from(cycle) * CYCLE_TIME;

@@ -9,7 +9,8 @@ use machine::{Machine, StallTolerance};
 use messages::feedback::status;
 use messages::laser::{GateEdge, LaserCycle, MAX_EDGES};
 use messages::{
-    Command, CommandMode, Cycle, FaultCode, Feedback, Nanoseconds, RealtimeFacts, axis::axis_array,
+    Command, CommandMode, Cycle, FaultCode, Feedback, Nanoseconds, RealtimeFacts,
+    axis::actuator_array,
 };
 
 const EPOCH: u64 = 77;
@@ -86,7 +87,7 @@ fn command(feedback: &Feedback, mode: CommandMode, laser: LaserCycle) -> Command
         cycle: feedback.cycle,
         published: feedback.published + Nanoseconds(10_000),
         mode: mode as u32,
-        voltage: axis_array(&[4.0, -2.0]),
+        voltage: actuator_array(&[4.0, -2.0]),
         laser,
         ..Command::default()
     }
@@ -260,10 +261,10 @@ fn a_command_that_makes_no_sense_stops_at_once() {
         run.answered(CommandMode::Voltage, lit());
         run.cycle(|feedback| {
             let good = command(feedback, CommandMode::Voltage, lit());
-            Some(Command { voltage: axis_array(&[1.0, number]), ..good })
+            Some(Command { voltage: actuator_array(&[1.0, number]), ..good })
         });
         let feedback = run.answered(CommandMode::Voltage, lit());
-        assert_eq!((feedback.fault.code(), feedback.fault.axis), (FaultCode::NotFinite, 2));
+        assert_eq!((feedback.fault.code(), feedback.fault.actuator), (FaultCode::NotFinite, 2));
         assert!(feedback.has(status::WATCHDOG_TRIPPED));
         assert!(!run.answered(CommandMode::Voltage, lit()).laser.is_lit());
         assert_eq!(run.bridge.report(facts()).gate_trips, 1);
@@ -313,12 +314,12 @@ fn steppers_follow_the_controller_to_rest_in_the_dark_after_a_peer_has_died() {
     const STOP: u32 = 150;
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../machines");
     let machine = Machine::load(&folder.join("cartesian_steppers.toml"), &[]).unwrap();
-    let pulse = machine.axes[0].encoder.resolution();
+    let pulse = machine.actuators[0].encoder.resolution();
     // Slow enough that no following error would ever be noticed, and fast.
     for speed in [0.01, 0.2] {
         let mut run = Run::of(&machine, Deadlines::Strict);
         let home = run.answered(CommandMode::Disabled, LaserCycle::OFF).position;
-        let fastest = speed / machine.axes[0].ratio;
+        let fastest = speed / machine.actuators[0].ratio;
         let mut told = home;
         for cycle in 0..DEATH + STOP + 50 {
             let rate = match cycle {
@@ -331,7 +332,7 @@ fn steppers_follow_the_controller_to_rest_in_the_dark_after_a_peer_has_died() {
             } else {
                 GatePermission::Granted
             });
-            let mut velocity = [0.0; 8];
+            let mut velocity = [0.0; messages::MAX_ACTUATORS];
             velocity[0] = rate * fastest;
             let before = told;
             told[0] += velocity[0] * 1e-3;
@@ -349,7 +350,7 @@ fn steppers_follow_the_controller_to_rest_in_the_dark_after_a_peer_has_died() {
         // It stands where it was told to, to the pulse.
         let stands = run.cycle(|feedback| {
             let moving = command(feedback, CommandMode::Position, LaserCycle::OFF);
-            Some(Command { position: told, velocity: [0.0; 8], ..moving })
+            Some(Command { position: told, velocity: [0.0; messages::MAX_ACTUATORS], ..moving })
         });
         assert!((stands.position[0] - told[0]).abs() <= pulse, "{stands:?}");
         assert_eq!(stands.velocity[0], 0.0);
@@ -409,7 +410,7 @@ fn a_released_port_is_dark_and_unpowered() {
     struct Listening(Arc<Mutex<Vec<Actuation>>>);
 
     impl Port for Listening {
-        fn axes(&self) -> usize {
+        fn actuators(&self) -> usize {
             2
         }
         fn gate_resolution(&self) -> Nanoseconds {

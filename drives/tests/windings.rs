@@ -6,7 +6,7 @@ mod shaft;
 use drives::plant::{Plant, PlantError, PlantOptions};
 use drives::{Actuation, Freshness, Measurement, Port};
 use machine::{Friction, LaserSource};
-use messages::{CommandMode, axis::axis_array};
+use messages::{CommandMode, axis::actuator_array};
 use shaft::Shaft;
 
 /// Voltage [V].
@@ -21,12 +21,12 @@ struct Values {
 }
 
 fn plant(values: Values, substep: f64) -> Result<Plant<1, Shaft>, PlantError> {
-    let mut axis = shaft::axis(values.inertia, Friction { coulomb: 0.0, viscous: 1e-7 });
-    let motor = axis.motor.dc_mut().unwrap();
+    let mut actuator = shaft::actuator(values.inertia, Friction { coulomb: 0.0, viscous: 1e-7 });
+    let motor = actuator.motor.dc_mut().unwrap();
     (motor.inductance, motor.torque_constant) = (values.inductance, values.torque_constant);
     let shaft = Shaft { load: 0.0, spread: 0.0 };
     let options = PlantOptions { substep, ..PlantOptions::default() };
-    Plant::new(shaft, &[axis], &LaserSource::IDEAL, &[0.0], options)
+    Plant::new(shaft, &[shaft::axis()], &[actuator], &LaserSource::IDEAL, &[0.0], options)
 }
 
 /// Angle and speed at the ends of 40 cycles, of which the voltage is on in the first 20.
@@ -36,7 +36,7 @@ fn course(values: Values, substep: f64) -> Vec<[f64; 2]> {
     let driven = |volts: f64| Actuation {
         freshness: Freshness::Fresh,
         mode: CommandMode::Voltage,
-        voltage: axis_array(&[volts]),
+        voltage: actuator_array(&[volts]),
         ..Actuation::DISABLED
     };
     let mut ends = Vec::new();

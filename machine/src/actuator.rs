@@ -1,6 +1,5 @@
-//! What moves a joint: motor, encoder, transmission ratio, and the gains of its cascade.
+//! What moves an axis: motor, encoder, transmission ratio, and the gains of its cascade.
 
-use crate::limits::AxisLimits;
 use crate::motor::Motor;
 use crate::transmission::gear::Efficiency;
 
@@ -64,42 +63,20 @@ pub struct LoopGains {
     pub inertia: f64,
 }
 
-/// What a joint is measured in. Its number is the form of a quantity of a joint's travel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum JointUnit {
-    /// [m].
-    Length = 0,
-    /// [rad].
-    Angle = 1,
-}
-
-impl JointUnit {
-    /// The symbol of the joint's position.
-    pub fn name(self) -> &'static str {
-        self.names()[0]
-    }
-
-    /// The symbols of the joint's position and its first three derivatives by time.
-    pub fn names(self) -> [&'static str; 4] {
-        match self {
-            Self::Length => ["m", "m/s", "m/s²", "m/s³"],
-            Self::Angle => ["rad", "rad/s", "rad/s²", "rad/s³"],
-        }
-    }
-}
-
-/// One actuated axis, in the order of the joints of the mechanism.
+/// One motor with what stands between it and its joint. An axis has one or several, in the order of the
+/// machine file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Axis {
-    /// The name in the machine file.
+pub struct Actuator {
+    /// The name of its axis, and of several on one axis its own behind a dot: `x`, `y.left`.
     pub name: String,
-    /// What its joint is measured in.
-    pub unit: JointUnit,
-    /// Joint units moved per radian of the motor, gear and screw or pulley included; positive
-    /// [m/rad or rad/rad].
+    /// Index of the axis that it drives.
+    pub axis: usize,
+    /// Joint units moved per radian of the motor, gear and screw or pulley included; negative where the
+    /// motor is mounted the other way round, never 0 [m/rad or rad/rad].
     pub ratio: f64,
-    /// How far the joint moves freely while the motor stands, from stop to stop [m or rad].
-    pub backlash: f64,
+    /// Share of the axis' transmission that is its own, of its stiffness and damping and so of every
+    /// effort: what its motor gives at standstill of what all motors of the axis give. They add up to 1.
+    pub share: f64,
     /// What of the motor's torque reaches the joint.
     ///
     /// For sizing only. In motion the losses are [`Friction`], for the plant and for the
@@ -115,8 +92,31 @@ pub struct Axis {
     pub encoder: Encoder,
     /// Gains of its cascade.
     pub gains: LoopGains,
-    /// Its limits.
-    pub limits: AxisLimits,
+    /// How far it stands beyond its place where its home reference is, in joint units [m or rad]: what
+    /// enabling takes back. 0 where the reference is square.
+    pub square: f64,
+}
+
+impl Actuator {
+    /// Joint travel of one count, or of one pulse [m or rad].
+    pub fn count(&self) -> f64 {
+        self.encoder.resolution() * self.ratio.abs()
+    }
+
+    /// Whether a motion of the axis asks the same of this one as of `other`, but for the direction in which
+    /// they turn.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.axis == other.axis
+            && self.ratio.abs() == other.ratio.abs()
+            && self.share == other.share
+            && self.motor == other.motor
+            && self.friction == other.friction
+    }
+
+    /// Effort at the joint that `torque` at the shaft [N·m] gives [N or N·m].
+    pub fn effort(&self, torque: f64) -> f64 {
+        torque / self.ratio.abs()
+    }
 }
 
 impl Encoder {

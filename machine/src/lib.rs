@@ -9,6 +9,7 @@
 
 pub mod actuator;
 pub mod analysis;
+pub mod axis;
 pub mod document;
 pub mod equation_of_motion;
 pub mod file;
@@ -29,7 +30,8 @@ pub mod taylor;
 pub mod transmission;
 pub mod trip;
 
-pub use actuator::{Axis, Encoder, Friction, HoldingBrake, JointUnit, LoopGains};
+pub use actuator::{Actuator, Encoder, Friction, HoldingBrake, LoopGains};
+pub use axis::{Axis, JointUnit};
 pub use document::{DocumentError, Override};
 pub use equation_of_motion::EquationOfMotion;
 pub use frame::Frame;

@@ -42,6 +42,9 @@ pub struct AxisLimits {
     pub jerk: f64,
     /// Largest |setpoint − feedback| before the machine stops, joint units [m or rad].
     pub following_error: f64,
+    /// Largest distance of two actuators of the axis from each other before the machine stops, joint
+    /// units [m or rad].
+    pub racking: f64,
 }
 
 /// The box that the tool may reach, machine frame.

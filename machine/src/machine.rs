@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::actuator::Axis;
+use crate::actuator::Actuator;
+use crate::axis::Axis;
 use crate::document::{Concern, DocumentError, Override};
 use crate::gcode_settings::GcodeSettings;
 use crate::laser::LaserSource;
@@ -24,6 +25,8 @@ pub struct Machine {
     pub mechanism: MechanismKind,
     /// Its axes, in the order of the mechanism's joints.
     pub axes: Vec<Axis>,
+    /// What drives them, those of the first axis first.
+    pub actuators: Vec<Actuator>,
     /// Where the tool may go.
     pub area: WorkArea,
     /// Where the tool rests, machine frame [m].
@@ -60,6 +63,16 @@ pub struct Warning {
 }
 
 impl Machine {
+    /// The actuators of each axis in turn, with the axis.
+    pub fn driven(&self) -> impl Iterator<Item = (&Axis, &[Actuator])> {
+        self.axes.iter().map(|axis| (axis, axis.driven_by(&self.actuators)))
+    }
+
+    /// Each actuator with the axis that it drives.
+    pub fn drives(&self) -> impl Iterator<Item = (&Actuator, &Axis)> {
+        self.actuators.iter().filter_map(|actuator| Some((actuator, self.axes.get(actuator.axis)?)))
+    }
+
     /// The warnings that bear on a job, each with its line in the machine file: those of values that are
     /// used.
     pub fn job_warnings(&self) -> Vec<String> {

@@ -5,7 +5,8 @@
 //! checker asks for [`Limit::plan`], the controller's supervision for [`Limit::trip`]. No other part
 //! keeps a margin of its own.
 
-use crate::actuator::Axis;
+use crate::actuator::Actuator;
+use crate::axis::Axis;
 use crate::motor::{DcMotor, Motor, StepperMotor};
 
 /// Supervision tolerates planned values up to 0.1 % beyond a limit. Planner and controller compute the same
@@ -91,7 +92,9 @@ impl Axis {
     pub fn jerk_limit(&self) -> Limit {
         Limit::planned(self.limits.jerk)
     }
+}
 
+impl Actuator {
     /// Torque of the motor at `speed` of its shaft [rad/s], without what friction takes, which may be
     /// against the motion or help to brake it [N·m].
     pub fn effort_limit(&self, speed: f64) -> Limit {
@@ -130,19 +133,20 @@ mod tests {
         for axis in &mut machine.axes {
             axis.limits.acceleration = 10.0;
             axis.limits.jerk = 500.0;
-            if let Some(motor) = axis.motor.dc_mut() {
+            let limits = [axis.velocity_limit(), axis.acceleration_limit(), axis.jerk_limit()];
+            for limit in limits {
+                assert!(limit.trip >= 1.000_999 * limit.plan, "{limit:?}");
+            }
+        }
+        for actuator in &mut machine.actuators {
+            if let Some(motor) = actuator.motor.dc_mut() {
                 motor.continuous_current = Some(3.0);
             }
-            let heating = axis.motor.dc().and_then(|motor| motor.heating_limit());
-            let power = axis.motor.dc().map(|motor| [motor.current_limit(), motor.voltage_limit()]);
-            let limits = [
-                axis.velocity_limit(),
-                axis.acceleration_limit(),
-                axis.jerk_limit(),
-                axis.effort_limit(100.0),
-                axis.effort_limit(-100.0),
-                Limit::ROUNDING,
-            ];
+            let dc = actuator.motor.dc();
+            let heating = dc.and_then(|motor| motor.heating_limit());
+            let power = dc.map(|motor| [motor.current_limit(), motor.voltage_limit()]);
+            let limits =
+                [actuator.effort_limit(100.0), actuator.effort_limit(-100.0), Limit::ROUNDING];
             for limit in limits.into_iter().chain(heating).chain(power.into_iter().flatten()) {
                 assert!(limit.trip >= 1.000_999 * limit.plan, "{limit:?}");
             }

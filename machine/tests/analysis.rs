@@ -70,7 +70,7 @@ fn singular_values_and_angles_are_those_of_the_golden_vectors() {
             let number = |key: &str, index: usize| pose[key][index].as_f64().unwrap();
             let place =
                 Place::with_tool_at(&machine, [number("x", 0), number("x", 1), 0.0]).unwrap();
-            let ratio = if name == "five_bar" { 1.0 } else { machine.axes[0].ratio };
+            let ratio = if name == "five_bar" { 1.0 } else { machine.actuators[0].ratio };
             let found = place.manipulability().unwrap();
             for (index, axis) in found.velocity.iter().enumerate() {
                 near(axis.value * ratio, number("singular_values", index), 1e-9);
@@ -155,7 +155,7 @@ fn carriages_swing_as_masses_on_their_springs() {
     assert!(free[0].frequency < 1e-3 && free[1].frequency < 1e-3, "{free:?}");
     let mut expected: Vec<f64> = (0..2)
         .map(|axis| {
-            let settings = &cartesian.axes[axis];
+            let settings = &cartesian.actuators[axis];
             let rotor = settings.motor.rotor_inertia() / (settings.ratio * settings.ratio);
             let stiffness = carriages.elasticity.unwrap()[axis].stiffness;
             (stiffness * (1.0 / carriages.mass[axis] + 1.0 / rotor)).sqrt() / TAU
@@ -256,9 +256,9 @@ fn a_tool_gives_way_to_a_push_as_its_springs_do() {
     let loops = place.tool_stiffness(Hold::Loops).unwrap();
     let clamped = place.tool_stiffness(Hold::Clamped).unwrap();
     assert!(loops[0].value < clamped[0].value);
-    let gains = &machine.axes[0].gains;
+    let gains = &machine.actuators[0].gains;
     let hold = gains.inertia * gains.velocity * gains.position
-        / (machine.axes[0].ratio * machine.axes[0].ratio);
+        / (machine.actuators[0].ratio * machine.actuators[0].ratio);
     let same_axes = (1.0 / 2750.0 + 1.0 / hold) * 2750.0;
     near(clamped[0].value / loops[0].value, same_axes, 1e-9);
 }
@@ -311,7 +311,7 @@ fn what_hangs_falls_faster_than_it_rises() {
     let place = Place::home(&machine).unwrap();
     let MechanismKind::Polar(polar) = &machine.mechanism else { panic!() };
     let (mass, weight) = (polar.load.head_mass, polar.load.head_mass * polar.load.gravity);
-    let ratio = machine.axes[2].ratio;
+    let ratio = machine.actuators[2].ratio;
     let torques = [1.0, 1.0, 2.0 * weight * ratio];
     near(place.acceleration(&Vector3::z(), &torques, false).value, weight / mass, 1e-9);
     near(place.acceleration(&-Vector3::z(), &torques, false).value, 3.0 * weight / mass, 1e-9);
@@ -335,12 +335,14 @@ fn the_largest_acceleration_uses_one_motor_fully_on_every_machine() {
             motion.acceleration = along * acceleration;
             let joints = mechanism.joint_motion(&motion, mechanism.branch(), &q).unwrap();
             let effort = mechanism.inverse_dynamics(&chain, &Joints::zeros(), &joints.acceleration);
-            let axes = machine.axes.iter().enumerate();
-            axes.map(|(axis, settings)| {
-                settings.ratio * effort[axis]
-                    + settings.motor.rotor_inertia() * joints.acceleration[axis] / settings.ratio
-            })
-            .collect()
+            let actuators = machine.actuators.iter().enumerate();
+            actuators
+                .map(|(axis, settings)| {
+                    settings.ratio * effort[axis]
+                        + settings.motor.rotor_inertia() * joints.acceleration[axis]
+                            / settings.ratio
+                })
+                .collect()
         }
     }
     for machine in machines() {

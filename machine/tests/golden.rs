@@ -134,7 +134,7 @@ impl MechanismVisitor for Compare {
 
 fn compare(name: &str) -> Machine {
     let machine = load(name);
-    let ratio = Vector2::new(machine.axes[0].ratio, machine.axes[1].ratio);
+    let ratio = Vector2::new(machine.actuators[0].ratio, machine.actuators[1].ratio);
     let poses = golden(name)["poses"].as_array().unwrap().clone();
     assert!(poses.len() >= 8, "{name} has {} poses", poses.len());
     assert_eq!(machine.mechanism.visit(Compare { ratio, poses: poses.clone() }), poses.len());
@@ -146,7 +146,7 @@ fn the_cartesian_agrees_with_its_golden_vectors() {
     let machine = compare("cartesian");
     let parameters = &golden("cartesian")["params"];
     let p = parameters["p_m_per_rad"].as_f64().unwrap();
-    check("p", machine.axes[0].ratio, p, p);
+    check("p", machine.actuators[0].ratio, p, p);
     let MechanismKind::Cartesian(cartesian) = machine.mechanism else { panic!("not cartesian") };
     assert_eq!(cartesian.mass, [1.93, 0.33]);
 }
@@ -154,7 +154,7 @@ fn the_cartesian_agrees_with_its_golden_vectors() {
 #[test]
 fn the_corexy_agrees_with_its_golden_vectors() {
     let machine = compare("corexy");
-    assert_eq!(machine.axes[0].ratio, 0.00125);
+    assert_eq!(machine.actuators[0].ratio, 0.00125);
     let MechanismKind::CoreXy(corexy) = machine.mechanism else { panic!("not a corexy") };
     assert_eq!(corexy.mass, [0.33, 1.06]);
 }
@@ -163,7 +163,7 @@ fn the_corexy_agrees_with_its_golden_vectors() {
 #[test]
 fn the_cartesian_x_axis_is_the_plant_of_the_golden_cascade() {
     let machine = load("cartesian");
-    let axis = &machine.axes[0];
+    let axis = &machine.actuators[0];
     let file = golden("cascade");
     let plant = &file["params"]["plant"];
     let number = |key: &str| plant[key].as_f64().unwrap();
@@ -200,7 +200,7 @@ fn the_cartesian_x_axis_is_the_plant_of_the_golden_cascade() {
 #[test]
 fn the_corexy_has_the_pilots_numbers() {
     let machine = Machine::builtin();
-    let axis = &machine.axes[0];
+    let axis = &machine.actuators[0];
     let gains = &axis.gains;
     let near = |found: f64, printed: f64, digit: f64| {
         assert!((found - printed).abs() <= digit / 2.0, "{found} against {printed}");

@@ -201,8 +201,8 @@ fn overrides_change_values_and_the_last_one_counts() {
     let machine = Machine::parse("corexy.toml", COREXY, &settings).unwrap();
     assert_eq!(machine.path.jerk, 5000.0);
     assert_eq!(machine.path.acceleration, 12.0);
-    assert_eq!(machine.axes[0].ratio, 0.001);
-    assert_eq!(machine.axes[1].ratio, 0.00125);
+    assert_eq!(machine.actuators[0].ratio, 0.001);
+    assert_eq!(machine.actuators[1].ratio, 0.00125);
     assert_eq!(machine.gcode.origins[8], [0.001, 0.002, 0.0]);
     assert_eq!(machine.name, "Other");
 }

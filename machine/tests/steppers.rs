@@ -18,14 +18,18 @@ fn errors(from: &str, to: &str) -> Vec<String> {
 fn a_stepper_is_counted_in_its_pulses() {
     let machine = Machine::parse("m.toml", FILE, &[]).unwrap();
     assert!(machine.warnings.is_empty(), "{:?}", machine.warnings);
-    let axis = &machine.axes[0];
+    let axis = &machine.actuators[0];
     let Motor::Stepper(motor) = axis.motor else { panic!("{axis:?}") };
     assert_eq!((motor.full_steps, motor.microsteps, axis.encoder.counts), (200.0, 16.0, 3200.0));
     assert!((motor.pulse_rate - 200e3).abs() < 1e-6);
     // The rotor and the screw through the gear: 3.8e-6 + 6.468e-6/9.
     assert!((motor.rotor_inertia - 4.518_667e-6).abs() < 1e-12);
     // 5 mm a turn: 90 % of 200 kHz are 0.28125 m/s.
-    assert!((axis.limits.velocity - 0.281_25).abs() < 1e-12, "{}", axis.limits.velocity);
+    assert!(
+        (machine.axes[0].limits.velocity - 0.281_25).abs() < 1e-12,
+        "{}",
+        machine.axes[0].limits.velocity
+    );
     // 50 turns a second, as the file's comment says.
     let torque = motor.pull_out_torque(100.0 * core::f64::consts::PI);
     assert!((torque - 0.2444).abs() < 5e-4, "{torque}");

@@ -100,8 +100,8 @@ fn efficiency_is_dynamic_and_static() {
     let text =
         with(CARTESIAN, "efficiency = 0.5", "efficiency = 0.5\nstatic_efficiency = \"80 %\"");
     let machine = Machine::parse("m.toml", &text, &[]).unwrap();
-    assert_eq!(machine.axes[0].efficiency, Efficiency { dynamic: 0.5, at_start: 0.8 });
-    assert_eq!(machine.axes[1].efficiency, Efficiency { dynamic: 0.5, at_start: 1.0 });
+    assert_eq!(machine.actuators[0].efficiency, Efficiency { dynamic: 0.5, at_start: 0.8 });
+    assert_eq!(machine.actuators[1].efficiency, Efficiency { dynamic: 0.5, at_start: 1.0 });
 }
 
 /// cartesian.toml with nothing but masses in its mechanism, and this transmission of both axes.

@@ -1,6 +1,6 @@
 //! Controller to drives: what the motors and the laser shall do in the next cycle.
 
-use crate::{AxisArray, Cycle, Fault, LaserCycle, Nanoseconds, sample};
+use crate::{ActuatorArray, Cycle, Fault, LaserCycle, Nanoseconds, sample};
 
 /// Which of a command's targets drives shall follow. Discriminants are the values in samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -37,7 +37,7 @@ impl CommandMode {
 
 sample! {
     /// The answer to one feedback. Drives latches it and applies it at the next deadline, always.
-    Command = "graver.Command.v2" {
+    Command = "graver.Command.v3" {
         /// The `Feedback::epoch` this answers: a command for another run of drives is not fresh.
         epoch: u64,
         /// The feedback this answers; it takes effect at the deadline of `cycle + 1`.
@@ -68,17 +68,17 @@ sample! {
         /// Where the plan has the tool at the instant of the feedback, machine frame [m].
         tool: [f64; 3],
         /// Position reference at the instant of the feedback, motor side [rad].
-        reference: AxisArray,
+        reference: ActuatorArray,
         /// Reference minus feedback [rad at the motor].
-        following_error: AxisArray,
+        following_error: ActuatorArray,
         /// Target position at the end of the cycle in which this acts [rad at the motor].
-        position: AxisArray,
+        position: ActuatorArray,
         /// Target velocity in the cycle in which this acts [rad/s at the motor].
-        velocity: AxisArray,
+        velocity: ActuatorArray,
         /// Target torque in the cycle in which this acts [N·m at the motor].
-        effort: AxisArray,
+        effort: ActuatorArray,
         /// Motor voltage for the cycle in which this acts [V].
-        voltage: AxisArray,
+        voltage: ActuatorArray,
         /// The laser in the cycle in which this acts.
         laser: LaserCycle,
         /// The latched fault, if any.

@@ -13,7 +13,7 @@ pub enum FaultCode {
     /// Nothing is wrong.
     #[default]
     None = 0,
-    /// |setpoint − feedback| of an axis above its limit.
+    /// |setpoint − feedback| of an actuator above the limit of its axis.
     FollowingError = 1,
     /// A measured joint position outside its soft limits.
     PositionLimit = 2,
@@ -45,6 +45,8 @@ pub enum FaultCode {
     SupervisorLost = 15,
     /// The first setpoint of a stream is not where the axis stands.
     StreamStart = 16,
+    /// Two actuators of one axis are too far from each other.
+    Racking = 17,
 }
 
 impl FaultCode {
@@ -67,6 +69,7 @@ impl FaultCode {
             14 => Self::Overload,
             15 => Self::SupervisorLost,
             16 => Self::StreamStart,
+            17 => Self::Racking,
             _ => Self::DriveFault,
         }
     }
@@ -91,17 +94,20 @@ impl FaultCode {
             Self::Overload => "overload",
             Self::SupervisorLost => "supervisor_lost",
             Self::StreamStart => "stream_start",
+            Self::Racking => "racking",
         }
     }
 }
 
 sample! {
     /// A latched fault: the first one, with where and how much.
-    Fault = "graver.Fault.v2" {
+    Fault = "graver.Fault.v3" {
         /// A [`FaultCode`].
         code: u32,
-        /// The axis from 1, or 0 when the fault belongs to none.
-        axis: u32,
+        /// The axis from 1, or 0 when the fault belongs to none, or to an actuator.
+        axis: u16,
+        /// The actuator from 1, or 0 when the fault belongs to none.
+        actuator: u16,
         /// A [`FaultQuantity`]: what `value` and `limit` measure.
         quantity: u32,
         /// 1 when there is a limit, else 0.
@@ -122,8 +128,13 @@ impl Fault {
     }
 
     /// The same on the axis with this index, from 0.
-    pub fn on(self, index: usize) -> Self {
-        Self { axis: index as u32 + 1, ..self }
+    pub fn on_axis(self, index: usize) -> Self {
+        Self { axis: index as u16 + 1, actuator: 0, ..self }
+    }
+
+    /// The same on the actuator with this index, from 0.
+    pub fn on_actuator(self, index: usize) -> Self {
+        Self { axis: 0, actuator: index as u16 + 1, ..self }
     }
 
     /// The same with the value that was found.

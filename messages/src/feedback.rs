@@ -1,6 +1,6 @@
 //! Drives to controller: what was measured at a deadline, and what happened in the cycle before.
 
-use crate::{AxisArray, Cycle, Fault, LaserCycle, MAX_AXES, Nanoseconds, sample};
+use crate::{ActuatorArray, Cycle, Fault, LaserCycle, MAX_ACTUATORS, Nanoseconds, sample};
 
 /// Bits of [`Feedback::status`].
 pub mod status {
@@ -21,7 +21,7 @@ pub mod status {
 
 sample! {
     /// One measurement, taken at the deadline of `cycle`.
-    Feedback = "graver.Feedback.v2" {
+    Feedback = "graver.Feedback.v3" {
         /// Identifies this run of drives: its start on the monotonic clock [ns].
         epoch: u64,
         /// The cycle that starts with this measurement.
@@ -56,13 +56,13 @@ sample! {
         /// for all above it: so long a stall is a fault in any case.
         skipped: u16,
         /// Encoder counts since power-on.
-        counts: [i64; MAX_AXES],
+        counts: [i64; MAX_ACTUATORS],
         /// Motor position from the encoder [rad].
-        position: AxisArray,
+        position: ActuatorArray,
         /// Motor velocity since the feedback before, on average [rad/s].
-        velocity: AxisArray,
+        velocity: ActuatorArray,
         /// Motor current [A].
-        current: AxisArray,
+        current: ActuatorArray,
         /// Tool centre point in the machine frame, if `status` says it is known [m].
         tool: [f64; 3],
         /// What the laser really did since the feedback before: in its cycle, and in those skipped

@@ -3,7 +3,7 @@
 //!
 //! Nothing here does input or output, allocates in a cycle, or knows how a sample travels.
 //! A sample is plain bytes: `#[repr(C)]`, no padding, no `bool`, no `enum`, no `Option`, arrays of
-//! [`MAX_AXES`] with unused axes at zero. It can therefore be sent, hashed, logged and replayed
+//! [`MAX_AXES`] or [`MAX_ACTUATORS`] with what is unused at zero. It can therefore be sent, hashed, logged and replayed
 //! as it stands. [`sample::Sample`] names each type and hashes its layout.
 //!
 //! Units are SI with angles in radians. Names carry no unit, the documentation does.
@@ -30,7 +30,7 @@ pub mod stall;
 pub mod state;
 pub mod time;
 
-pub use axis::{AxisArray, MAX_AXES};
+pub use axis::{ActuatorArray, AxisArray, MAX_ACTUATORS, MAX_AXES};
 pub use command::{Command, CommandMode};
 pub use fault::{Fault, FaultCode, FaultQuantity};
 pub use feedback::Feedback;

@@ -82,15 +82,16 @@ pub struct LimitUtilization {
     pub acceleration: Vec<f64>,
     /// Joint jerk, per axis.
     pub jerk: Vec<f64>,
-    /// Motor current, friction included, per axis.
+    /// Motor current, friction included, per actuator.
     pub current: Vec<f64>,
-    /// Motor voltage, per axis.
+    /// Motor voltage, per actuator.
     pub voltage: Vec<f64>,
-    /// Heating of each DC motor's winding, the root mean square of its current against what it
+    /// Heating of each actuator's DC winding, the root mean square of its current against what it
     /// bears for ever; 0 where the machine file does not say that.
     pub heat: Vec<f64>,
     /// Motor torque as the efficiencies of gear and screw have it, in place of friction: for
-    /// sizing, against the power stage's limit or the pull-out torque. No limit is held to it.
+    /// sizing, against the power stage's limit or the pull-out torque, per actuator. No limit is held to
+    /// it.
     pub sizing: Vec<f64>,
     /// Speed of the tool.
     pub path_speed: f64,

@@ -1,6 +1,6 @@
 //! Final reports: what each stage alone can know, sent when a stream ends and every second.
 
-use crate::{AxisArray, Cycle, Fault, Stalls, sample};
+use crate::{ActuatorArray, AxisArray, Cycle, Fault, Stalls, sample};
 
 /// Bits of [`RealtimeFacts::refused`].
 pub mod refused {
@@ -52,7 +52,7 @@ sample! {
 
 sample! {
     /// What the controller counted over one stream: published every second, also after its end.
-    ControllerReport = "graver.ControllerReport.v1" {
+    ControllerReport = "graver.ControllerReport.v2" {
         /// The stream it speaks of.
         stream: u64,
         /// 1 once the stream has ended and this is final, else 0.
@@ -70,9 +70,9 @@ sample! {
         /// Samples behind the root mean squares.
         count: u64,
         /// Largest |reference − feedback| at the motor [rad].
-        following_error_max: AxisArray,
+        following_error_max: ActuatorArray,
         /// Sum of the squares of it [rad²].
-        following_error_squares: AxisArray,
+        following_error_squares: ActuatorArray,
         /// Largest share of the limit used: joint velocity.
         velocity_use: AxisArray,
         /// Largest share of the limit used: joint acceleration.
@@ -80,7 +80,7 @@ sample! {
         /// Largest share of the limit used: joint jerk.
         jerk_use: AxisArray,
         /// Largest share of the current limit commanded.
-        effort_use: AxisArray,
+        effort_use: ActuatorArray,
         /// Largest share of the limit used: acceleration along and across the path.
         path_acceleration_use: f64,
         /// Largest share of the limit used: jerk along and across the path.
@@ -94,7 +94,7 @@ sample! {
 
 sample! {
     /// What drives counted since it started.
-    DrivesReport = "graver.DrivesReport.v2" {
+    DrivesReport = "graver.DrivesReport.v3" {
         /// The newest cycle.
         cycle: Cycle,
         /// Cycles whose work did not end before the next deadline, slips and skipped cycles included.

@@ -1,6 +1,6 @@
 //! Planner to controller: the trajectory, one sample a cycle, ahead of time.
 
-use crate::{AxisArray, LaserCycle, Nanoseconds, sample};
+use crate::{ActuatorArray, AxisArray, LaserCycle, Nanoseconds, sample};
 
 /// Bits of [`Setpoint::flags`].
 pub mod flags {
@@ -15,14 +15,15 @@ sample! {
     ///
     /// Joint quantities are on the load side of the transmission, in the joint's own unit
     /// (metres of a carriage or belt, radians of an arm), and exact derivatives of the planned
-    /// path, not differences. Efforts are torques at the motor shaft without friction, which the
+    /// path, not differences. What the motors need for it is by actuator: their leads, in the unit of the
+    /// joint and with its sign, and their efforts, torques at the shaft without friction, which the
     /// controller adds from the motor's own speed.
     ///
     /// Played at rate `r` (1 is as planned) and rate change `ṙ` [1/s], the effort is
     /// `static_effort + (effort − static_effort)·r² + momentum·ṙ`, and the lead is
     /// `static_lead + (lead − static_lead)·r² + lead_momentum·ṙ` up to the small part of the
     /// transmission's damping.
-    Setpoint = "graver.Setpoint.v2" {
+    Setpoint = "graver.Setpoint.v3" {
         /// The stream this sample belongs to; one job is one stream. Never 0.
         stream: u64,
         /// Position in the stream, from 0 without gaps.
@@ -53,17 +54,17 @@ sample! {
         jerk: AxisArray,
         /// How far the motor side is ahead of the load side through the elastic transmission, and a
         /// stepper's field ahead of its rotor, in joint units [m or rad].
-        lead: AxisArray,
+        lead: ActuatorArray,
         /// The part of `lead` that does not move with the rate: what gravity stretches and turns.
-        static_lead: AxisArray,
+        static_lead: ActuatorArray,
         /// The lead per unit of rate change [m·s or rad·s].
-        lead_momentum: AxisArray,
+        lead_momentum: ActuatorArray,
         /// Torque of the motor for this motion, rotor included, friction excluded [N·m].
-        effort: AxisArray,
+        effort: ActuatorArray,
         /// The part of `effort` that does not move with the rate: gravity [N·m].
-        static_effort: AxisArray,
+        static_effort: ActuatorArray,
         /// Motor torque per unit of rate change [N·m·s].
-        momentum: AxisArray,
+        momentum: ActuatorArray,
         /// The laser in the cycle that starts here.
         laser: LaserCycle,
     }

@@ -20,7 +20,7 @@ use crate::summary::{
     ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, StallSummary,
     Summary,
 };
-use machine::{Axis, Machine};
+use machine::{Actuator, Machine};
 use messages::artwork::Artwork;
 use messages::plan::PlanFacts;
 use messages::time::CYCLE_TIME;
@@ -144,7 +144,7 @@ fn end(summary: &mut Summary, machine: &Machine, run_outcome: &RunOutcome) {
         drives: run_outcome.drives.map(|report| report.fault).unwrap_or_default(),
         own: run_outcome.outcome,
     });
-    let told = |fault: Fault| FaultSummary::of(&fault, &machine.axes);
+    let told = |fault: Fault| FaultSummary::of(&fault, machine);
     summary.outcome = verdict.outcome;
     summary.fault = verdict.fault.and_then(told);
     if let Some(later) = verdict.later.and_then(told) {
@@ -186,6 +186,7 @@ pub fn machine_summary(machine: &Machine) -> MachineSummary {
         name: machine.name.clone(),
         mechanism: machine.mechanism.name().to_owned(),
         axes: machine.axes.iter().map(|axis| axis.name.clone()).collect(),
+        actuators: machine.actuators.iter().map(|actuator| actuator.name.clone()).collect(),
     }
 }
 
@@ -264,8 +265,8 @@ pub fn write(
     summary.out = Some(folder.path().to_string_lossy().into_owned());
     if let Some(results) = results {
         // A stepper's current says nothing of its torque.
-        let constant = |axis: &Axis| axis.motor.dc().map_or(0.0, |motor| motor.torque_constant);
-        let constants: Vec<f64> = machine.axes.iter().map(constant).collect();
+        let constant = |it: &Actuator| it.motor.dc().map_or(0.0, |motor| motor.torque_constant);
+        let constants: Vec<f64> = machine.actuators.iter().map(constant).collect();
         let began = Instant::now();
         let report = Report {
             summary,

@@ -16,13 +16,13 @@ use messages::run_folder;
 /// What a report is made from.
 #[derive(Debug, Clone, Copy)]
 pub struct Report<'a> {
-    /// The figures; its machine's axes give the charts their names and number.
+    /// The figures; its machine's actuators give the charts their names and number.
     pub summary: &'a Summary,
     /// What was to be marked.
     pub artwork: &'a Artwork,
     /// The curves and paths.
     pub trace: &'a Trace,
-    /// Torque constant of each axis [N·m/A], in the order of the axes.
+    /// Torque constant of each actuator [N·m/A], in their order.
     pub torque_constants: &'a [f64],
     /// The latencies; empty in virtual time.
     pub histograms: &'a HopHistograms,

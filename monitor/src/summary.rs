@@ -138,9 +138,13 @@ pub struct MachineSummary {
     pub mechanism: String,
     /// The axes' names, in the order of every per-axis list here.
     pub axes: Vec<String>,
+    /// The actuators' names, in the order of every per-actuator list here: those of their axes, but where
+    /// an axis has several.
+    #[serde(default)]
+    pub actuators: Vec<String>,
 }
 
-/// |Setpoint − feedback| per axis, at the motor [rad].
+/// |Setpoint − feedback| per actuator, at the motor [rad].
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FollowingError {
     /// The largest.
@@ -158,7 +162,7 @@ pub struct LimitUse {
     pub acceleration: Vec<f64>,
     /// Joint jerk per axis.
     pub jerk: Vec<f64>,
-    /// Commanded motor current per axis.
+    /// Commanded motor current per actuator.
     pub effort: Vec<f64>,
     /// Acceleration along and across the path together.
     pub path_acceleration: f64,
@@ -236,24 +240,25 @@ impl Summary {
     }
 
     /// Takes over what the controller counted: cycles, digest, limits and following error. Uses
-    /// the axes of `machine`, which must be set.
+    /// axes and actuators of `machine`, which must be set.
     pub fn take_controller(&mut self, report: &ControllerReport) {
-        let axes = self.machine.axes.len();
-        let first = |values: &messages::AxisArray| -> Vec<f64> {
-            values.iter().take(axes).copied().collect()
+        let first = |values: &[f64], names: &[String]| -> Vec<f64> {
+            values.iter().take(names.len()).copied().collect()
         };
+        let MachineSummary { axes, actuators, .. } = &self.machine;
+        let squares = report.following_error_squares;
         let count = report.count.max(1) as f64;
         self.cycles = report.cycles;
         self.digest = format!("{:016x}", report.digest);
         self.following_error = FollowingError {
-            max: first(&report.following_error_max),
-            rms: first(&report.following_error_squares.map(|squares| (squares / count).sqrt())),
+            max: first(&report.following_error_max, actuators),
+            rms: first(&squares.map(|squares| (squares / count).sqrt()), actuators),
         };
         self.limits = LimitUse {
-            velocity: first(&report.velocity_use),
-            acceleration: first(&report.acceleration_use),
-            jerk: first(&report.jerk_use),
-            effort: first(&report.effort_use),
+            velocity: first(&report.velocity_use, axes),
+            acceleration: first(&report.acceleration_use, axes),
+            jerk: first(&report.jerk_use, axes),
+            effort: first(&report.effort_use, actuators),
             path_acceleration: report.path_acceleration_use,
             path_jerk: report.path_jerk_use,
         };
@@ -275,6 +280,7 @@ mod tests {
             name: "corexy".into(),
             mechanism: "corexy".into(),
             axes: vec!["a".into(), "b".into()],
+            actuators: vec!["a".into(), "b".into()],
         };
         Summary::new(Outcome::Completed, JobSummary::default(), machine)
     }

@@ -9,7 +9,7 @@ use crate::recording::CycleRecord;
 use crate::recording::continuity::Succession;
 use envelope::Envelope;
 use messages::hop::{Hop, latencies};
-use messages::{LaserCycle, MAX_AXES};
+use messages::{LaserCycle, MAX_ACTUATORS};
 use outline::{Outline, OutlinePoint};
 
 /// Share of so many cycles in which the laser marked, 0..=1.
@@ -38,12 +38,12 @@ pub struct Trace {
     pub speed: Envelope,
     /// Power of the laser at its largest in the cycle, fraction of full scale.
     pub power: Envelope,
-    /// Reference minus feedback per axis [rad at the motor].
-    pub following_error: [Envelope; MAX_AXES],
-    /// Measured current per axis [A].
-    pub current: [Envelope; MAX_AXES],
-    /// Commanded voltage per axis, in volts.
-    pub voltage: [Envelope; MAX_AXES],
+    /// Reference minus feedback per actuator [rad at the motor].
+    pub following_error: [Envelope; MAX_ACTUATORS],
+    /// Measured current per actuator [A].
+    pub current: [Envelope; MAX_ACTUATORS],
+    /// Commanded voltage per actuator, in volts.
+    pub voltage: [Envelope; MAX_ACTUATORS],
     /// Latency per hop, in the order of [`Hop::ALL`], in seconds; empty in virtual time.
     pub latency: [Envelope; Hop::ALL.len()],
 }
@@ -86,15 +86,15 @@ impl Trace {
                 self.latency.iter_mut().for_each(|envelope| envelope.push(None));
             }
         }
-        for axis in 0..MAX_AXES {
-            let pick = |values: &messages::AxisArray| values.get(axis).copied();
+        for index in 0..MAX_ACTUATORS {
+            let pick = |values: &messages::ActuatorArray| values.get(index).copied();
             let curves = [
                 (&mut self.following_error, answered, &command.following_error),
                 (&mut self.current, true, &feedback.current),
                 (&mut self.voltage, answered, &command.voltage),
             ];
             for (envelopes, known, values) in curves {
-                if let Some(envelope) = envelopes.get_mut(axis) {
+                if let Some(envelope) = envelopes.get_mut(index) {
                     envelope.push(pick(values).filter(|_| known));
                 }
             }
@@ -116,8 +116,8 @@ impl Trace {
     /// The curves with a value for each record.
     fn of_records(&mut self) -> impl Iterator<Item = &mut Envelope> {
         let latency = self.latency.iter_mut().filter(|_| self.timed);
-        let axes = self.following_error.iter_mut().chain(&mut self.current);
-        axes.chain(&mut self.voltage).chain(latency)
+        let motors = self.following_error.iter_mut().chain(&mut self.current);
+        motors.chain(&mut self.voltage).chain(latency)
     }
 
     /// The curves with a value for each cycle between two records.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use machine::{Axis, Machine, Mechanism, MechanismKind, MechanismVisitor};
+use machine::{Actuator, Axis, Machine, Mechanism, MechanismKind, MechanismVisitor};
 use messages::Setpoint;
 use messages::artwork::Artwork;
 
@@ -29,6 +29,7 @@ pub struct Plan {
     pub trajectory: Arc<Trajectory>,
     mechanism: MechanismKind,
     axes: Vec<Axis>,
+    actuators: Vec<Actuator>,
 }
 
 /// Plans `job` for `machine` and checks every sample against the limits of path and axes.
@@ -98,6 +99,7 @@ fn plan_within(
         trajectory: Arc::new(trajectory),
         mechanism: machine.mechanism.clone(),
         axes: machine.axes.clone(),
+        actuators: machine.actuators.clone(),
     })
 }
 
@@ -157,7 +159,9 @@ pub(crate) fn sampler<const N: usize, M: Mechanism<N>>(
         _ => return None,
     };
     let attitude = trajectory.attitude;
-    let mut sampler = Sampler::new(mechanism, &plan.axes, rest.clone(), attitude, stream).ok()?;
+    let (axes, actuators) = (&plan.axes, &plan.actuators);
+    let sampler = Sampler::new(mechanism, axes, actuators, rest.clone(), attitude, stream);
+    let mut sampler = sampler.ok()?;
     sampler.extend(trajectory, true);
     Some(sampler)
 }

@@ -154,7 +154,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     ) -> Result<Self, PlanError> {
         let Task { machine, limits, scope, attitude, surface, .. } = *task;
         let joints = Joints::<N>::from_fn(|axis, _| task.standing[axis]);
-        let limits = MotionLimits::new(mechanism, &machine.axes, limits, &joints, attitude, scope);
+        let limits = MotionLimits::new(mechanism, machine, limits, &joints, attitude, scope);
         let now = Configuration { joints, branch: 0 };
         let rest = JointMove::standing(&joints, 0);
         let before = first_rest(machine);
@@ -168,12 +168,19 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             line: 0,
             stroke: 0,
         };
-        let mut sampler = Sampler::new(mechanism.clone(), &machine.axes, rest, attitude, stream)
-            .map_err(|cause| PlanError::Unreachable {
-                line: 0,
-                place: Place { stroke: 0, time: 0.0 },
-                cause,
-            })?;
+        let mut sampler = Sampler::new(
+            mechanism.clone(),
+            &machine.axes,
+            &machine.actuators,
+            rest,
+            attitude,
+            stream,
+        )
+        .map_err(|cause| PlanError::Unreachable {
+            line: 0,
+            place: Place { stroke: 0, time: 0.0 },
+            cause,
+        })?;
         sampler.tell_ahead(told_ahead(&machine.laser));
         // On straight joints the cubic is the tool's own.
         let interpolates = scope == Scope::Machine && !mechanism.is_linear();
@@ -249,7 +256,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             }
             if is_the_same {
                 trials.slow();
-            } else if !trials.tighten(violation, self.limits.axes) {
+            } else if !trials.tighten(violation, self.limits.axes, self.limits.actuators) {
                 return Err(match early {
                     Some(early) => Failure::Before(early),
                     None if may_mend => Failure::Before(error),
@@ -309,7 +316,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
     /// Lets a window that is planned again use less of what was broken. Says whether that is worth another
     /// trial.
     fn tighten(&self, trials: &mut Trials, violation: &LimitViolation) -> bool {
-        trials.tighten(violation, self.limits.axes)
+        trials.tighten(violation, self.limits.axes, self.limits.actuators)
     }
 
     /// Plans, samples and checks one window.
@@ -394,7 +401,8 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             if front.sampler.is_crowded() {
                 return Err(self.limit(LimitViolation::too_many_changes(setpoint)));
             }
-            if let Err(violation) = front.checker.check(setpoint, self.limits.axes, self.area) {
+            let drives = (self.limits.axes, self.limits.actuators);
+            if let Err(violation) = front.checker.check(setpoint, drives, self.area) {
                 return Err(self.limit(violation));
             }
             if let Some(interpolation) = &mut front.interpolation {

@@ -6,7 +6,7 @@
 use core::f64::consts::TAU;
 
 use machine::mechanisms::polar::{Polar, PolarBranch, PolarLoad};
-use machine::{Axis, Machine, MechanismKind};
+use machine::{Actuator, Axis, Machine, MechanismKind};
 use messages::Setpoint;
 use nalgebra::Vector3;
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
@@ -24,15 +24,25 @@ fn axis(
     ratio: f64,
     position: [f64; 2],
     [velocity, acceleration, jerk]: [f64; 3],
-) -> Axis {
-    let mut axis = Machine::builtin().axes[0].clone();
-    axis.name = name.to_owned();
-    axis.ratio = ratio;
+) -> (Axis, Actuator) {
+    let Machine { mut axes, mut actuators, .. } = Machine::builtin();
+    let (mut axis, mut actuator) = (axes.remove(0), actuators.remove(0));
+    (axis.name, actuator.name) = (name.to_owned(), name.to_owned());
+    actuator.ratio = ratio;
     axis.limits.position = position;
     axis.limits.velocity = velocity;
     axis.limits.acceleration = acceleration;
     axis.limits.jerk = jerk;
-    axis
+    (axis, actuator)
+}
+
+/// Gives `machine` these axes with an actuator each.
+fn put(machine: &mut Machine, drives: Vec<(Axis, Actuator)>) {
+    (machine.axes, machine.actuators) = drives.into_iter().unzip();
+    for (index, actuator) in machine.actuators.iter_mut().enumerate() {
+        actuator.axis = index;
+        machine.axes[index].actuators = index..index + 1;
+    }
 }
 
 /// An arm that reaches the centre of a table whose cable lets it turn one and a half times.
@@ -63,11 +73,12 @@ fn machine() -> Machine {
         elasticity: None,
     });
     let turning = [6.0, 300.0, 20_000.0];
-    machine.axes = vec![
+    let drives = vec![
         axis("arm", 0.02, [-1.2, 1.2], turning),
         axis("table", 0.02, [-TRAVEL * TAU, TRAVEL * TAU], turning),
         axis("lift", 3e-4, [-0.05, 0.05], [0.1, 5.0, 500.0]),
     ];
+    put(&mut machine, drives);
     machine.area.lower = [-0.1, -0.1, -0.05];
     machine.area.upper = [0.1, 0.1, 0.05];
     // The arm 0.3 rad from the centre: 2·a·sin(0.15) from it.

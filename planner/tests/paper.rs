@@ -148,7 +148,7 @@ impl MechanismVisitor for Counted<'_> {
         let samples: Vec<_> = paper.setpoints(machine, 1).unwrap().collect();
         assert_eq!(samples.len() as u64, rule["steps"].as_u64().unwrap() + 1);
         let per_length: [f64; N] = core::array::from_fn(|axis| {
-            let of = &machine.axes[axis];
+            let of = &machine.actuators[axis];
             of.motor.stepper().unwrap().pulses_per_radian() / of.ratio
         });
         let first = samples[0].position;

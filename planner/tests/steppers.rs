@@ -12,7 +12,7 @@ fn machine() -> Machine {
 }
 
 fn stepper(machine: &mut Machine, axis: usize) -> &mut StepperMotor {
-    match &mut machine.axes[axis].motor {
+    match &mut machine.actuators[axis].motor {
         Motor::Stepper(motor) => motor,
         Motor::Dc(motor) => panic!("{motor:?}"),
     }
@@ -32,9 +32,8 @@ fn the_checker_reports_torque_and_pulse_rate() {
     let uses = plan(&machine, &job).unwrap().facts.uses;
     println!("{uses:?}");
     // Somewhere the letters move at up to 0.25 m/s, 160 kHz of 200.
-    let rate = uses.velocity[0] * machine.axes[0].limits.velocity / machine.axes[0].ratio * 3200.0
-        / core::f64::consts::TAU
-        / 200e3;
+    let fastest = uses.velocity[0] * machine.axes[0].limits.velocity;
+    let rate = fastest / machine.actuators[0].ratio * 3200.0 / core::f64::consts::TAU / 200e3;
     assert!((uses.voltage[0] / rate - 1.0).abs() < 0.02, "{} {rate}", uses.voltage[0]);
     assert!(uses.current.iter().all(|share| *share > 0.05 && *share < 1.0), "{:?}", uses.current);
 }

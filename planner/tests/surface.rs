@@ -7,7 +7,7 @@ mod loads;
 
 use machine::mechanisms::mcm::{Mcm, McmBranch};
 use machine::surface::{Cone, Placement, Projection, Shape, Surface};
-use machine::{Axis, Machine, Mechanism, MechanismKind};
+use machine::{Actuator, Axis, Machine, Mechanism, MechanismKind};
 use nalgebra::{Matrix3, SVector, Vector3};
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
 use planner::geometry::attitude::{AttitudeLaw, turned};
@@ -16,15 +16,30 @@ use planner::{Job, PlanError, plan};
 
 const RADIUS: f64 = 0.03;
 
-fn axis(name: &str, ratio: f64, travel: f64, [velocity, acceleration, jerk]: [f64; 3]) -> Axis {
-    let mut axis = Machine::builtin().axes[0].clone();
-    axis.name = name.to_owned();
-    axis.ratio = ratio;
+fn axis(
+    name: &str,
+    ratio: f64,
+    travel: f64,
+    [velocity, acceleration, jerk]: [f64; 3],
+) -> (Axis, Actuator) {
+    let Machine { mut axes, mut actuators, .. } = Machine::builtin();
+    let (mut axis, mut actuator) = (axes.remove(0), actuators.remove(0));
+    (axis.name, actuator.name) = (name.to_owned(), name.to_owned());
+    actuator.ratio = ratio;
     axis.limits.position = [-travel, travel];
     axis.limits.velocity = velocity;
     axis.limits.acceleration = acceleration;
     axis.limits.jerk = jerk;
-    axis
+    (axis, actuator)
+}
+
+/// Gives `machine` these axes with an actuator each.
+fn put(machine: &mut Machine, drives: Vec<(Axis, Actuator)>) {
+    (machine.axes, machine.actuators) = drives.into_iter().unzip();
+    for (index, actuator) in machine.actuators.iter_mut().enumerate() {
+        actuator.axis = index;
+        machine.axes[index].actuators = index..index + 1;
+    }
 }
 
 fn mechanism() -> Mcm {
@@ -44,13 +59,14 @@ fn machine() -> Machine {
     let mut machine = Machine::builtin();
     machine.mechanism = MechanismKind::Mcm(mechanism());
     let (linear, turning) = ([0.3, 3.0, 300.0], [5.0, 60.0, 4000.0]);
-    machine.axes = vec![
+    let drives = vec![
         axis("x", 1e-3, 0.4, linear),
         axis("z", 1e-3, 0.4, linear),
         axis("table", 0.02, 20.0, turning),
         axis("tilt", 0.02, 1.5, turning),
         axis("turn", 0.02, 6.0, turning),
     ];
+    put(&mut machine, drives);
     machine.area.lower = [-0.4; 3];
     machine.area.upper = [0.4; 3];
     machine.path.acceleration = 2.0;

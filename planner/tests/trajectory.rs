@@ -468,13 +468,13 @@ fn a_weak_axis_slows_a_line_and_keeps_its_limit() {
     };
     // Less than the speed asked for takes on axis b, whose spring takes a part too.
     let mut weak = strong.clone();
-    weak.axes[1].motor.dc_mut().unwrap().voltage = 3.0;
+    weak.actuators[1].motor.dc_mut().unwrap().voltage = 3.0;
     let planned = slowed(&weak);
     assert!(planned.facts.uses.voltage[1] > 0.8, "{:?}", planned.facts.uses.voltage);
     assert!(planned.facts.uses.voltage.iter().all(|share| *share <= 1.0));
 
     let mut weak = strong.clone();
-    weak.axes[0].motor.dc_mut().unwrap().current = 0.5;
+    weak.actuators[0].motor.dc_mut().unwrap().current = 0.5;
     let planned = slowed(&weak);
     assert!(planned.facts.uses.current[0] > 0.8, "{:?}", planned.facts.uses.current);
     assert!(planned.facts.uses.current.iter().all(|share| *share <= 1.0));

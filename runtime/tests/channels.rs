@@ -21,7 +21,11 @@ use scratch::Scratch;
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn feedback(cycle: u64) -> Feedback {
-    Feedback { cycle: Cycle(cycle), position: [0.5; 8], ..Feedback::default() }
+    Feedback {
+        cycle: Cycle(cycle),
+        position: [0.5; messages::MAX_ACTUATORS],
+        ..Feedback::default()
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::arguments::ExportArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::Sources;
-use messages::{MAX_AXES, run_folder};
+use messages::{MAX_ACTUATORS, run_folder};
 use monitor::recording::file::{RecordingError, RecordingReader};
 use monitor::recording::table::TableWriter;
 use monitor::summary::Summary;
@@ -24,17 +24,17 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, Failure> {
     let file = File::open(&recording).map_err(|error| at(&recording, error))?;
     let reader =
         RecordingReader::new(BufReader::new(file)).map_err(|error| at(&recording, error))?;
-    let axes = axes(&recording.with_file_name(run_folder::SUMMARY));
+    let actuators = actuators(&recording.with_file_name(run_folder::SUMMARY));
     match &arguments.out {
         Some(path) => {
             let file = Sources::recording(&recording).create("--out", path)?;
-            export(&recording, reader, &axes, BufWriter::new(file), |error| {
+            export(&recording, reader, &actuators, BufWriter::new(file), |error| {
                 Err(Failure::output(format!("{}: {error}", path.display())))
             })
         }
         None => {
             let output = BufWriter::new(io::stdout().lock());
-            export(&recording, reader, &axes, output, |error| match error.kind() {
+            export(&recording, reader, &actuators, output, |error| match error.kind() {
                 // Whoever read has read enough, as `head` does.
                 ErrorKind::BrokenPipe => Ok(Exit::Done),
                 _ => Err(Failure::output(format!("standard output: {error}"))),
@@ -47,11 +47,11 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, Failure> {
 fn export(
     recording: &Path,
     reader: RecordingReader<impl io::Read>,
-    axes: &[String],
+    actuators: &[String],
     writer: impl Write,
     written: impl Fn(io::Error) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
-    let mut table = match TableWriter::new(writer, axes) {
+    let mut table = match TableWriter::new(writer, actuators) {
         Ok(table) => table,
         Err(error) => return written(error),
     };
@@ -72,21 +72,21 @@ fn export(
     table.finish().map_or_else(written, |()| Ok(Exit::Done))
 }
 
-/// The axes' names by the summary beside the recording; numbers where it tells none.
-fn axes(summary: &Path) -> Vec<String> {
+/// The actuators' names by the summary beside the recording; numbers where it tells none.
+fn actuators(summary: &Path) -> Vec<String> {
     let told = match std::fs::read(summary) {
         Err(error) if error.kind() == ErrorKind::NotFound => None,
         text => text
             .and_then(|text| Ok(serde_json::from_slice::<Summary>(&text)?))
             .inspect_err(|error| {
                 let path = summary.display();
-                message::tell(&format!("warning: {path}: {error}: the axes are numbered"));
+                message::tell(&format!("warning: {path}: {error}: the actuators are numbered"));
             })
             .ok(),
     };
-    told.map(|summary| summary.machine.axes)
-        .filter(|axes| !axes.is_empty())
-        .unwrap_or_else(|| (1..=MAX_AXES).map(|axis| format!("axis_{axis}")).collect())
+    told.map(|summary| summary.machine.actuators)
+        .filter(|actuators| !actuators.is_empty())
+        .unwrap_or_else(|| (1..=MAX_ACTUATORS).map(|number| format!("actuator_{number}")).collect())
 }
 
 fn at(path: &Path, error: impl std::fmt::Display) -> Failure {

@@ -9,7 +9,7 @@ use crate::arguments::{KinematicsArguments, KinematicsVerb};
 use crate::exit::{Exit, Failure};
 use crate::inputs;
 use machine::kinematics::{Branch as _, Joints, KinematicsError, TaskSpace};
-use machine::{Axis, EquationOfMotion, Machine, Mechanism, MechanismVisitor, Pose};
+use machine::{Actuator, EquationOfMotion, Machine, Mechanism, MechanismVisitor, Pose};
 use messages::finite::first_not_finite;
 use messages::math;
 use nalgebra::{
@@ -146,7 +146,7 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     fn ratios(&self) -> Joints<N> {
         Joints::from_fn(
             |axis, _| {
-                if self.arguments.motor { self.machine.axes[axis].ratio } else { 1.0 }
+                if self.arguments.motor { self.actuators(axis)[0].ratio } else { 1.0 }
             },
         )
     }
@@ -360,20 +360,27 @@ impl<const N: usize, M: Mechanism<N>> Answer<'_, N, M> {
     /// joint value.
     fn friction(&self, velocity: &Joints<N>) -> Joints<N> {
         let joints = Joints::<N>::from_fn(|axis, _| {
-            let Axis { friction, ratio, .. } = &self.machine.axes[axis];
-            friction.torque(velocity[axis] / ratio) / ratio
+            let of = |it: &Actuator| it.friction.torque(velocity[axis] / it.ratio) / it.ratio;
+            self.actuators(axis).iter().map(of).sum::<f64>()
         });
         joints.component_mul(&self.ratios())
     }
 
-    /// Inertia of each motor's rotor where motor angles are asked for [kg·m²]; joints have none.
+    /// Inertia of each axis' rotors, at the shaft of its first motor, where motor angles are asked for
+    /// [kg·m²]; joints have none.
     fn rotors(&self) -> Joints<N> {
         let motor = self.arguments.motor;
-        Joints::from_fn(
-            |axis, _| {
-                if motor { self.machine.axes[axis].motor.rotor_inertia() } else { 0.0 }
-            },
-        )
+        Joints::from_fn(|axis, _| {
+            let own = self.actuators(axis);
+            let turns = |it: &Actuator| own[0].ratio / it.ratio;
+            let of = |it: &Actuator| it.motor.rotor_inertia() * turns(it) * turns(it);
+            if motor { own.iter().map(of).sum() } else { 0.0 }
+        })
+    }
+
+    /// What drives the axis with this index; a machine file gives each at least one.
+    fn actuators(&self, axis: usize) -> &[Actuator] {
+        self.machine.axes[axis].driven_by(&self.machine.actuators)
     }
 
     fn matrices(&mut self, request: &Request) -> Result<Reply, ErrorBody> {

@@ -255,11 +255,11 @@ fn print_paper(paper: &PaperFacts, own: f64) {
 }
 
 fn print_pulses(pulses: &PulseFacts, machine: &Machine) {
-    let steppers = machine.axes.iter().enumerate();
-    let steppers = steppers.filter(|(_, axis)| axis.motor.stepper().is_some());
-    let counts = steppers.map(|(index, axis)| {
+    let steppers = machine.actuators.iter().enumerate();
+    let steppers = steppers.filter(|(_, actuator)| actuator.motor.stepper().is_some());
+    let counts = steppers.map(|(index, actuator)| {
         let (count, rate) = (pulses.counts[index], pulses.largest_rate[index] * 1e-3);
-        format!("{} {count:+} pulses from start to end, {rate:.1} kHz at most", axis.name)
+        format!("{} {count:+} pulses from start to end, {rate:.1} kHz at most", actuator.name)
     });
     say!("pulses    {}", counts.collect::<Vec<_>>().join("; "));
     say!(
@@ -272,8 +272,8 @@ fn print_pulses(pulses: &PulseFacts, machine: &Machine) {
     );
 }
 
-/// One row a setpoint: `t`, the tool, then per axis position, velocity, acceleration and effort,
-/// then laser on and power.
+/// One row a setpoint: `t`, the tool, then per axis position, velocity, acceleration and the
+/// efforts of its actuators, then laser on and power.
 fn write_samples(
     file: File,
     machine: &Machine,
@@ -281,29 +281,26 @@ fn write_samples(
 ) -> io::Result<()> {
     let mut file = BufWriter::new(file);
     write!(file, "t,x,y,z")?;
-    for axis in &machine.axes {
+    for (axis, actuators) in machine.driven() {
         let name = &axis.name;
-        write!(file, ",{name}_position,{name}_velocity,{name}_acceleration,{name}_effort")?;
+        write!(file, ",{name}_position,{name}_velocity,{name}_acceleration")?;
+        actuators.iter().try_for_each(|actuator| write!(file, ",{}_effort", actuator.name))?;
     }
     writeln!(file, ",laser,power")?;
     for setpoint in setpoints {
-        write_row(&mut file, machine.axes.len(), &setpoint)?;
+        write_row(&mut file, machine, &setpoint)?;
     }
     file.flush()
 }
 
-fn write_row(file: &mut impl Write, axes: usize, setpoint: &Setpoint) -> io::Result<()> {
+fn write_row(file: &mut impl Write, machine: &Machine, setpoint: &Setpoint) -> io::Result<()> {
     let [x, y, z] = setpoint.tool;
     write!(file, "{},{x},{y},{z}", setpoint.sequence as f64 * CYCLE_TIME)?;
-    for axis in 0..axes {
-        write!(
-            file,
-            ",{},{},{},{}",
-            setpoint.position[axis],
-            setpoint.velocity[axis],
-            setpoint.acceleration[axis],
-            setpoint.effort[axis]
-        )?;
+    for (index, axis) in machine.axes.iter().enumerate() {
+        let Setpoint { position, velocity, acceleration, .. } = setpoint;
+        write!(file, ",{},{},{}", position[index], velocity[index], acceleration[index])?;
+        let mut efforts = setpoint.effort[axis.actuators.clone()].iter();
+        efforts.try_for_each(|effort| write!(file, ",{effort}"))?;
     }
     let lit = u32::from(setpoint.laser.gate != 0);
     writeln!(file, ",{lit},{}", if lit == 1 { setpoint.laser.power } else { 0.0 })

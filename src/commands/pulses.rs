@@ -44,9 +44,9 @@ pub struct PulseFiles {
     pub path: Option<(File, PathBuf)>,
 }
 
-/// Whether any axis of `machine` has a stepper.
+/// Whether any actuator of `machine` is a stepper.
 pub fn has_steppers(machine: &Machine) -> bool {
-    machine.axes.iter().any(|axis| axis.motor.stepper().is_some())
+    machine.actuators.iter().any(|actuator| actuator.motor.stepper().is_some())
 }
 
 /// A motion in setpoints, and between them.
@@ -66,7 +66,7 @@ impl<'a> Motion<'a> {
     }
 }
 
-/// Follows the pulses of `motion`. The list has one row a pulse in order of time: `t` [s], the axis, and
+/// Follows the pulses of `motion`. The list has one row a pulse in order of time: `t` [s], the axis or of several on one the actuator, and
 /// the count from then on, 0 at the start. The path has one row a pulse too: `t` [s], where the tool is
 /// from then on [m], how far that is from the plan [m], and whether the laser is on.
 ///
@@ -137,9 +137,9 @@ impl Follower<'_> {
         mechanism: M,
         first: Setpoint,
     ) -> Result<PulseFacts, Failure> {
-        let axes = self.machine.axes.iter().enumerate();
+        let actuators = self.machine.actuators.iter().enumerate();
         let mut trains: Vec<Train> =
-            axes.filter_map(|(index, axis)| Train::new(index, axis, &first)).collect();
+            actuators.filter_map(|(index, actuator)| Train::new(index, actuator, &first)).collect();
         let mut path = PulsePath::new(mechanism, &mut self.motion.planned, &trains, &first)
             .map_err(|error| path::unclosed(first.sequence as f64 * CYCLE_TIME, &error))?;
         let mut due: Vec<Due> = Vec::new();

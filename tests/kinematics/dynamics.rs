@@ -92,7 +92,7 @@ fn motions(name: &str, axes: usize, motor: bool, count: usize) -> Vec<Value> {
     let path = support::source("machines").join(format!("{name}.toml"));
     let machine = Machine::load(&path, &[]).unwrap();
     let mut random = SplitMix64::new(11);
-    let ratio = |axis: usize| if motor { machine.axes[axis].ratio } else { 1.0 };
+    let ratio = |axis: usize| if motor { machine.actuators[axis].ratio } else { 1.0 };
     let mut list = |offset: &dyn Fn(usize) -> f64, scale: f64| -> Vec<f64> {
         (0..axes)
             .map(|axis| (offset(axis) + scale * random.between(-1.0, 1.0)) / ratio(axis))
@@ -191,7 +191,7 @@ fn every_machine_tells_the_friction_of_its_axes() {
             for (reply, motion) in replies.iter().zip(&motions) {
                 let velocity = list(&motion["qd"]);
                 let friction: Vec<f64> = machine
-                    .axes
+                    .actuators
                     .iter()
                     .zip(&velocity)
                     .map(|(axis, rate)| {

@@ -12,7 +12,7 @@ pub use mismatch::mismatched;
 pub use ranking::{CRITERIA, Weights};
 
 use machine::kinematics::KinematicsError;
-use machine::{Machine, Motor};
+use machine::{Actuator, Machine};
 use messages::plan::LimitUtilization;
 use planner::request::JobRequest;
 use schemars::JsonSchema;
@@ -84,14 +84,15 @@ pub struct AxisUse {
 }
 
 impl AxisUse {
-    fn of(motor: &Motor, axis: usize, uses: &LimitUtilization) -> Self {
-        let at = |uses: &[f64]| uses.get(axis).copied().unwrap_or_default();
-        let is_dc = motor.dc().is_some();
+    /// Of `actuator`, the `index`th.
+    fn of(actuator: &Actuator, index: usize, uses: &LimitUtilization) -> Self {
+        let at = |uses: &[f64]| uses.get(index).copied().unwrap_or_default();
+        let is_dc = actuator.motor.dc().is_some();
         let of_dc = |value: f64| is_dc.then_some(value);
         let of_stepper = |value: f64| (!is_dc).then_some(value);
         // Of a stepper, the places of current and voltage hold torque and pulse rate.
         Self {
-            speed: at(&uses.velocity),
+            speed: uses.velocity.get(actuator.axis).copied().unwrap_or_default(),
             current: of_dc(at(&uses.current)),
             torque: of_stepper(at(&uses.current)),
             voltage: of_dc(at(&uses.voltage)),
@@ -124,7 +125,7 @@ impl AxisUse {
     }
 }
 
-/// What the jobs ask of one axis.
+/// What the jobs ask of one axis, or of each actuator where an axis has several.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct AxisReport {
     /// Its name.
@@ -330,19 +331,19 @@ fn report(
 }
 
 fn axes(machine: &Machine, runs: &[Run]) -> Vec<AxisReport> {
-    let of = |(index, axis): (usize, &machine::Axis)| {
+    let of = |(index, (actuator, axis)): (usize, (&Actuator, &machine::Axis))| {
         let demands = runs.iter().filter_map(|run| run.demands.get(index));
-        let uses = runs.iter().map(|run| AxisUse::of(&axis.motor, index, &run.uses));
+        let uses = runs.iter().map(|run| AxisUse::of(actuator, index, &run.uses));
         AxisReport {
-            axis: axis.name.clone(),
+            axis: actuator.name.clone(),
             unit: axis.unit.name().to_owned(),
-            ratio: axis.ratio,
-            efficiency: axis.efficiency.dynamic,
+            ratio: actuator.ratio.abs(),
+            efficiency: actuator.efficiency.dynamic,
             demand: demands.fold(Demand::default(), |all, one| all.and(one)),
             uses: uses.reduce(AxisUse::and).unwrap_or_default(),
         }
     };
-    machine.axes.iter().enumerate().map(of).collect()
+    machine.drives().enumerate().map(of).collect()
 }
 
 /// The limits that bound all runs, each by its part of the time of all paths.

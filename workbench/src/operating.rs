@@ -1,7 +1,7 @@
 //! What a plan asks of each motor: its operating points over the job, and what they come to.
 
 use machine::transmission::gear::Efficiency;
-use machine::{Axis, Friction, Machine, Motor};
+use machine::{Actuator, Friction, Machine, Motor};
 use messages::Setpoint;
 use messages::time::CYCLE_TIME;
 use planner::Plan;
@@ -57,44 +57,45 @@ impl OperatingPoint {
 /// What one motor does over a job, cycle by cycle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisCourse {
-    /// Name of the axis.
+    /// Name of the actuator.
     pub name: String,
     /// Its operating points, one a cycle.
     pub points: Vec<OperatingPoint>,
 }
 
-/// What each motor of `machine` does over `plan`, in the order of the axes.
+/// What each motor of `machine` does over `plan`, in the order of the actuators.
 pub fn courses(machine: &Machine, plan: &Plan) -> Vec<AxisCourse> {
     let mut courses: Vec<AxisCourse> = machine
-        .axes
+        .actuators
         .iter()
-        .map(|axis| AxisCourse { name: axis.name.clone(), points: Vec::new() })
+        .map(|actuator| AxisCourse { name: actuator.name.clone(), points: Vec::new() })
         .collect();
-    let mut before: Vec<Option<Shaft>> = vec![None; machine.axes.len()];
+    let mut before: Vec<Option<Shaft>> = vec![None; machine.actuators.len()];
     for setpoint in plan.setpoints(1) {
-        for (index, (axis, course)) in machine.axes.iter().zip(&mut courses).enumerate() {
-            let (point, shaft) = operate(axis, index, &setpoint, before[index]);
+        for (index, (actuator, course)) in machine.actuators.iter().zip(&mut courses).enumerate() {
+            let (point, shaft) = operate(actuator, index, &setpoint, before[index]);
             before[index] = Some(shaft);
             course.points.push(point);
         }
     }
-    for (axis, course) in machine.axes.iter().zip(&mut courses) {
-        lead(axis, &mut course.points);
+    for (actuator, course) in machine.actuators.iter().zip(&mut courses) {
+        lead(actuator, &mut course.points);
     }
     courses
 }
 
 /// Gives each point the acceleration of the shaft itself, from its speeds before and after: springs let it
 /// lead the joint, and what the rotor takes for that is not the load's.
-fn lead(axis: &Axis, points: &mut [OperatingPoint]) {
+fn lead(actuator: &Actuator, points: &mut [OperatingPoint]) {
     for index in 1..points.len().saturating_sub(1) {
         let next = points[index + 1].speed;
         let point = &mut points[index];
         let torque = point.load + point.rotor;
         point.acceleration = (next - point.speed) / CYCLE_TIME;
-        point.rotor = axis.motor.rotor_inertia() * point.acceleration;
+        point.rotor = actuator.motor.rotor_inertia() * point.acceleration;
         point.load = torque - point.rotor;
-        point.by_efficiency = point.rotor + with_losses(&axis.efficiency, point.load, point.speed);
+        point.by_efficiency =
+            point.rotor + with_losses(&actuator.efficiency, point.load, point.speed);
     }
 }
 
@@ -108,19 +109,19 @@ struct Shaft {
 }
 
 fn operate(
-    axis: &Axis,
+    actuator: &Actuator,
     index: usize,
     setpoint: &Setpoint,
     before: Option<Shaft>,
 ) -> (OperatingPoint, Shaft) {
-    let angle = (setpoint.position[index] + setpoint.lead[index]) / axis.ratio;
+    let angle = (setpoint.position[actuator.axis] + setpoint.lead[index]) / actuator.ratio;
     let speed = before.map_or(0.0, |before| (angle - before.angle) / CYCLE_TIME);
-    let acceleration = setpoint.acceleration[index] / axis.ratio;
-    let rotor = axis.motor.rotor_inertia() * acceleration;
+    let acceleration = setpoint.acceleration[actuator.axis] / actuator.ratio;
+    let rotor = actuator.motor.rotor_inertia() * acceleration;
     let load = setpoint.effort[index] - rotor;
-    let friction = axis.friction.torque(speed);
+    let friction = actuator.friction.torque(speed);
     let torque = setpoint.effort[index] + friction;
-    let (current, voltage, supplied) = match &axis.motor {
+    let (current, voltage, supplied) = match &actuator.motor {
         Motor::Dc(motor) => {
             let current = torque / motor.torque_constant;
             let earlier = before.map_or(current, |before| before.current);
@@ -139,7 +140,7 @@ fn operate(
         load,
         rotor,
         friction,
-        by_efficiency: rotor + with_losses(&axis.efficiency, load, speed),
+        by_efficiency: rotor + with_losses(&actuator.efficiency, load, speed),
         current,
         voltage,
         supplied,
@@ -267,27 +268,22 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
-    use messages::AxisArray;
+    use messages::axis::axis_array;
 
     /// The first motor of the built-in CoreXY along the diagonal of its area with 10 m/s², at 0.2 m/s.
     #[test]
     fn an_operating_point_is_what_a_hand_computes() {
         let machine = Machine::builtin();
-        let axis = &machine.axes[0];
+        let axis = &machine.actuators[0];
         // Both belts' coordinates are x + y and x − y: along the diagonal the first goes √2 times as fast.
         let [speed, acceleration] = [0.2 * 2_f64.sqrt(), 10.0 * 2_f64.sqrt()];
         let force = (0.33 + 1.06) / 4.0 * acceleration;
         let inertia = 2e-6;
         let effort = axis.ratio * force + inertia * acceleration / axis.ratio;
-        let array = |value: f64| -> AxisArray {
-            let mut array = AxisArray::default();
-            array[0] = value;
-            array
-        };
         let setpoint = Setpoint {
-            position: array(0.01),
-            acceleration: array(acceleration),
-            effort: array(effort),
+            position: axis_array(&[0.01]),
+            acceleration: axis_array(&[acceleration]),
+            effort: core::array::from_fn(|index| if index == 0 { effort } else { 0.0 }),
             ..Setpoint::default()
         };
         let torque = effort + 5e-3 + 1e-6 * speed / axis.ratio;

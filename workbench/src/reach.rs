@@ -97,7 +97,8 @@ impl MechanismVisitor for Survey<'_> {
         // Counts or pulses of each joint [1/m or 1/rad].
         let counts: [f64; N] = core::array::from_fn(|axis| {
             let axis = machine.axes.get(axis);
-            axis.map_or(f64::INFINITY, |axis| 1.0 / (axis.encoder.resolution() * axis.ratio))
+            let actuators = axis.map(|axis| axis.driven_by(&machine.actuators)).unwrap_or_default();
+            actuators.iter().map(|it| 1.0 / it.count()).fold(f64::INFINITY, f64::min)
         });
         let mut area = Area::new(machine, &mechanism)?;
         let mut tally = Tally::default();

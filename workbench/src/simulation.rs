@@ -6,7 +6,7 @@
 use controller::{Controller, Inputs, Outputs, Peers};
 use drives::bridge::BridgeOptions;
 use drives::{Bridge, Deadlines, PlantOptions, SimulatedPlant};
-use machine::{Axis, Machine};
+use machine::Machine;
 use messages::time::CYCLE_PERIOD;
 use messages::{
     ControllerReport, ControllerState, DrivesReport, Fault, Nanoseconds, OperatorRequest,
@@ -106,7 +106,7 @@ impl Pipeline {
         CycleRecord { feedback: *self.bridge.feedback(), command: self.outputs.command }
     }
 
-    fn enable(&mut self, axes: &[Axis]) -> Result<(), SimulationError> {
+    fn enable(&mut self, machine: &Machine) -> Result<(), SimulationError> {
         // Drives powers nothing before it has been greeted by an unpowered command.
         self.cycle(&[], None);
         self.cycle(&[], Some(request(OperatorVerb::Enable, 0.0)));
@@ -119,7 +119,7 @@ impl Pipeline {
         }
         let command = &self.outputs.command;
         let fault = command.fault;
-        Err(match FaultSummary::of(&fault, axes) {
+        Err(match FaultSummary::of(&fault, machine) {
             Some(told) => SimulationError::Faulted { fault, words: told.to_string() },
             None => SimulationError::NotReady { state: command.state().name() },
         })
@@ -143,7 +143,7 @@ pub fn simulate(
     mut examine: impl FnMut(&[CycleRecord]),
 ) -> Result<Simulated, SimulationError> {
     let mut pipeline = Pipeline::new(machine, plant, plant_options)?;
-    pipeline.enable(&machine.axes)?;
+    pipeline.enable(machine)?;
     let mut setpoints = plan.setpoints(STREAM);
     let mut waiting: Vec<Setpoint> = Vec::with_capacity(DRAIN);
     // Written once, so that its pages are there before the clock runs.

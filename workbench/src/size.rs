@@ -145,7 +145,7 @@ pub fn size(
         let axes: Vec<AxisSize> = needs
             .iter()
             .map(|need| {
-                let is_asked = options.axes.is_empty() || options.axes.contains(&need.name);
+                let is_asked = options.axes.is_empty() || options.axes.contains(&need.axis);
                 choose::axis(need, catalogue, &options, is_asked)
             })
             .collect();
@@ -169,7 +169,7 @@ pub fn size(
     }
 }
 
-/// The axes of `needs` by name.
+/// The actuator of `needs` with this name.
 pub(crate) fn named<'a>(needs: &'a [AxisNeed], name: &str) -> Option<&'a AxisNeed> {
     needs.iter().find(|need| need.name == name)
 }

@@ -130,7 +130,7 @@ fn a_weight_beyond_the_motor_is_named() {
     let machine = shipped("serial", &[]);
     let mut weak = machine.clone();
     // 50 mV give 2.5 mN·m and friction 4, of the 7.8 that the slide asks for when its brake opens.
-    weak.axes[2].motor.dc_mut().unwrap().voltage = 0.05;
+    weak.actuators[2].motor.dc_mut().unwrap().voltage = 0.05;
     let text = errors(&machine, &weak).unwrap_err().to_string();
     assert!(text.contains(" of axis j3: "), "{text}");
 }

@@ -67,13 +67,13 @@ impl Controller {
         }
     }
 
-    /// Writes the targets of all axes, and the voltages of those whose loops are closed here.
+    /// Writes the targets of all actuators, and the voltages of those whose loops are closed here.
     fn close_loops(&mut self, feedback: &Feedback, command: &mut Command) {
         let follows = self.state.follows();
-        let axes = self.machine.axes.iter().zip(&mut self.cascades).enumerate();
-        for (index, (axis, cascade)) in axes {
-            let reference = self.feedforward.reference(index, axis);
-            let target = self.feedforward.target(index, axis);
+        let drives = self.machine.actuators.iter().zip(&mut self.cascades).enumerate();
+        for (index, (actuator, cascade)) in drives {
+            let reference = self.feedforward.reference(index, actuator);
+            let target = self.feedforward.target(index, actuator);
             let measured = Measurement {
                 position: feedback.position[index],
                 velocity: feedback.velocity[index],
@@ -86,7 +86,7 @@ impl Controller {
             command.effort[index] = target.effort;
             if !follows {
                 // What holds the weight, in the cycle in which the power comes.
-                if let (State::Enabling { .. }, Some(motor)) = (self.state, axis.motor.dc()) {
+                if let (State::Enabling { .. }, Some(motor)) = (self.state, actuator.motor.dc()) {
                     let most = motor.voltage;
                     command.voltage[index] = reference.voltage.clamp(-most, most);
                 }
@@ -98,11 +98,11 @@ impl Controller {
             // a count. Friction holds it, but for a slip of a count now and then: what is within
             // two, the integral would only wind itself up with until the axis leaves. At rest, or
             // where no friction holds it, it is drawn to within one.
-            let count = axis.encoder.resolution();
+            let count = actuator.encoder.resolution();
             let fastest = self.feedforward.fastest(index);
-            let slips = fastest > 0.0 && axis.friction.coulomb > 0.0;
+            let slips = fastest > 0.0 && actuator.friction.coulomb > 0.0;
             let band = if slips { 2.0 * count } else { count };
-            let creeps = fastest <= count * axis.gains.position;
+            let creeps = fastest <= count * actuator.gains.position;
             let held_by_friction = creeps && error.abs() <= band;
             let drive = cascade.step(&reference, &measured, !held_by_friction);
             command.voltage[index] = drive.voltage;
@@ -117,10 +117,10 @@ impl Controller {
         let lookahead = self.intake.lookahead();
         let mut position = [0.0; MAX_AXES];
         let angles = self.feedforward.now().angle;
-        for (position, (axis, angle)) in
-            position.iter_mut().zip(self.machine.axes.iter().zip(&angles))
-        {
-            *position = angle * axis.ratio;
+        for (actuator, angle) in self.machine.actuators.iter().zip(&angles) {
+            if let Some(position) = position.get_mut(actuator.axis) {
+                *position += actuator.share * (angle * actuator.ratio);
+            }
         }
         Progress {
             published: now,

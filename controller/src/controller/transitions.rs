@@ -106,12 +106,12 @@ impl Controller {
         }
         let fault = Fault::new(FaultCode::DriveFault);
         if let Some(Strayed { index, distance, limit }) = strayed {
-            let ratio = self.machine.axes[index].ratio;
+            let ratio = self.machine.actuators[index].ratio.abs();
             let quantity = FaultQuantity::HoldDistance;
-            return fault.on(index).beyond(quantity, distance * ratio, limit * ratio);
+            return fault.on_actuator(index).beyond(quantity, distance * ratio, limit * ratio);
         }
         if let Some((index, speed, limit)) = self.supervision.moving(feedback) {
-            return fault.on(index).beyond(FaultQuantity::Velocity, speed, limit);
+            return fault.on_actuator(index).beyond(FaultQuantity::Velocity, speed, limit);
         }
         let limit = PATIENCE + self.standing.release();
         fault.beyond(FaultQuantity::Cycles, f64::from(waited), f64::from(limit))

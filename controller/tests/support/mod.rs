@@ -4,7 +4,7 @@
 #![allow(dead_code, unreachable_pub, missing_docs, clippy::unwrap_used)]
 
 use controller::{Controller, Inputs, Outputs, Peers};
-use machine::{Axis, Machine, StallTolerance};
+use machine::{Actuator, Machine, StallTolerance};
 use messages::feedback::status;
 use messages::setpoint::flags;
 use messages::time::CYCLE_PERIOD;
@@ -24,7 +24,7 @@ const CYCLE_TIME: f64 = 1e-3;
 
 /// A DC motor with a rigid load, true stiction, and an encoder.
 pub struct Motor {
-    axis: Axis,
+    actuator: Actuator,
     pub angle: f64,
     pub speed: f64,
     pub current: f64,
@@ -32,20 +32,21 @@ pub struct Motor {
 }
 
 impl Motor {
-    pub fn new(axis: &Axis, angle: f64) -> Self {
-        let mut motor = Self { axis: axis.clone(), angle, speed: 0.0, current: 0.0, counts: 0 };
+    pub fn new(actuator: &Actuator, angle: f64) -> Self {
+        let actuator = actuator.clone();
+        let mut motor = Self { actuator, angle, speed: 0.0, current: 0.0, counts: 0 };
         motor.counts = motor.read();
         motor
     }
 
     fn read(&self) -> i64 {
-        (self.angle / self.axis.encoder.resolution()).round() as i64
+        (self.angle / self.actuator.encoder.resolution()).round() as i64
     }
 
     /// One cycle with `voltage`, or with the phases open.
     fn run(&mut self, voltage: Option<f64>, step: f64) {
-        let (motor, friction) = (*self.axis.motor.dc().unwrap(), self.axis.friction);
-        let inertia = self.axis.gains.inertia;
+        let (motor, friction) = (*self.actuator.motor.dc().unwrap(), self.actuator.friction);
+        let inertia = self.actuator.gains.inertia;
         for _ in 0..(CYCLE_TIME / step).round() as usize {
             self.current = match voltage {
                 Some(voltage) => {
@@ -176,7 +177,7 @@ pub fn job(machine: &Machine, stream: u64, parts: &[Part], power: f64) -> Job {
             let mut setpoint = Setpoint { stream, sequence, ..Setpoint::default() };
             let span = spans.iter().find(|(_, to, ..)| time < *to).or(spans.last()).unwrap();
             let (from, _, origin, motion) = span;
-            for (index, axis) in machine.axes.iter().enumerate() {
+            for (index, axis) in machine.actuators.iter().enumerate() {
                 let (path, share) = motion.as_ref().map_or(([0.0; 4], 0.0), |(path, shares)| {
                     (path.at(time - from), shares[index])
                 });
@@ -242,7 +243,7 @@ pub fn stalling(tolerance: Nanoseconds) -> Machine {
 /// Joints at home of a CoreXY, or of a Cartesian machine, whose motors are steppers here.
 pub fn home(machine: &Machine) -> [f64; 2] {
     let [x, y, _] = machine.home;
-    match machine.axes[0].motor {
+    match machine.actuators[0].motor {
         machine::Motor::Dc(_) => [x + y, x - y],
         machine::Motor::Stepper(_) => [x, y],
     }
@@ -295,10 +296,10 @@ impl Bench {
     pub fn new(machine: &Machine) -> Self {
         // The motors stand off the encoder's grid, as real ones do.
         let motors = machine
-            .axes
+            .actuators
             .iter()
             .zip(home(machine))
-            .map(|(axis, joint)| Motor::new(axis, joint / axis.ratio))
+            .map(|(actuator, joint)| Motor::new(actuator, joint / actuator.ratio))
             .collect();
         Self {
             machine: machine.clone(),
@@ -348,7 +349,7 @@ impl Bench {
             if self.latched.mode() == CommandMode::Disabled { 0 } else { status::POWERED };
         for (index, motor) in self.motors.iter_mut().enumerate() {
             let counts = motor.read();
-            let resolution = motor.axis.encoder.resolution();
+            let resolution = motor.actuator.encoder.resolution();
             feedback.counts[index] = counts;
             feedback.position[index] = counts as f64 * resolution;
             feedback.velocity[index] = (counts - motor.counts) as f64 * resolution / elapsed;
@@ -377,7 +378,7 @@ impl Bench {
         self.reports.extend(outputs.report);
         self.progress = outputs.progress.or(self.progress);
         let joints: Vec<f64> =
-            self.motors.iter().map(|motor| motor.angle * motor.axis.ratio).collect();
+            self.motors.iter().map(|motor| motor.angle * motor.actuator.ratio).collect();
         let tracking = messages::artwork::distance(&tool(&joints), &outputs.command.tool);
         self.records.push(Record { feedback: self.feedback, command: outputs.command, tracking });
         self.run_motors();
@@ -563,12 +564,13 @@ pub fn reach(bench: &mut Bench, job: &Job, time: f64) {
 
 /// Largest second difference of the references, as an acceleration of the joints [m/s²].
 pub fn sharpest(records: &[Record], machine: &Machine) -> f64 {
-    let axes = machine.axes.iter().enumerate();
-    axes.flat_map(|(index, axis)| {
-        records.windows(3).map(move |window| {
-            let [a, b, c] = [0, 1, 2].map(|at| window[at].command.reference[index]);
-            ((c - b) - (b - a)).abs() * axis.ratio / 1e-6
+    let actuators = machine.actuators.iter().enumerate();
+    actuators
+        .flat_map(|(index, axis)| {
+            records.windows(3).map(move |window| {
+                let [a, b, c] = [0, 1, 2].map(|at| window[at].command.reference[index]);
+                ((c - b) - (b - a)).abs() * axis.ratio / 1e-6
+            })
         })
-    })
-    .fold(0.0, f64::max)
+        .fold(0.0, f64::max)
 }

@@ -14,7 +14,7 @@
 //! rotor and load seen at the shaft, leaving the other half to the loops, and never more than the
 //! axis's own limit of acceleration.
 
-use machine::Axis;
+use machine::{Actuator, Axis};
 use nalgebra::SVector;
 
 use super::motors::Motors;
@@ -30,11 +30,12 @@ const INTEGRAL_CORNER: f64 = 0.25;
 /// loop that acts on the state at the start of each substep is well damped at a tenth of it.
 const CURRENT_SHARE: f64 = 0.1;
 
-/// What the ramp of `axis` takes from its motor's speed [rad/s²].
-pub(super) fn deceleration(axis: &Axis) -> f64 {
-    let fastest = axis.velocity_limit().plan / axis.ratio;
-    let torque = RAMP_SHARE * axis.motor.largest_torque(fastest);
-    (torque / axis.gains.inertia).min(axis.acceleration_limit().plan / axis.ratio)
+/// What the ramp of `actuator`, which drives `axis`, takes from its motor's speed [rad/s²].
+pub(super) fn deceleration(axis: &Axis, actuator: &Actuator) -> f64 {
+    let ratio = actuator.ratio.abs();
+    let fastest = axis.velocity_limit().plan / ratio;
+    let torque = RAMP_SHARE * actuator.motor.largest_torque(fastest);
+    (torque / actuator.gains.inertia).min(axis.acceleration_limit().plan / ratio)
 }
 
 /// The braking loop of all axes.
@@ -51,15 +52,26 @@ pub struct Brake<const N: usize> {
 }
 
 impl<const N: usize> Brake<N> {
-    /// The brake of `axes`.
-    pub fn of(axes: &[Axis; N]) -> Self {
-        let each = |value: fn(&Axis) -> f64| SVector::from_fn(|row, _| value(&axes[row]));
+    /// The brake of `actuators`, which drive `axes`: those of one axis at the ramp of the gentlest, so that
+    /// they stay together.
+    pub fn of(axes: &[Axis], actuators: &[Actuator]) -> Self {
+        let each = |value: fn(&Actuator) -> f64, none: f64| {
+            SVector::from_fn(|row, _| actuators.get(row).map_or(none, value))
+        };
+        let ramp = |row: usize| {
+            let actuator = actuators.get(row)?;
+            let axis = axes.get(actuator.axis)?;
+            let of_joint = |it: &Actuator| deceleration(axis, it) * it.ratio.abs();
+            let all = axis.driven_by(actuators).iter().map(of_joint);
+            let gentlest = all.fold(f64::INFINITY, f64::min) / actuator.ratio.abs();
+            Some(if axis.actuators.len() > 1 { gentlest } else { deceleration(axis, actuator) })
+        };
         Self {
-            position_gain: each(|axis| axis.gains.position),
-            velocity_gain: each(|axis| axis.gains.velocity),
-            inertia: each(|axis| axis.gains.inertia),
-            deceleration: each(deceleration),
-            resolution: each(|axis| axis.encoder.resolution()),
+            position_gain: each(|actuator| actuator.gains.position, 0.0),
+            velocity_gain: each(|actuator| actuator.gains.velocity, 0.0),
+            inertia: each(|actuator| actuator.gains.inertia, 1.0),
+            deceleration: SVector::from_fn(|row, _| ramp(row).unwrap_or(0.0)),
+            resolution: each(|actuator| actuator.encoder.resolution(), 1.0),
             angle: SVector::zeros(),
             speed: SVector::zeros(),
             integral: SVector::zeros(),
@@ -67,14 +79,19 @@ impl<const N: usize> Brake<N> {
     }
 
     /// Takes the references from where the motors are.
-    pub fn engage(&mut self, state: &State<N>) {
+    pub fn engage<const J: usize>(&mut self, state: &State<J, N>) {
         self.angle = state.angle;
         self.speed = state.speed;
         self.integral = SVector::zeros();
     }
 
     /// Moves the references on by `step` [s] and gives the voltages for it [V], unlimited.
-    pub fn voltage(&mut self, state: &State<N>, motors: &Motors<N>, step: f64) -> SVector<f64, N> {
+    pub fn voltage<const J: usize>(
+        &mut self,
+        state: &State<J, N>,
+        motors: &Motors<N>,
+        step: f64,
+    ) -> SVector<f64, N> {
         SVector::from_fn(|row, _| {
             let speed = self.speed[row];
             let change = (self.deceleration[row] * step).min(speed.abs()) * speed.signum();
@@ -95,6 +112,9 @@ impl<const N: usize> Brake<N> {
                 + motors.coulomb[row] * direction;
             let limit = motors.current[row];
             let motor = &motors.windings.motors()[row];
+            if motor.torque_constant == 0.0 {
+                return 0.0;
+            }
             let unlimited = torque / motor.torque_constant;
             let target = unlimited.clamp(-limit, limit);
             if unlimited == target {

@@ -41,33 +41,33 @@ enum Transmission<const N: usize> {
     Elastic {
         stiffness: SMatrix<f64, N, N>,
         damping: SMatrix<f64, N, N>,
-        /// Whether any joint has backlash.
-        has_gaps: bool,
+        /// Half of the backlash of each joint, where any has some [joint units].
+        gaps: Option<Joints<N>>,
     },
 }
 
 /// The equations of motion.
 #[derive(Debug, Clone)]
-pub struct Dynamics<const N: usize, M: Mechanism<N>> {
+pub struct Dynamics<const N: usize, M: Mechanism<N>, const A: usize = N> {
     mechanism: M,
-    motors: Motors<N>,
+    motors: Motors<A>,
     transmission: Transmission<N>,
     coupling: Coupling<N, M>,
     /// What turns steppers.
-    field: Option<Field<N>>,
+    field: Option<Field<A>>,
     /// 1/J of each rotor.
-    mobility: SVector<f64, N>,
+    mobility: SVector<f64, A>,
     /// ratio/J of each rotor.
-    reaction: SVector<f64, N>,
+    reaction: SVector<f64, A>,
     /// 1/ratio: motor radians per joint unit.
-    turns: SVector<f64, N>,
+    turns: SVector<f64, A>,
 }
 
 /// Where a step has led.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reached<const N: usize> {
+pub struct Reached<const N: usize, const A: usize = N> {
     /// Where the plant is.
-    pub state: State<N>,
+    pub state: State<N, A>,
     /// Acceleration of the load in the step's last stage, which is third-order close to where it
     /// ended [m/s² or rad/s²].
     pub acceleration: Joints<N>,
@@ -92,18 +92,26 @@ impl Part {
     }
 }
 
-impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
+impl<const N: usize, M: Mechanism<N>, const A: usize> Dynamics<N, M, A> {
     /// The equations of `mechanism` moved by `motors`.
     ///
     /// # Errors
-    /// If the mass matrix at `home` cannot be inverted.
-    pub fn new(mechanism: M, motors: Motors<N>, home: M::ChainState) -> Result<Self, PlantError> {
+    /// If the mass matrix at `home` cannot be inverted, or several motors drive a joint rigidly or with
+    /// backlash.
+    pub fn new(mechanism: M, motors: Motors<A>, home: M::ChainState) -> Result<Self, PlantError> {
+        let mut gap = Joints::<N>::zeros();
+        for (motor, joint) in motors.joint.into_iter().enumerate() {
+            gap[joint] = motors.gap[motor].max(gap[joint]);
+        }
+        let gaps = Some(gap).filter(|gap| gap.iter().any(|gap| *gap > 0.0));
+        let has_gap = |motor: usize| motors.share[motor] < 1.0 && motors.gap[motor] > 0.0;
+        if A != N && ((0..A).any(has_gap) || mechanism.stiffness().is_none()) {
+            return Err(PlantError::Pair);
+        }
         let transmission = match mechanism.stiffness() {
-            Some(stiffness) => Transmission::Elastic {
-                stiffness,
-                damping: mechanism.damping(),
-                has_gaps: motors.gap.iter().any(|gap| *gap > 0.0),
-            },
+            Some(stiffness) => {
+                Transmission::Elastic { stiffness, damping: mechanism.damping(), gaps }
+            }
             None => Transmission::Rigid,
         };
         let rigid = (transmission == Transmission::Rigid).then(|| rotors(&motors));
@@ -136,12 +144,12 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     }
 
     /// The same with steppers, which turn in `field`.
-    pub(super) fn with_field(self, field: Option<Field<N>>) -> Self {
+    pub(super) fn with_field(self, field: Option<Field<A>>) -> Self {
         Self { field, ..self }
     }
 
     /// What turns steppers, to be moved on.
-    pub(super) fn field_mut(&mut self) -> Option<&mut Field<N>> {
+    pub(super) fn field_mut(&mut self) -> Option<&mut Field<A>> {
         self.field.as_mut()
     }
 
@@ -152,15 +160,15 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     }
 
     /// The motors.
-    pub fn motors(&self) -> &Motors<N> {
+    pub fn motors(&self) -> &Motors<A> {
         &self.motors
     }
 
     /// Puts the load where a rigid transmission has it; leaves it alone behind an elastic one.
-    pub fn couple(&self, state: &mut State<N>) {
+    pub fn couple(&self, state: &mut State<N, A>) {
         if self.transmission == Transmission::Rigid {
-            state.load = self.motors.ratio.component_mul(&state.angle);
-            state.load_speed = self.motors.ratio.component_mul(&state.speed);
+            state.load = by_joint(&self.motors.ratio.component_mul(&state.angle));
+            state.load_speed = by_joint(&self.motors.ratio.component_mul(&state.speed));
         }
     }
 
@@ -185,10 +193,18 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             drag += self.at_shafts(&field.damping());
             spring = self.at_shafts(&field.stiffness());
         }
-        let admittance = self.coupling.mobility()
-            + SMatrix::from_diagonal(
-                &motors.ratio.component_mul(&motors.ratio).component_div(&motors.inertia),
-            );
+        let rotors = motors.ratio.component_mul(&motors.ratio).component_div(&motors.inertia);
+        let rotors = if A == N {
+            by_joint(&rotors)
+        } else {
+            // Several rotors on one joint swing against each other too.
+            let shared = rotors.component_mul(&motors.share);
+            Joints::from_fn(|joint, _| {
+                let own = (0..A).filter(|motor| motors.joint[*motor] == joint);
+                2.0 * own.map(|motor| shared[motor]).fold(0.0, f64::max)
+            })
+        };
+        let admittance = self.coupling.mobility() + SMatrix::from_diagonal(&rotors);
         let square = row_sum(&(admittance * stiffness)) + spring;
         let linear = row_sum(&(admittance * damping)) + drag;
         bound(linear, square)
@@ -210,12 +226,12 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
 
     /// What `at_shaft`, torques of the motors by their motion, makes of the acceleration of what they turn
     /// directly: of the rotors, and behind a rigid transmission of motors and load, which are one inertia.
-    fn at_shafts(&self, at_shaft: &SVector<f64, N>) -> f64 {
+    fn at_shafts(&self, at_shaft: &SVector<f64, A>) -> f64 {
         match self.transmission {
             Transmission::Elastic { .. } => self.mobility.component_mul(at_shaft).amax(),
             Transmission::Rigid => {
                 let square = self.motors.ratio.component_mul(&self.motors.ratio);
-                let turned = SMatrix::from_diagonal(&at_shaft.component_div(&square));
+                let turned = SMatrix::from_diagonal(&by_joint(&at_shaft.component_div(&square)));
                 row_sum(&(self.coupling.mobility() * turned))
             }
         }
@@ -225,44 +241,50 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     ///
     /// # Errors
     /// If the chain cannot close on the way, or is singular there.
-    pub fn begin(&mut self, state: &State<N>, step: f64) -> Result<(), Unsolvable> {
+    pub fn begin(&mut self, state: &State<N, A>, step: f64) -> Result<(), Unsolvable> {
         self.coupling.begin(&self.mechanism, &state.load, &state.load_speed, step)
     }
 
     /// The end of the substep begun, where `contacts` have changed just there.
-    pub fn turn(&self, state: &State<N>, contacts: &Contacts<N>) -> Reached<N> {
+    pub fn turn(&self, state: &State<N, A>, contacts: &Contacts<A>) -> Reached<N, A> {
         let response = self.coupling.at(1.0);
         let (_, acceleration) = self.accelerations(state, contacts, &response, 1.0);
         Reached { state: *state, acceleration }
     }
 
     /// Ends the substep as `reached`, where the next one begins.
-    pub fn end(&mut self, reached: &Reached<N>) {
+    pub fn end(&mut self, reached: &Reached<N, A>) {
         self.coupling.end(&reached.state.load, &reached.state.load_speed, &reached.acceleration);
     }
 
     /// Torque that turns each motor at the share `at` of the substep begun, Coulomb friction left
     /// out: what its stiction must hold.
-    pub fn net_torque(&self, state: &State<N>, contacts: &Contacts<N>, at: f64) -> SVector<f64, N> {
+    pub fn net_torque(
+        &self,
+        state: &State<N, A>,
+        contacts: &Contacts<A>,
+        at: f64,
+    ) -> SVector<f64, A> {
         let motors = &self.motors;
         let shaft = self.driven(state) - motors.viscous.component_mul(&state.speed);
         match self.transmission {
             Transmission::Elastic { .. } => {
-                shaft - motors.ratio.component_mul(&self.transmitted(state))
+                let effort = self.transmitted(state);
+                shaft - motors.ratio.component_mul(&self.borne(state, &effort))
             }
             Transmission::Rigid => {
                 let response = self.coupling.at(at);
                 let (_, load) = self.accelerations(state, contacts, &response, at);
                 // A held motor bears what the others' acceleration puts on its joint.
                 let load_side = self.coupling.inertia(at) * load + response.bias;
-                shaft - motors.ratio.component_mul(&load_side)
+                shaft - motors.ratio.component_mul(&by_motor(&load_side))
             }
         }
     }
 
     /// Torque of currents and fields on the rotors [N·m].
     #[inline(always)]
-    fn driven(&self, state: &State<N>) -> SVector<f64, N> {
+    fn driven(&self, state: &State<N, A>) -> SVector<f64, A> {
         match &self.field {
             None => self.motors.windings.torque_constant.component_mul(&state.current),
             Some(field) => field.torque(state),
@@ -271,19 +293,52 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
 
     /// Effort that the transmission puts on the joints [N or N·m]; zero when it is rigid.
     #[inline(always)]
-    pub fn transmitted(&self, state: &State<N>) -> Joints<N> {
+    pub fn transmitted(&self, state: &State<N, A>) -> Joints<N> {
         match &self.transmission {
             Transmission::Rigid => Joints::zeros(),
-            Transmission::Elastic { stiffness, damping, has_gaps } => {
-                let ratio = &self.motors.ratio;
-                let ahead = ratio.component_mul(&state.angle) - state.load;
-                let faster = ratio.component_mul(&state.speed) - state.load_speed;
-                if *has_gaps {
-                    return across_gaps(stiffness, damping, &ahead, &faster, &self.motors.gap);
+            Transmission::Elastic { stiffness, damping, gaps } => {
+                let ahead = self.joined(&state.angle) - state.load;
+                let faster = self.joined(&state.speed) - state.load_speed;
+                if let Some(gaps) = gaps {
+                    return across_gaps(stiffness, damping, &ahead, &faster, gaps);
                 }
                 stiffness * ahead + damping * faster
             }
         }
+    }
+
+    /// Where `angle` of the motors has the joints: of several motors on one, in the mean of their springs.
+    #[inline(always)]
+    fn joined(&self, angle: &SVector<f64, A>) -> Joints<N> {
+        let Motors { ratio, share, joint, .. } = &self.motors;
+        if A == N {
+            return Joints::from_fn(|row, _| ratio[row] * angle[row]);
+        }
+        let mut joined = Joints::zeros();
+        for motor in 0..A {
+            joined[joint[motor]] += share[motor] * (ratio[motor] * angle[motor]);
+        }
+        joined
+    }
+
+    /// What of the `effort` of the transmission each motor bears at its joint [N or N·m]: its share, and what
+    /// its own spring has beyond the mean of those of its joint.
+    #[inline(always)]
+    fn borne(&self, state: &State<N, A>, effort: &Joints<N>) -> SVector<f64, A> {
+        let (Transmission::Elastic { stiffness, damping, .. }, false) =
+            (&self.transmission, A == N)
+        else {
+            return by_motor(effort);
+        };
+        let Motors { ratio, share, joint, .. } = &self.motors;
+        let (mean, mean_speed) = (self.joined(&state.angle), self.joined(&state.speed));
+        SVector::from_fn(|motor, _| {
+            let row = joint[motor];
+            let ahead = ratio[motor] * state.angle[motor] - mean[row];
+            let faster = ratio[motor] * state.speed[motor] - mean_speed[row];
+            let own = stiffness[(row, row)] * ahead + damping[(row, row)] * faster;
+            share[motor] * (effort[row] + own)
+        })
     }
 
     /// Accelerations of motors [rad/s²] and load [m/s² or rad/s²] at the share `at` of the substep
@@ -291,11 +346,11 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     #[inline(always)] // Four calls a step through memory cost as much as the arithmetic.
     fn accelerations(
         &self,
-        state: &State<N>,
-        contacts: &Contacts<N>,
+        state: &State<N, A>,
+        contacts: &Contacts<A>,
         response: &Response<N>,
         at: f64,
-    ) -> (SVector<f64, N>, Joints<N>) {
+    ) -> (SVector<f64, A>, Joints<N>) {
         let motors = &self.motors;
         let torque =
             self.driven(state) - motors.viscous.component_mul(&state.speed) - contacts.torque();
@@ -303,19 +358,20 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             Transmission::Elastic { .. } => {
                 let effort = self.transmitted(state);
                 let motor = (self.mobility.component_mul(&torque)
-                    - self.reaction.component_mul(&effort))
+                    - self.reaction.component_mul(&self.borne(state, &effort)))
                 .component_mul(contacts.free());
                 (motor, response.mobility * (effort - response.bias))
             }
             Transmission::Rigid => {
-                let push = (torque.component_mul(&self.turns) - response.bias)
-                    .component_mul(contacts.free());
+                let free = by_joint(contacts.free());
+                let push = (by_joint(&torque.component_mul(&self.turns)) - response.bias)
+                    .component_mul(&free);
                 let load = if contacts.any_held() {
-                    partly_held(&self.coupling.inertia(at), &push, contacts.free())
+                    partly_held(&self.coupling.inertia(at), &push, &free)
                 } else {
                     response.mobility * push
                 };
-                (load.component_mul(&self.turns), load)
+                (by_motor::<N, A>(&load).component_mul(&self.turns), load)
             }
         }
     }
@@ -328,12 +384,12 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
     /// end of the step: see [`super::Plant`].
     pub fn step(
         &self,
-        start: &State<N>,
-        contacts: &Contacts<N>,
-        phases: &Phases<N>,
-        weights: &Weights<N>,
+        start: &State<N, A>,
+        contacts: &Contacts<A>,
+        phases: &Phases<A>,
+        weights: &Weights<A>,
         part: Part,
-    ) -> Reached<N> {
+    ) -> Reached<N, A> {
         let step = weights.step;
         let half = 0.5 * step;
         let course = match phases {
@@ -343,8 +399,8 @@ impl<const N: usize, M: Mechanism<N>> Dynamics<N, M> {
             }
         };
         let current =
-            |value: fn(&super::winding::Course<N>, &Weights<N>, &SVector<f64, N>) -> _,
-             speed: &SVector<f64, N>| {
+            |value: fn(&super::winding::Course<A>, &Weights<A>, &SVector<f64, A>) -> _,
+             speed: &SVector<f64, A>| {
                 course.as_ref().map_or_else(SVector::zeros, |course| value(course, weights, speed))
             };
         let shares = [part.from, part.from + 0.5 * part.length, part.end()];
@@ -449,7 +505,7 @@ fn bound(linear: f64, square: f64) -> f64 {
 fn partly_held<const N: usize>(
     inertia: &SMatrix<f64, N, N>,
     push: &Joints<N>,
-    free: &SVector<f64, N>,
+    free: &Joints<N>,
 ) -> Joints<N> {
     let matrix = SMatrix::<f64, N, N>::from_fn(|row, column| {
         let held = if row == column { 1.0 - free[row] } else { 0.0 };
@@ -459,9 +515,20 @@ fn partly_held<const N: usize>(
     positive_inverse(&matrix).map_or_else(Joints::zeros, |inverse| inverse * push)
 }
 
-/// The rotors' inertia in joint coordinates.
-fn rotors<const N: usize>(motors: &Motors<N>) -> SMatrix<f64, N, N> {
-    SMatrix::from_diagonal(
-        &motors.inertia.component_div(&motors.ratio.component_mul(&motors.ratio)),
-    )
+/// The rotors' inertia in joint coordinates, one on each joint.
+fn rotors<const N: usize, const A: usize>(motors: &Motors<A>) -> SMatrix<f64, N, N> {
+    let square = motors.ratio.component_mul(&motors.ratio);
+    SMatrix::from_diagonal(&by_joint(&motors.inertia.component_div(&square)))
+}
+
+/// What belongs to the motors of joints with one each, by joint.
+#[inline(always)]
+fn by_joint<const N: usize, const A: usize>(motors: &SVector<f64, A>) -> Joints<N> {
+    Joints::from_fn(|row, _| motors[row])
+}
+
+/// What belongs to joints with one motor each, by motor; 0 of those that are not there.
+#[inline(always)]
+fn by_motor<const N: usize, const A: usize>(joints: &Joints<N>) -> SVector<f64, A> {
+    SVector::from_fn(|row, _| if row < N { joints[row] } else { 0.0 })
 }

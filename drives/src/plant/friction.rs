@@ -27,13 +27,13 @@ const REFINEMENTS: usize = 4;
 const TIME_RESOLUTION: f64 = 1e-12;
 
 /// The contacts in which `state` goes on.
-fn decide<const N: usize, M: Mechanism<N>>(
-    dynamics: &Dynamics<N, M>,
-    state: &State<N>,
-) -> Contacts<N> {
+fn decide<const N: usize, const A: usize, M: Mechanism<N>>(
+    dynamics: &Dynamics<N, M, A>,
+    state: &State<N, A>,
+) -> Contacts<A> {
     let coulomb = dynamics.motors().coulomb;
     let mut contacts = Contacts::new();
-    for motor in 0..N {
+    for motor in 0..A {
         if coulomb[motor] > 0.0 {
             let speed = state.speed[motor];
             let contact =
@@ -47,7 +47,7 @@ fn decide<const N: usize, M: Mechanism<N>>(
         let torque = dynamics.net_torque(state, &contacts, 0.0);
         let mut worst = None;
         let mut excess = 0.0;
-        for motor in 0..N {
+        for motor in 0..A {
             let over = torque[motor].abs() - coulomb[motor];
             if contacts.of(motor) == Contact::Held && over > excess {
                 (worst, excess) = (Some(motor), over);
@@ -60,12 +60,12 @@ fn decide<const N: usize, M: Mechanism<N>>(
 }
 
 /// How far each motor is from the end of its contact; negative once it is past it.
-fn margins<const N: usize, M: Mechanism<N>>(
-    contacts: &Contacts<N>,
-    dynamics: &Dynamics<N, M>,
-    state: &State<N>,
+fn margins<const N: usize, const A: usize, M: Mechanism<N>>(
+    contacts: &Contacts<A>,
+    dynamics: &Dynamics<N, M, A>,
+    state: &State<N, A>,
     at: f64,
-) -> [f64; N] {
+) -> [f64; A] {
     let torque = if contacts.any_held() {
         dynamics.net_torque(state, contacts, at)
     } else {
@@ -83,12 +83,12 @@ fn margins<const N: usize, M: Mechanism<N>>(
 ///
 /// # Errors
 /// If the mechanism cannot go where this step leads.
-pub fn advance<const N: usize, M: Mechanism<N>>(
-    dynamics: &mut Dynamics<N, M>,
-    state: &State<N>,
-    phases: &Phases<N>,
-    weights: &Weights<N>,
-) -> Result<State<N>, Unsolvable> {
+pub fn advance<const N: usize, const A: usize, M: Mechanism<N>>(
+    dynamics: &mut Dynamics<N, M, A>,
+    state: &State<N, A>,
+    phases: &Phases<A>,
+    weights: &Weights<A>,
+) -> Result<State<N, A>, Unsolvable> {
     let whole = weights.step;
     dynamics.begin(state, whole)?;
     let mut state = *state;
@@ -96,7 +96,7 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
     let mut weights = *weights;
     let mut contacts = decide(dynamics, &state);
     // Every motor may stop and start again within a step; more than that is chatter.
-    for _ in 0..2 * N + 2 {
+    for _ in 0..2 * A + 2 {
         let end = dynamics.step(&state, &contacts, phases, &weights, part);
         let after = margins(&contacts, dynamics, &end.state, part.end());
         if after.iter().all(|margin| *margin >= 0.0) {
@@ -139,7 +139,7 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
         part.length = rest / whole;
     }
     // Chatter: what changes its mind again and again within a step is at rest in it.
-    for motor in 0..N {
+    for motor in 0..A {
         if contacts.of(motor) != Contact::Frictionless && state.speed[motor].abs() == 0.0 {
             contacts.set(motor, Contact::Held, 0.0);
         }
@@ -150,9 +150,9 @@ pub fn advance<const N: usize, M: Mechanism<N>>(
 }
 
 /// The motor whose contact ends first, with the share of the step at which it does, by the chord.
-fn earliest<const N: usize>(before: &[f64; N], after: &[f64; N]) -> (usize, f64) {
+fn earliest<const A: usize>(before: &[f64; A], after: &[f64; A]) -> (usize, f64) {
     let mut first = (0, f64::INFINITY);
-    for motor in 0..N {
+    for motor in 0..A {
         if after[motor] < 0.0 {
             let share = chord(before[motor].max(0.0), after[motor]);
             if share < first.1 {
@@ -169,12 +169,12 @@ fn chord(before: f64, after: f64) -> f64 {
 }
 
 /// The share of the step at which the margin of `motor` vanishes, from the guess `share` on.
-fn locate<const N: usize, M: Mechanism<N>>(
-    dynamics: &Dynamics<N, M>,
-    state: &State<N>,
-    contacts: &Contacts<N>,
-    phases: &Phases<N>,
-    (weights, whole): (&Weights<N>, Part),
+fn locate<const N: usize, const A: usize, M: Mechanism<N>>(
+    dynamics: &Dynamics<N, M, A>,
+    state: &State<N, A>,
+    contacts: &Contacts<A>,
+    phases: &Phases<A>,
+    (weights, whole): (&Weights<A>, Part),
     (motor, guess): (usize, f64),
     (before, after): (f64, f64),
 ) -> f64 {

@@ -1,6 +1,6 @@
-//! The motors' data in vectors, an entry for each axis.
+//! The motors' data in vectors, an entry for each actuator, and entries that do nothing behind them.
 
-use machine::{Axis, DcMotor};
+use machine::{Actuator, Axis, DcMotor};
 use nalgebra::SVector;
 
 use super::winding::Windings;
@@ -11,6 +11,10 @@ const SAME_TIME: f64 = 1e-9;
 /// What the motors are made of, one entry each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motors<const N: usize> {
+    /// Which joint each of them drives; 0 of those that are not there.
+    pub joint: [usize; N],
+    /// Share of the joint's spring that is behind each; 0 of those that are not there.
+    pub share: SVector<f64, N>,
     /// The electrical part.
     pub windings: Windings<N>,
     /// Inertia at the shaft [kg·m²].
@@ -35,21 +39,28 @@ pub struct Motors<const N: usize> {
 }
 
 impl<const N: usize> Motors<N> {
-    /// The motors of `axes`, of which there are `N`.
-    pub fn of(axes: &[Axis; N]) -> Self {
-        let each = |value: fn(&Axis) -> f64| SVector::from_fn(|row, _| value(&axes[row]));
+    /// The motors of `actuators`, of which there are `N` at most, and which drive `axes`.
+    pub fn of(axes: &[Axis], actuators: &[Actuator]) -> Self {
+        let gap =
+            |actuator: &Actuator| axes.get(actuator.axis).map_or(0.0, |axis| axis.backlash / 2.0);
+        let each = |value: fn(&Actuator) -> f64, none: f64| {
+            SVector::from_fn(|row, _| actuators.get(row).map_or(none, value))
+        };
+        let coulomb = each(|actuator| actuator.friction.coulomb, 0.0);
         Self {
-            windings: Windings::new(core::array::from_fn(|row| dc(&axes[row]))),
-            inertia: each(|axis| axis.motor.rotor_inertia()),
-            coulomb: each(|axis| axis.friction.coulomb),
-            sliding: each(|axis| axis.friction.coulomb),
-            brake: each(|axis| axis.brake.torque),
-            release: each(|axis| axis.brake.release),
-            viscous: each(|axis| axis.friction.viscous),
-            ratio: each(|axis| axis.ratio),
-            gap: each(|axis| axis.backlash / 2.0),
-            voltage: each(|axis| dc(axis).voltage),
-            current: each(|axis| dc(axis).current),
+            joint: core::array::from_fn(|row| actuators.get(row).map_or(0, |it| it.axis)),
+            share: each(|actuator| actuator.share, 0.0),
+            windings: Windings::new(core::array::from_fn(|row| dc(actuators.get(row)))),
+            inertia: each(|actuator| actuator.motor.rotor_inertia(), 1.0),
+            coulomb,
+            sliding: coulomb,
+            brake: each(|actuator| actuator.brake.torque, 0.0),
+            release: each(|actuator| actuator.brake.release, 0.0),
+            viscous: each(|actuator| actuator.friction.viscous, 0.0),
+            ratio: each(|actuator| actuator.ratio, 1.0),
+            gap: SVector::from_fn(|row, _| actuators.get(row).map_or(0.0, gap)),
+            voltage: each(|actuator| dc(Some(actuator)).voltage, 0.0),
+            current: each(|actuator| dc(Some(actuator)).current, 0.0),
         }
     }
 
@@ -63,8 +74,9 @@ impl<const N: usize> Motors<N> {
     }
 }
 
-/// The DC motor of `axis`, or what stands for it in a stepper: a winding without current and torque.
-fn dc(axis: &Axis) -> DcMotor {
+/// The DC motor of `actuator`, or what stands for it in a stepper and where there is none: a winding
+/// without current and torque.
+fn dc(actuator: Option<&Actuator>) -> DcMotor {
     const NONE: DcMotor = DcMotor {
         resistance: 1.0,
         inductance: 1.0,
@@ -74,5 +86,5 @@ fn dc(axis: &Axis) -> DcMotor {
         current: 0.0,
         continuous_current: None,
     };
-    axis.motor.dc().copied().unwrap_or(NONE)
+    actuator.and_then(|actuator| actuator.motor.dc()).copied().unwrap_or(NONE)
 }

@@ -3,15 +3,15 @@
 use machine::kinematics::Joints;
 use nalgebra::SVector;
 
-/// Where the plant is.
+/// Where the plant is, with `N` joints and `A` motors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct State<const N: usize> {
+pub struct State<const N: usize, const A: usize = N> {
     /// Motor currents [A].
-    pub current: SVector<f64, N>,
+    pub current: SVector<f64, A>,
     /// Motor angles [rad].
-    pub angle: SVector<f64, N>,
+    pub angle: SVector<f64, A>,
     /// Motor speeds [rad/s].
-    pub speed: SVector<f64, N>,
+    pub speed: SVector<f64, A>,
     /// Load side of the joints [m or rad].
     pub load: Joints<N>,
     /// Velocity of the load side [m/s or rad/s].

@@ -9,7 +9,7 @@
 //! Unpowered, only the teeth hold the rotor. The count then follows it, as if it were homed anew
 //! when the power comes back.
 
-use machine::{Axis, StepperMotor};
+use machine::{Actuator, Axis, StepperMotor};
 use messages::{CommandMode, Fault, FaultCode, FaultQuantity};
 use nalgebra::SVector;
 
@@ -25,6 +25,8 @@ const EXCESS: f64 = 1.001;
 #[derive(Debug, Clone, Copy)]
 pub struct Field<const N: usize> {
     motors: [StepperMotor; N],
+    /// How many of them there are.
+    count: usize,
     /// Angles of the rotors at home, where a full step is [rad].
     origin: SVector<f64, N>,
     /// Whether the phases are driven.
@@ -39,9 +41,9 @@ pub struct Field<const N: usize> {
 
 impl<const N: usize> Field<N> {
     /// Torque on the rotors [N·m].
-    pub fn torque(&self, state: &State<N>) -> SVector<f64, N> {
+    pub fn torque<const J: usize>(&self, state: &State<J, N>) -> SVector<f64, N> {
         let mut torque = SVector::zeros();
-        for (row, motor) in self.motors.iter().enumerate() {
+        for (row, motor) in self.motors.iter().enumerate().take(self.count) {
             let (angle, speed) = (state.angle[row], state.speed[row]);
             let teeth = motor.teeth_torque(angle - self.origin[row]);
             torque[row] = teeth;
@@ -57,6 +59,9 @@ impl<const N: usize> Field<N> {
     /// The rotors' springs [N·m/rad], at their stiffest.
     pub(super) fn stiffness(&self) -> SVector<f64, N> {
         SVector::from_fn(|row, _| {
+            if row >= self.count {
+                return 0.0;
+            }
             let motor = &self.motors[row];
             motor.stiffness() + 4.0 * motor.periods() * motor.detent_torque
         })
@@ -64,7 +69,7 @@ impl<const N: usize> Field<N> {
 
     /// The drivers' damping [N·m·s/rad].
     pub(super) fn damping(&self) -> SVector<f64, N> {
-        SVector::from_fn(|row, _| self.motors[row].damping)
+        SVector::from_fn(|row, _| if row < self.count { self.motors[row].damping } else { 0.0 })
     }
 }
 
@@ -72,6 +77,8 @@ impl<const N: usize> Field<N> {
 #[derive(Debug, Clone)]
 pub(super) struct Stepping<const N: usize> {
     motors: [StepperMotor; N],
+    /// How many of them there are.
+    count: usize,
     deceleration: [f64; N],
     /// Commanded angles at home [rad]; pulses count from there.
     origin: SVector<f64, N>,
@@ -80,27 +87,28 @@ pub(super) struct Stepping<const N: usize> {
 }
 
 impl<const N: usize> Stepping<N> {
-    /// The drivers of `axes`, at home with the magnetic axes at `origin` [rad]; `None` where the
-    /// axes have no steppers.
-    pub(super) fn of(axes: &[Axis; N], origin: SVector<f64, N>) -> Option<Self> {
-        let mut motors = axes.iter().map(|axis| axis.motor.stepper().copied());
-        let first = motors.next()??;
-        let mut all = [first; N];
-        for (slot, motor) in all[1..].iter_mut().zip(motors) {
-            *slot = motor?;
+    /// The drivers of `actuators`, which drive `axes`, at home with the magnetic axes at `origin` [rad];
+    /// `None` where they have no steppers.
+    pub(super) fn of(
+        axes: &[Axis],
+        actuators: &[Actuator],
+        origin: SVector<f64, N>,
+    ) -> Option<Self> {
+        let first = *actuators.first()?.motor.stepper()?;
+        let (mut motors, mut deceleration) = ([first; N], [0.0; N]);
+        for (row, actuator) in actuators.iter().enumerate().take(N) {
+            motors[row] = *actuator.motor.stepper()?;
+            deceleration[row] = brake::deceleration(axes.get(actuator.axis)?, actuator);
         }
-        Some(Self {
-            motors: all,
-            deceleration: core::array::from_fn(|row| brake::deceleration(&axes[row])),
-            origin,
-            segments: [Segment::rest(0.0); N],
-        })
+        let count = actuators.len().min(N);
+        Some(Self { motors, count, deceleration, origin, segments: [Segment::rest(0.0); N] })
     }
 
     /// The unpowered field of rotors whose teeth stand on a full step at `rotor` [rad].
     pub(super) fn field(&self, rotor: SVector<f64, N>) -> Field<N> {
         Field {
             motors: self.motors,
+            count: self.count,
             origin: rotor,
             powered: false,
             angle: self.origin,
@@ -113,9 +121,13 @@ impl<const N: usize> Stepping<N> {
     ///
     /// # Errors
     /// A pulse rate beyond a driver's limit; the cycle is then left as it was.
-    pub(super) fn engage(&mut self, actuation: &Actuation, state: &State<N>) -> Result<(), Fault> {
+    pub(super) fn engage<const J: usize>(
+        &mut self,
+        actuation: &Actuation,
+        state: &State<J, N>,
+    ) -> Result<(), Fault> {
         let mut segments = self.segments;
-        for (row, segment) in segments.iter_mut().enumerate() {
+        for (row, segment) in segments.iter_mut().enumerate().take(self.count) {
             let motor = &self.motors[row];
             *segment = match (actuation.mode, actuation.freshness) {
                 (CommandMode::Disabled, _) => Segment::rest(state.angle[row] - self.origin[row]),
@@ -128,7 +140,7 @@ impl<const N: usize> Stepping<N> {
             let rate = segment.fastest() * motor.pulses_per_radian();
             let follows = actuation.mode == CommandMode::Position;
             if follows && (rate > motor.pulse_rate * EXCESS || rate.is_nan()) {
-                let fault = Fault::new(FaultCode::DriveFault).on(row);
+                let fault = Fault::new(FaultCode::DriveFault).on_actuator(row);
                 return Err(fault.beyond(FaultQuantity::PulseRate, rate, motor.pulse_rate));
             }
         }
@@ -140,7 +152,7 @@ impl<const N: usize> Stepping<N> {
     /// the mean, so that each pulse counts from its instant on.
     pub(super) fn drive(&self, field: &mut Field<N>, [from, to]: [f64; 2], mode: CommandMode) {
         field.powered = mode != CommandMode::Disabled;
-        for (row, segment) in self.segments.iter().enumerate() {
+        for (row, segment) in self.segments.iter().enumerate().take(self.count) {
             let pulses = segment.mean_count(self.per_radian(row), from, to);
             let (_, speed) = segment.at(0.5 * (from + to));
             field.angle[row] = self.origin[row] + pulses / self.per_radian(row);
@@ -153,12 +165,16 @@ impl<const N: usize> Stepping<N> {
     ///
     /// # Errors
     /// One that is not, with how far it is off [rad].
-    pub(super) fn in_step(&self, field: &Field<N>, state: &State<N>) -> Result<(), Fault> {
-        for (row, motor) in self.motors.iter().enumerate() {
+    pub(super) fn in_step<const J: usize>(
+        &self,
+        field: &Field<N>,
+        state: &State<J, N>,
+    ) -> Result<(), Fault> {
+        for (row, motor) in self.motors.iter().enumerate().take(self.count) {
             let lag = (field.angle[row] - state.angle[row]).abs();
             let limit = motor.stall_angle();
             if field.powered && (lag > limit || lag.is_nan()) {
-                let fault = Fault::new(FaultCode::DriveFault).on(row);
+                let fault = Fault::new(FaultCode::DriveFault).on_actuator(row);
                 return Err(fault.beyond(FaultQuantity::Lag, lag, limit));
             }
         }

@@ -96,13 +96,31 @@ impl Mechanism<1> for Shaft {
     }
 }
 
-/// The axis of a bare motor: EC035.120 with `inertia` [kg·m²] and `friction` at its shaft.
-pub(crate) fn axis(inertia: f64, friction: Friction) -> machine::Axis {
+/// The axis of a bare motor.
+pub(crate) fn axis() -> machine::Axis {
     machine::Axis {
         name: "shaft".to_owned(),
         unit: machine::JointUnit::Angle,
-        ratio: 1.0,
         backlash: 0.0,
+        limits: AxisLimits {
+            position: [-1e9, 1e9],
+            velocity: 500.0,
+            acceleration: f64::INFINITY,
+            jerk: f64::INFINITY,
+            following_error: 1.0,
+            racking: 1.0,
+        },
+        actuators: 0..1,
+    }
+}
+
+/// A bare motor: EC035.120 with `inertia` [kg·m²] and `friction` at its shaft.
+pub(crate) fn actuator(inertia: f64, friction: Friction) -> machine::Actuator {
+    machine::Actuator {
+        name: "shaft".to_owned(),
+        axis: 0,
+        ratio: 1.0,
+        share: 1.0,
         efficiency: Efficiency::LOSSLESS,
         motor: Motor::Dc(DcMotor {
             resistance: 2.3,
@@ -117,12 +135,17 @@ pub(crate) fn axis(inertia: f64, friction: Friction) -> machine::Axis {
         brake: HoldingBrake { torque: 0.0, release: 0.0 },
         encoder: Encoder { counts: 4096.0 },
         gains: LoopGains { position: 40.0, velocity: 160.0, current: 349.0, inertia },
-        limits: AxisLimits {
-            position: [-1e9, 1e9],
-            velocity: 500.0,
-            acceleration: f64::INFINITY,
-            jerk: f64::INFINITY,
-            following_error: 1.0,
-        },
+        square: 0.0,
     }
+}
+
+/// So many axes and actuators as `actuator`, one to one.
+#[allow(dead_code)] // Each test has its own copy of this module.
+pub(crate) fn alike(
+    actuator: &machine::Actuator,
+    count: usize,
+) -> (Vec<machine::Axis>, Vec<machine::Actuator>) {
+    let own = |axis| machine::Actuator { axis, ..actuator.clone() };
+    let of = |index: usize| machine::Axis { actuators: index..index + 1, ..axis() };
+    ((0..count).map(of).collect(), (0..count).map(own).collect())
 }

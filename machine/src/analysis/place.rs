@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::Bodies;
-use crate::actuator::Axis;
+use crate::actuator::Actuator;
+use crate::axis::Axis;
 use crate::kinematics::{Branch, Joints, KinematicsError, Margin, TaskSpace};
 use crate::{Machine, Mechanism, MechanismVisitor, Motor, Pose};
 
@@ -28,36 +29,41 @@ pub struct Place {
     pub(super) gravity: DVector<f64>,
     /// Stiffness of the transmission [N/m or N·m/rad]; `None` where it is rigid.
     pub(super) stiffness: Option<DMatrix<f64>>,
-    /// Each axis's motor.
+    /// Each axis's motors.
     pub(super) motors: Vec<MotorSide>,
 }
 
-/// A motor seen from its joint.
+/// The motors of an axis, together, seen from its joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MotorSide {
-    /// Joint units per radian of the motor.
+    /// Joint units per radian of the first of them.
     pub(super) ratio: f64,
-    /// Inertia of the rotor at the joint [kg or kg·m²].
+    /// Inertia of the rotors at the joint [kg or kg·m²].
     pub(super) inertia: f64,
-    /// Torque that it gives at standstill, at the shaft [N·m].
+    /// Torque that they give at standstill, as if all of it were at the first one's shaft [N·m].
     pub(super) torque: f64,
-    /// Stiffness with which its loops, or its field, hold the joint [N/m or N·m/rad].
+    /// Stiffness with which their loops, or their fields, hold the joint [N/m or N·m/rad].
     pub(super) hold: f64,
 }
 
 impl MotorSide {
-    fn of(axis: &Axis) -> Self {
-        let square = axis.ratio * axis.ratio;
-        let hold = match &axis.motor {
-            Motor::Dc(_) => axis.gains.inertia * axis.gains.velocity * axis.gains.position,
-            Motor::Stepper(motor) => motor.stiffness(),
-        };
-        Self {
-            ratio: axis.ratio,
-            inertia: axis.motor.rotor_inertia() / square,
-            torque: axis.motor.stall_torque(),
-            hold: hold / square,
+    fn of((_, actuators): (&Axis, &[Actuator])) -> Self {
+        let ratio = actuators.first().map_or(1.0, |first| first.ratio.abs());
+        let mut side = Self { ratio, inertia: 0.0, torque: 0.0, hold: 0.0 };
+        for actuator in actuators {
+            let square = actuator.ratio * actuator.ratio;
+            let hold = match &actuator.motor {
+                Motor::Dc(_) => {
+                    let gains = &actuator.gains;
+                    gains.inertia * gains.velocity * gains.position
+                }
+                Motor::Stepper(motor) => motor.stiffness(),
+            };
+            side.inertia += actuator.motor.rotor_inertia() / square;
+            side.torque += actuator.motor.stall_torque() * (ratio / actuator.ratio.abs());
+            side.hold += hold / square;
         }
+        side
     }
 }
 
@@ -114,7 +120,7 @@ impl Place {
             mass: square(mass),
             gravity: DVector::from_fn(N, |row, _| gravity[row]),
             stiffness: mechanism.stiffness().map(square),
-            motors: machine.axes.iter().map(MotorSide::of).collect(),
+            motors: machine.driven().map(MotorSide::of).collect(),
         }
     }
 

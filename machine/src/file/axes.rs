@@ -1,15 +1,17 @@
-//! From the axes' tables to [`Axis`]: ratios, what the loops move, and the motor's own limits.
+//! From the axes' tables to [`Axis`] and [`Actuator`]: ratios, what the loops move, and the motors' own
+//! limits.
 
 use super::motors::{counts, motor};
-use super::tables::{AxisTable, LimitsTable, LoopsTable};
-use crate::actuator::{Axis, Friction, HoldingBrake, LoopGains};
-use crate::document::{Decode, Diagnostics, Either, ProblemKind, Quantity, Range};
+use super::tables::{AxisActuatorTable, AxisTable, LimitsTable, LoopsTable};
+use crate::actuator::{Actuator, Friction, HoldingBrake, LoopGains};
+use crate::axis::Axis;
+use crate::document::{Decode, Diagnostics, Either, ProblemKind, Quantity, Range, Spanned};
 use crate::limits::AxisLimits;
 use crate::motor::Motor;
 use crate::quantity::Kind;
 use crate::transmission::gear::Efficiency;
 
-pub(super) use crate::actuator::JointUnit;
+pub(super) use crate::axis::JointUnit;
 
 /// Share of the motor's no-load speed that an axis may use where the file sets no limit: what is
 /// left of the voltage there drives the current that friction takes.
@@ -75,46 +77,187 @@ impl JointUnit {
     }
 }
 
-/// The axis that `table` describes, driving `joint`; `None` where it has no motor.
-pub(super) fn axis(
+/// One actuator of an axis as the file says it.
+pub(super) struct Drive {
+    /// Its name, `x` or `y.left`.
+    pub(super) name: String,
+    /// The key of its table under `axis`, `x` or `y.actuator.left`.
+    pub(super) key: String,
+    /// The table of its axis, with what is its own in it.
+    pub(super) table: AxisTable,
+    /// 1, or −1 where the motor is mounted the other way round.
+    side: f64,
+    /// How far beyond its place its home reference is [m or rad].
+    square: f64,
+}
+
+/// The actuators that `table` gives to `joint`, at least one.
+pub(super) fn drives(
     table: &AxisTable,
     joint: &Joint,
     diagnostics: &mut Diagnostics,
-) -> Option<Axis> {
-    let gear = table.gear.value;
-    let ratio = joint.travel / gear;
-    let motor = motor(table, joint, diagnostics)?;
-    let inertia = motor.rotor_inertia() + ratio * ratio * joint.load;
-    Some(Axis {
+) -> Vec<Drive> {
+    let alone = || Drive {
         name: joint.name.to_owned(),
-        unit: joint.unit,
-        ratio,
-        backlash: backlash(table, joint, diagnostics),
-        efficiency: Efficiency {
-            dynamic: table.efficiency.value,
-            at_start: table.static_efficiency.value,
-        },
-        motor,
-        friction: Friction {
-            coulomb: table.friction.coulomb.value,
-            viscous: table.friction.viscous.value,
-        },
-        brake: HoldingBrake {
-            torque: table.friction.brake.value,
-            release: table.friction.brake_release.value,
-        },
-        encoder: counts(table, &motor, diagnostics)?,
-        gains: match motor {
-            Motor::Dc(_) => gains(table, inertia, diagnostics)?,
-            Motor::Stepper(_) => LoopGains { position: 0.0, velocity: 0.0, current: 0.0, inertia },
-        },
-        limits: limits(&table.limits, joint, &motor, ratio, diagnostics),
-    })
+        key: joint.name.to_owned(),
+        table: table.clone(),
+        side: 1.0,
+        square: 0.0,
+    };
+    let Some(actuators) = &table.actuator else { return vec![alone()] };
+    if actuators.entries.is_empty() {
+        diagnostics.refuse(
+            ProblemKind::MissingKey,
+            actuators.span,
+            format!("axis `{}` has a table of actuators, and none in it", joint.name),
+            Some("name them, such as `actuator.left = {}`, or leave the table out".to_owned()),
+        );
+        return vec![alone()];
+    }
+    let drive = |(name, own): &(Spanned<String>, AxisActuatorTable)| {
+        refuse_name(name, diagnostics);
+        let square = own.square.as_ref().map_or(0.0, |square| {
+            joint.unit.expect(square, joint.name, diagnostics);
+            square.value
+        });
+        Drive {
+            name: format!("{}.{}", joint.name, name.value),
+            key: format!("{}.actuator.{}", joint.name, name.value),
+            table: table.with_own(own),
+            side: if own.mirrored.value { -1.0 } else { 1.0 },
+            square,
+        }
+    };
+    actuators.entries.iter().map(drive).collect()
 }
 
-fn backlash(table: &AxisTable, joint: &Joint, diagnostics: &mut Diagnostics) -> f64 {
+impl AxisTable {
+    /// This as the actuator with the table `own` has it.
+    pub fn with_own(&self, own: &AxisActuatorTable) -> Self {
+        let AxisActuatorTable { gear, motor, friction, encoder, loops, .. } = own.clone();
+        let axis = self.clone();
+        Self {
+            gear: gear.unwrap_or(axis.gear),
+            motor: motor.unwrap_or(axis.motor),
+            friction: friction.unwrap_or(axis.friction),
+            encoder: encoder.or(axis.encoder),
+            loops: loops.or(axis.loops),
+            ..axis
+        }
+    }
+}
+
+/// Refuses a name that could not be told from others in a list or in a table's heading.
+fn refuse_name(name: &Spanned<String>, diagnostics: &mut Diagnostics) {
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '_' || letter == '-';
+    if name.value.is_empty() || !name.value.chars().all(is_plain) {
+        diagnostics.contradict(
+            name.span,
+            format!("an actuator cannot be called `{}`", name.value),
+            "use letters, digits, _ and - only, such as `left`",
+        );
+    }
+}
+
+/// The axis that `table` describes, moving `joint`, and its actuators, each with what is said of it in the
+/// file; their indices begin with those after the `before` that there are, of axes before the `index`th.
+/// `None` where an actuator has no motor.
+pub(super) fn axis(
+    table: &AxisTable,
+    joint: &Joint,
+    [index, before]: [usize; 2],
+    diagnostics: &mut Diagnostics,
+) -> Option<(Axis, Vec<(Drive, Actuator)>)> {
+    let drives = drives(table, joint, diagnostics);
+    let motors: Vec<Option<Motor>> =
+        drives.iter().map(|drive| motor(drive, joint, diagnostics)).collect();
+    let motors: Vec<Motor> = motors.into_iter().collect::<Option<_>>()?;
+    let ratio = |drive: &Drive| drive.side * (joint.travel / drive.table.gear.value);
+    let strength = |(drive, motor): (&Drive, &Motor)| motor.stall_torque() / ratio(drive).abs();
+    let whole: f64 = drives.iter().zip(&motors).map(strength).sum();
+    let mut actuators = Vec::with_capacity(drives.len());
+    let mut fastest = f64::INFINITY;
+    for (drive, motor) in drives.into_iter().zip(motors) {
+        let ratio = ratio(&drive);
+        let share = strength((&drive, &motor)) / whole;
+        let inertia = motor.rotor_inertia() + ratio * ratio * (joint.load * share);
+        let table = &drive.table;
+        fastest = fastest.min(motor.largest_speed() * ratio.abs());
+        let actuator = Actuator {
+            name: drive.name.clone(),
+            axis: index,
+            ratio,
+            share,
+            efficiency: Efficiency {
+                dynamic: table.efficiency.value,
+                at_start: table.static_efficiency.value,
+            },
+            motor,
+            friction: Friction {
+                coulomb: table.friction.coulomb.value,
+                viscous: table.friction.viscous.value,
+            },
+            brake: HoldingBrake {
+                torque: table.friction.brake.value,
+                release: table.friction.brake_release.value,
+            },
+            encoder: counts(table, &motor, diagnostics)?,
+            gains: match motor {
+                Motor::Dc(_) => gains(table, inertia, diagnostics)?,
+                Motor::Stepper(_) => {
+                    LoopGains { position: 0.0, velocity: 0.0, current: 0.0, inertia }
+                }
+            },
+            square: drive.square,
+        };
+        actuators.push((drive, actuator));
+    }
+    let axis = Axis {
+        name: joint.name.to_owned(),
+        unit: joint.unit,
+        backlash: backlash(table, joint, actuators.len(), diagnostics),
+        limits: limits(&table.limits, joint, fastest, actuators.len(), diagnostics),
+        actuators: before..before + actuators.len(),
+    };
+    for (drive, actuator) in &actuators {
+        refuse_crooked(drive, actuator, &axis, diagnostics);
+    }
+    Some((axis, actuators))
+}
+
+/// Refuses a home reference so far out of square that the machine would stop at once.
+fn refuse_crooked(drive: &Drive, actuator: &Actuator, axis: &Axis, diagnostics: &mut Diagnostics) {
+    let (limit, name) = (axis.limits.racking, axis.unit.name());
+    let own = drive.table.actuator.iter().flat_map(|actuators| &actuators.entries);
+    let span = own.filter(|(own, _)| actuator.name == format!("{}.{}", axis.name, own.value));
+    let span = span.filter_map(|(_, own)| own.square.as_ref()).map(|square| square.span).next();
+    if let Some(span) = span.filter(|_| actuator.square.abs() > limit / 2.0) {
+        diagnostics.contradict(
+            span,
+            format!(
+                "`square` is {} {name}, and actuators {limit} {name} apart stop the machine",
+                actuator.square
+            ),
+            "square the references within half of `limits.racking`, or raise that",
+        );
+    }
+}
+
+fn backlash(
+    table: &AxisTable,
+    joint: &Joint,
+    actuators: usize,
+    diagnostics: &mut Diagnostics,
+) -> f64 {
     let Some(backlash) = &table.backlash else { return 0.0 };
     joint.unit.expect(backlash, joint.name, diagnostics);
+    if actuators > 1 && backlash.value > 0.0 {
+        diagnostics.contradict(
+            backlash.span,
+            format!("axis `{}` has backlash and {actuators} actuators", joint.name),
+            "leave the backlash out: it is known of an axis with one actuator only",
+        );
+    }
     backlash.value
 }
 
@@ -155,8 +298,8 @@ fn gains(table: &AxisTable, inertia: f64, diagnostics: &mut Diagnostics) -> Opti
 fn limits(
     table: &LimitsTable,
     joint: &Joint,
-    motor: &Motor,
-    ratio: f64,
+    no_load: f64,
+    actuators: usize,
     diagnostics: &mut Diagnostics,
 ) -> AxisLimits {
     let (unit, name) = (joint.unit, joint.name);
@@ -170,12 +313,24 @@ fn limits(
     if let Some(limit) = &table.jerk {
         unit.expect(limit, name, diagnostics);
     }
+    let racking = table.racking.map_or(following_error, |declared| {
+        unit.expect(&declared, name, diagnostics);
+        if actuators < 2 {
+            diagnostics.contradict(
+                declared.span,
+                format!("axis `{name}` has one actuator, which cannot rack"),
+                "remove `racking`",
+            );
+        }
+        declared.value
+    });
     AxisLimits {
         position: position(table, joint, following_error, diagnostics),
-        velocity: velocity(table, joint, motor.largest_speed() * ratio, diagnostics),
+        velocity: velocity(table, joint, no_load, diagnostics),
         acceleration: table.acceleration.map_or(f64::INFINITY, |limit| limit.value),
         jerk: table.jerk.map_or(f64::INFINITY, |limit| limit.value),
         following_error,
+        racking,
     }
 }
 

@@ -2,21 +2,18 @@
 
 use core::f64::consts::TAU;
 
-use super::axes::Joint;
+use super::axes::{Drive, Joint};
 use super::tables::{AxisTable, DcMotorTable, StepperMotorTable};
-use crate::actuator::{Axis, Encoder};
+use crate::actuator::{Actuator, Encoder};
 use crate::document::{Diagnostics, Number, Positive, ProblemKind};
 use crate::motor::{DcMotor, Motor, StepperMotor};
 
 /// Rounding of a whole number that was computed from other units.
 const WHOLE: f64 = 1e-6;
 
-/// The motor of `table`, which drives `joint`; `None` where there is not exactly one.
-pub(super) fn motor(
-    table: &AxisTable,
-    joint: &Joint,
-    diagnostics: &mut Diagnostics,
-) -> Option<Motor> {
+/// The motor of `drive`, which drives `joint`; `None` where there is not exactly one.
+pub(super) fn motor(drive: &Drive, joint: &Joint, diagnostics: &mut Diagnostics) -> Option<Motor> {
+    let Drive { table, name, key, .. } = drive;
     let stiff = joint.stiff_inertia / (table.gear.value * table.gear.value);
     match (&table.motor.dc, &table.motor.stepper) {
         (Some(data), None) => Some(Motor::Dc(dc(data, stiff, diagnostics))),
@@ -25,18 +22,15 @@ pub(super) fn motor(
             diagnostics.refuse(
                 ProblemKind::MissingKey,
                 table.motor.span,
-                format!("axis `{}` has no motor", joint.name),
-                Some(format!(
-                    "add [axis.{name}.motor.dc] or [axis.{name}.motor.stepper]",
-                    name = joint.name
-                )),
+                format!("axis `{name}` has no motor"),
+                Some(format!("add [axis.{key}.motor.dc] or [axis.{key}.motor.stepper]")),
             );
             None
         }
         (Some(dc), Some(stepper)) => {
             diagnostics.contradict(
                 dc.span.max(stepper.span),
-                format!("axis `{}` has two motors", joint.name),
+                format!("axis `{name}` has two motors"),
                 "keep either the table `dc` or the table `stepper`",
             );
             None
@@ -170,17 +164,16 @@ pub(super) fn counts(
 
 /// Refuses axes whose motors are not all of one kind: one command drives them all, by voltage or by
 /// position.
-pub(super) fn of_one_kind<'a>(
-    axes: impl IntoIterator<Item = (&'a AxisTable, &'a Axis)>,
-    diagnostics: &mut Diagnostics,
-) {
-    let mut axes = axes.into_iter();
-    let Some((_, first)) = axes.next() else { return };
-    for (table, axis) in axes {
-        if axis.motor.dc().is_some() != first.motor.dc().is_some() {
+pub(super) fn of_one_kind(actuators: &[(Drive, Actuator)], diagnostics: &mut Diagnostics) {
+    let Some(((_, first), others)) = actuators.split_first() else { return };
+    for (drive, other) in others {
+        if other.motor.dc().is_some() != first.motor.dc().is_some() {
             diagnostics.contradict(
-                table.motor.span,
-                format!("axes `{}` and `{}` have motors of different kinds", first.name, axis.name),
+                drive.table.motor.span,
+                format!(
+                    "axes `{}` and `{}` have motors of different kinds",
+                    first.name, other.name
+                ),
                 "give all axes DC motors, or all of them steppers",
             );
         }

@@ -7,10 +7,11 @@
 use messages::time::CYCLE_TIME;
 use nalgebra::{DMatrix, SMatrix};
 
-use super::axes::Joint;
+use super::axes::{Drive, Joint};
 use super::mechanism::travel_place;
 use super::tables::{AxisTable, MachineTable, PathTable};
-use crate::actuator::{Axis, JointUnit};
+use crate::actuator::Actuator;
+use crate::axis::{Axis, JointUnit};
 use crate::document::{Diagnostics, Span};
 use crate::kinematics::{Joints, Mechanism};
 use crate::mechanisms::spectrum::smallest_eigenvalue;
@@ -72,23 +73,36 @@ struct Standing {
 /// Gives [`Standing`]; `None` where the chain cannot close at home, which is refused elsewhere.
 struct AtHome<'a> {
     joints: &'a [Joint],
-    axes: &'a [Axis],
+    driven: &'a [(Drive, Actuator)],
 }
 
 impl MechanismVisitor for AtHome<'_> {
     type Output = Option<Standing>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let Self { joints, axes } = self;
+        let Self { joints, driven } = self;
         let home = Joints::<N>::from_fn(|row, _| joints.get(row).map_or(0.0, |joint| joint.home));
         let chain = mechanism.solve(&home, mechanism.branch(), None).ok()?;
         let jacobian = mechanism.jacobian(&chain);
         let linear = DMatrix::from_fn(3, N, |row, column| jacobian[(row, column)]);
         let mass = mechanism.mass_matrix(&chain);
+        // The actuators of a joint move together: what each moves of it is added up at the first one's shaft.
+        let side = |joint: usize| {
+            let of = driven.iter().map(|(_, actuator)| actuator).filter(|it| it.axis == joint);
+            let mut of = of.peekable();
+            let ratio = of.peek().map_or(1.0, |first| first.ratio.abs());
+            of.fold((ratio, 0.0, 0.0), |(ratio, rotors, inertia), actuator| {
+                let square = (ratio / actuator.ratio) * (ratio / actuator.ratio);
+                let rotor = actuator.motor.rotor_inertia() * square;
+                (ratio, rotors + rotor, inertia + actuator.gains.inertia * square)
+            })
+        };
+        let sides: [(f64, f64, f64); N] = core::array::from_fn(side);
         let seen = SMatrix::<f64, N, N>::from_fn(|row, column| {
-            let rotor = if row == column { axes[row].motor.rotor_inertia() } else { 0.0 };
-            let inertia = rotor + axes[row].ratio * mass[(row, column)] * axes[column].ratio;
-            inertia / (axes[row].gains.inertia * axes[column].gains.inertia).sqrt()
+            let ((ratio, rotors, own), (other_ratio, _, other)) = (sides[row], sides[column]);
+            let rotor = if row == column { rotors } else { 0.0 };
+            let inertia = rotor + ratio * mass[(row, column)] * other_ratio;
+            inertia / (own * other).sqrt()
         });
         Some(Standing {
             lever: linear.column_iter().map(|column| column.norm()).collect(),
@@ -127,11 +141,12 @@ fn lowest<const N: usize>(
     (square >= 0.0).then(|| square.sqrt())
 }
 
-/// One axis as the file says it and as it was understood.
+/// One actuator as the file says it and as it was understood, with its axis.
 struct Subject<'a> {
     table: &'a AxisTable,
     joint: &'a Joint,
     axis: &'a Axis,
+    actuator: &'a Actuator,
     /// Way of the tool per joint unit [m/m or m/rad].
     lever: f64,
     /// Joint speed per tool speed at home, or anywhere where that is the same.
@@ -143,58 +158,72 @@ struct Subject<'a> {
 }
 
 /// Warns of values of a machine that do not fit each other, and refuses contradictions.
-/// `tables`, `joints` and `axes` belong to each other.
+/// `joints`, `axes` and what is `driven` belong to each other.
 pub(super) fn check(
     table: &MachineTable,
     mechanism: &MechanismKind,
-    tables: &[&AxisTable],
     joints: &[Joint],
     axes: &[Axis],
+    driven: &[(Drive, Actuator)],
     diagnostics: &mut Diagnostics,
 ) {
-    if tables.len() != axes.len() || joints.len() != axes.len() {
+    if joints.len() != axes.len() {
         return;
     }
-    let Some(standing) = mechanism.visit(AtHome { joints, axes }) else { return };
-    for (index, (axis_table, (joint, axis))) in
-        tables.iter().zip(joints.iter().zip(axes)).enumerate()
-    {
-        let worst_speed = joint.worst_speed.max(standing.worst_speed[index]);
+    let Some(standing) = mechanism.visit(AtHome { joints, driven }) else { return };
+    for (index, (drive, actuator)) in driven.iter().enumerate() {
+        let (joint, axis) = (&joints[actuator.axis], &axes[actuator.axis]);
+        if driven[axis.actuators.start..index].iter().any(|(other, _)| is_alike(other, drive)) {
+            continue;
+        }
+        let worst_speed = joint.worst_speed.max(standing.worst_speed[actuator.axis]);
         let subject = Subject {
-            table: axis_table,
+            table: &drive.table,
             joint,
             axis,
-            lever: standing.lever[index],
+            actuator,
+            lever: standing.lever[actuator.axis],
             worst_speed,
-            gravity: standing.gravity[index],
+            gravity: standing.gravity[actuator.axis],
             is_elastic: standing.resonance.is_some(),
         };
         subject.following_error(&table.path, standing.resonance, diagnostics);
         subject.resolution(&table.path, diagnostics);
         subject.speeds(&table.path, diagnostics);
-        subject.lead(table, diagnostics);
+        if index == axis.actuators.start {
+            subject.lead(table, diagnostics);
+        }
         subject.load(diagnostics);
         subject.weight(diagnostics);
-        match &axis.motor {
+        match &actuator.motor {
             Motor::Dc(motor) => subject.dc(motor, &table.path, diagnostics),
             Motor::Stepper(motor) => subject.stepper(motor, diagnostics),
         }
     }
-    loops(tables, axes, &standing, diagnostics);
+    loops(driven, &standing, diagnostics);
+}
+
+/// Whether two actuators of an axis are the same in all that is said of them.
+fn is_alike(one: &Drive, other: &Drive) -> bool {
+    let spans = |drive: &Drive| {
+        let AxisTable { gear, motor, friction, encoder, loops, .. } = &drive.table;
+        let encoder = encoder.as_ref().map(|encoder| encoder.span);
+        (gear.span, motor.span, friction.span, encoder, loops.as_ref().map(|loops| loops.span))
+    };
+    spans(one) == spans(other)
 }
 
 /// Whether the loops are fast enough for the springs, and slow enough for the cycle, where the axes
 /// move each other's loads.
-fn loops(tables: &[&AxisTable], axes: &[Axis], standing: &Standing, diagnostics: &mut Diagnostics) {
-    let Some((table, axis)) = tables
+fn loops(driven: &[(Drive, Actuator)], standing: &Standing, diagnostics: &mut Diagnostics) {
+    let Some((Drive { table, .. }, actuator)) = driven
         .iter()
-        .zip(axes)
-        .filter(|(_, axis)| axis.motor.dc().is_some())
+        .filter(|(_, actuator)| actuator.motor.dc().is_some())
         .max_by(|(_, one), (_, other)| one.gains.velocity.total_cmp(&other.gains.velocity))
     else {
         return;
     };
-    let bandwidth = axis.gains.velocity;
+    let bandwidth = actuator.gains.velocity;
     let span = table.loops.as_ref().map_or(table.span, |loops| loops.velocity.span);
     if let Some(resonance) = standing.resonance
         && resonance < bandwidth
@@ -204,7 +233,7 @@ fn loops(tables: &[&AxisTable], axes: &[Axis], standing: &Standing, diagnostics:
             format!(
                 "axis `{}`: the velocity loop has a bandwidth of {bandwidth:.1} rad/s, and the load on \
                  its springs resonates at {resonance:.1} rad/s: lower the one or stiffen the other",
-                axis.name
+                actuator.name
             ),
         );
     }
@@ -227,13 +256,13 @@ fn loops(tables: &[&AxisTable], axes: &[Axis], standing: &Standing, diagnostics:
 
 impl Subject<'_> {
     fn warn(&self, span: Span, text: &str, diagnostics: &mut Diagnostics) {
-        diagnostics.warn(span, format!("axis `{}`: {text}", self.axis.name));
+        diagnostics.warn(span, format!("axis `{}`: {text}", self.actuator.name));
     }
 
     /// What the loops of position and velocity, without their integral, hold a shaft with
     /// [N·m/rad].
     fn stiffness(&self) -> f64 {
-        self.axis.gains.inertia * self.axis.gains.velocity * self.axis.gains.position
+        self.actuator.gains.inertia * self.actuator.gains.velocity * self.actuator.gains.position
     }
 
     /// The unit of the joint, and of its speed.
@@ -248,12 +277,12 @@ impl Subject<'_> {
         resonance: Option<f64>,
         diagnostics: &mut Diagnostics,
     ) {
-        let Self { table, axis, .. } = self;
+        let Self { table, axis, actuator, .. } = self;
         let limit = axis.limits.following_error;
         let span = table.limits.following_error.map_or(table.limits.span, |declared| declared.span);
         let [unit, ..] = self.units();
-        let count = axis.encoder.resolution() * axis.ratio;
-        let what = counted(&axis.motor);
+        let count = actuator.count();
+        let what = counted(&actuator.motor);
         let line = self.count_line(diagnostics);
         if limit < count {
             diagnostics.contradict(
@@ -306,15 +335,15 @@ impl Subject<'_> {
 
     /// A count of the encoder against the path's tolerance.
     fn resolution(&self, path: &PathTable, diagnostics: &mut Diagnostics) {
-        let Self { table, axis, lever, .. } = self;
-        let count = axis.encoder.resolution() * axis.ratio * lever;
+        let Self { table, lever, actuator, .. } = self;
+        let count = actuator.count() * lever;
         if count > path.tolerance.value {
             let encoder = table.encoder.as_ref().map(|encoder| encoder.resolution.span);
             let stepper = table.motor.stepper.as_ref().map(|stepper| stepper.microsteps.span);
             let text = format!(
                 "one {} moves the tool by {:.3} µm, and the path's tolerance is {:.3} µm{}: give it a \
                  finer encoder or more gear, or the path more tolerance",
-                counted(&axis.motor),
+                counted(&actuator.motor),
                 count * 1e6,
                 path.tolerance.value * 1e6,
                 at_line(path.tolerance.span, diagnostics)
@@ -325,7 +354,7 @@ impl Subject<'_> {
 
     /// What the motor reaches through its gear against what path and limits ask for.
     fn speeds(&self, path: &PathTable, diagnostics: &mut Diagnostics) {
-        let Self { table, axis, worst_speed, .. } = self;
+        let Self { table, axis, worst_speed, actuator, .. } = self;
         let [_, unit, ..] = self.units();
         let speed = if path.speed.value > path.rapid.value { path.speed } else { path.rapid };
         let asked = speed.value * worst_speed;
@@ -342,8 +371,8 @@ impl Subject<'_> {
             self.warn(speed.span, &text, diagnostics);
         }
         let used = table.limits.velocity.map_or(asked, |declared| declared.value).max(asked);
-        let most = axis.motor.largest_speed() * axis.ratio;
-        if axis.motor.dc().is_some() && used > 0.0 && most > LARGEST_SPEED_RESERVE * used {
+        let most = actuator.motor.largest_speed() * actuator.ratio.abs();
+        if actuator.motor.dc().is_some() && used > 0.0 && most > LARGEST_SPEED_RESERVE * used {
             let text = format!(
                 "the motor reaches {most:.3} {unit} through a gear of {}, and path and limits use \
                  {used:.3} {unit}: more gear or less lead would use the motor, and its encoder, better",
@@ -371,12 +400,12 @@ impl Subject<'_> {
 
     /// The load's inertia against the rotor's.
     fn load(&self, diagnostics: &mut Diagnostics) {
-        let Self { table, axis, joint, .. } = self;
-        let rotor = axis.motor.rotor_inertia();
-        if axis.motor.stepper().is_some_and(StepperMotor::is_planar) {
+        let Self { table, joint, actuator, .. } = self;
+        let rotor = actuator.motor.rotor_inertia();
+        if actuator.motor.stepper().is_some_and(StepperMotor::is_planar) {
             return;
         }
-        let load = axis.ratio * axis.ratio * joint.load;
+        let load = actuator.ratio * actuator.ratio * (joint.load * actuator.share);
         let most = LARGEST_LOAD[usize::from(!self.is_elastic)];
         let ratio = load / rotor;
         if ratio > most {
@@ -392,10 +421,10 @@ impl Subject<'_> {
 
     /// What gravity takes against what holds an axis whose motor is unpowered.
     fn weight(&self, diagnostics: &mut Diagnostics) {
-        let Self { table, axis, gravity, .. } = self;
-        let torque = (gravity * axis.ratio).abs();
-        let teeth = axis.motor.stepper().map_or(0.0, |motor| motor.detent_torque);
-        let held = axis.friction.coulomb + axis.brake.torque + teeth;
+        let Self { table, gravity, actuator, .. } = self;
+        let torque = (gravity * actuator.share * actuator.ratio).abs();
+        let teeth = actuator.motor.stepper().map_or(0.0, |motor| motor.detent_torque);
+        let held = actuator.friction.coulomb + actuator.brake.torque + teeth;
         if torque > held {
             let text = format!(
                 "at home gravity turns the motor with {torque:.3e} N·m, and friction and brake hold \
@@ -407,7 +436,7 @@ impl Subject<'_> {
 
     /// What the data of a DC motor say of each other, and of the loops.
     fn dc(&self, motor: &DcMotor, path: &PathTable, diagnostics: &mut Diagnostics) {
-        let Self { table, axis, lever, .. } = self;
+        let Self { table, lever, actuator, .. } = self;
         let Some(data) = &table.motor.dc else { return };
         let DcMotor { resistance, inductance, torque_constant, .. } = *motor;
         let electrical = inductance / resistance;
@@ -421,7 +450,7 @@ impl Subject<'_> {
             );
             self.warn(data.inductance.span, &text, diagnostics);
         }
-        let inertia = axis.gains.inertia;
+        let inertia = actuator.gains.inertia;
         // Behind a spring the rotor swings by itself, and only with the load on the whole.
         let alone = if self.is_elastic { motor.rotor_inertia } else { inertia };
         let unusual = [alone, inertia].into_iter().find(|inertia| {
@@ -439,7 +468,7 @@ impl Subject<'_> {
             );
             self.warn(data.torque_constant.span, &text, diagnostics);
         }
-        let (position, velocity) = (axis.gains.position, axis.gains.velocity);
+        let (position, velocity) = (actuator.gains.position, actuator.gains.velocity);
         if position * LOOP_RATIO > velocity {
             let span = table.loops.as_ref().map_or(table.span, |loops| loops.position.span);
             let text = format!(
@@ -452,13 +481,13 @@ impl Subject<'_> {
             self.warn(span, &text, diagnostics);
         }
         self.friction(motor.stall_torque(), diagnostics);
-        let push = axis.friction.coulomb / self.stiffness() * axis.ratio * lever;
+        let push = actuator.friction.coulomb / self.stiffness() * actuator.ratio.abs() * lever;
         if push > FRICTION_TOLERANCES * path.tolerance.value {
             let text = format!(
                 "a friction of {:.3e} N·m against the {inertia:.3e} kg·m² that the loops are made for{} \
                  pushes the tool off its path by {:.2} mm, {:.0} times the tolerance of {:.3} µm{}: its \
                  feedforward would have to be that exact",
-                axis.friction.coulomb,
+                actuator.friction.coulomb,
                 rotor_line(table, diagnostics),
                 push * 1e3,
                 push / path.tolerance.value,
@@ -471,7 +500,7 @@ impl Subject<'_> {
 
     /// Friction against what the motor gives at standstill [N·m].
     fn friction(&self, stall: f64, diagnostics: &mut Diagnostics) {
-        let coulomb = self.axis.friction.coulomb;
+        let coulomb = self.actuator.friction.coulomb;
         if coulomb > LARGEST_FRICTION * stall {
             let text = format!(
                 "friction takes {coulomb:.3e} N·m of the {stall:.3e} N·m that the motor gives at \
@@ -492,7 +521,7 @@ impl Subject<'_> {
                 format!(
                     "axis `{}`: a detent torque of {detent} N·m is not less than the holding torque of \
                      {holding} N·m{}: the motor could not turn",
-                    self.axis.name,
+                    self.actuator.name,
                     at_line(data.holding_torque.span, diagnostics)
                 ),
                 "a detent torque is about a twentieth of the holding torque",

@@ -119,7 +119,7 @@ table! {
 }
 
 table! {
-    /// One axis: what stands between the voltage and the joint.
+    /// One axis: its joint's limits, and what stands between the voltage and the joint.
     pub struct AxisTable {
         /// Turns of the motor per turn of the screw, pulley or arm.
         pub gear: Number<Positive> = 1.0,
@@ -143,6 +143,32 @@ table! {
         /// Limits beyond those of the path.
         pub limits: LimitsTable,
         /// Bandwidths of the control loops; a stepper has none.
+        pub loops: Option<LoopsTable>,
+        /// Where several motors drive the axis: a table for each, named, in their order. What it leaves
+        /// out is as the axis has it.
+        pub actuator: Option<Named<AxisActuatorTable>>,
+    }
+}
+
+table! {
+    /// One of several motors that drive an axis together, with what is its own; everything else is as the
+    /// axis has it.
+    pub struct AxisActuatorTable {
+        /// Whether the motor is mounted the other way round, so that it turns backwards for a joint that
+        /// moves forwards.
+        pub mirrored: Spanned<bool> = false,
+        /// How far the actuator stands beyond its place, in the joint's travel, when it is at its home
+        /// reference. Enabling takes it back, which squares the axis.
+        pub square: Option<Signed<unit::Travel>>,
+        /// Turns of the motor per turn of the screw, pulley or arm.
+        pub gear: Option<Number<Positive>>,
+        /// The motor: one table, named by its kind.
+        pub motor: Option<MotorTable>,
+        /// Friction, all of it seen at the motor shaft.
+        pub friction: Option<FrictionTable>,
+        /// The encoder on the motor shaft.
+        pub encoder: Option<EncoderTable>,
+        /// Bandwidths of the control loops.
         pub loops: Option<LoopsTable>,
     }
 }
@@ -250,6 +276,9 @@ table! {
         /// Largest difference between setpoint and feedback before the machine stops; 1 mm or
         /// 10 mrad when left out.
         pub following_error: Option<Above<unit::Travel>>,
+        /// Largest distance of two actuators of the axis from each other before the machine stops; the
+        /// following error when left out. Of an axis with several actuators only.
+        pub racking: Option<Above<unit::Travel>>,
     }
 }
 

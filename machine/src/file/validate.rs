@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::axes::{Joint, axis};
+use super::axes::{Drive, Joint, axis};
 use super::bounds::BOUNDS;
 use super::mechanism::{self, Built};
 use super::motors;
@@ -11,7 +11,8 @@ use super::tables::{
     AreaTable, AxisTable, LaserTable, MachineTable, OriginsTable, PathTable, RealtimeTable,
 };
 use super::{unused, warnings};
-use crate::actuator::Axis;
+use crate::actuator::Actuator;
+use crate::axis::Axis;
 use crate::document::{
     Diagnostics, Document, DocumentError, Named, Point, ProblemKind, Span, Spanned, nearest,
 };
@@ -20,7 +21,7 @@ use crate::laser::LaserSource;
 use crate::limits::{PathLimits, StallTolerance, WorkArea};
 use crate::machine::Machine;
 use crate::mechanisms::MechanismKind;
-use messages::Nanoseconds;
+use messages::{MAX_ACTUATORS, Nanoseconds};
 
 pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let (table, mut diagnostics) = document.decode_within::<MachineTable>(BOUNDS)?;
@@ -35,11 +36,13 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let Some(tables) = axes_in_order(&table.axis, &joints, &mut diagnostics) else {
         return diagnostics.fail();
     };
-    let axes = axes(&table, &tables, &joints, &mut diagnostics);
+    let (axes, driven) = axes(&table, &tables, &joints, &mut diagnostics);
     if diagnostics.is_empty() {
-        relations::check(&table, &mechanism, &tables, &joints, &axes, &mut diagnostics);
+        relations::check(&table, &mechanism, &joints, &axes, &driven, &mut diagnostics);
     }
     refuse_rigid_backlash(&mechanism, &table.axis, &mut diagnostics);
+    refuse_rigid_pairs(&mechanism, &table.axis, &mut diagnostics);
+    refuse_many(&table.axis, &driven, &mut diagnostics);
     check_z(&table, &mechanism, &mut diagnostics);
     let laser = laser(&table.laser, &mut diagnostics);
     let stall = stall(&table.realtime, &mut diagnostics);
@@ -49,6 +52,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         name: table.name.value.clone(),
         mechanism,
         axes,
+        actuators: driven.into_iter().map(|(_, actuator)| actuator).collect(),
         area,
         home,
         home_joints: joints.iter().map(|joint| joint.home).collect(),
@@ -74,33 +78,45 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     diagnostics.finish(machine)
 }
 
-/// The axes that `tables` describe, in the order of `joints`; warnings about them and their
-/// transmissions are noted. Those without a sound motor are left out, and noted.
+/// The axes that `tables` describe, in the order of `joints`, and their actuators with what is said of
+/// each; warnings about them and their transmissions are noted. Those without a sound motor are left out,
+/// and noted.
 fn axes(
     table: &MachineTable,
     tables: &[&AxisTable],
     joints: &[Joint],
     diagnostics: &mut Diagnostics,
-) -> Vec<Axis> {
+) -> (Vec<Axis>, Vec<(Drive, Actuator)>) {
     let mut axes = Vec::with_capacity(joints.len());
+    let mut driven = Vec::with_capacity(joints.len());
     for (axis_table, joint) in tables.iter().copied().zip(joints) {
-        let Some(axis) = axis(axis_table, joint, diagnostics) else { continue };
-        if let Some(dc) = &axis_table.motor.dc {
-            warnings::of_motor(joint.name, dc, diagnostics);
+        let before = [axes.len(), driven.len()];
+        let Some((axis, actuators)) = axis(axis_table, joint, before, diagnostics) else {
+            continue;
+        };
+        for (index, (drive, actuator)) in actuators.iter().enumerate() {
+            let is_shared =
+                |(other, _): &(Drive, Actuator)| other.table.motor.span == drive.table.motor.span;
+            if let Some(dc) = &drive.table.motor.dc
+                && !actuators[..index].iter().any(is_shared)
+            {
+                warnings::of_motor(&actuator.name, dc, diagnostics);
+            }
         }
         if axis_table.limits.velocity.is_none() {
             let speeds = [&table.path.speed, &table.path.rapid];
             warnings::of_speeds(speeds, joint, &axis, diagnostics);
         }
         axes.push(axis);
+        driven.extend(actuators);
     }
     if axes.len() == tables.len() {
-        motors::of_one_kind(tables.iter().copied().zip(&axes), diagnostics);
+        motors::of_one_kind(&driven, diagnostics);
     }
     for ratio in mechanism::damping_ratios(table) {
         warnings::of_damping(ratio, diagnostics);
     }
-    axes
+    (axes, driven)
 }
 
 /// That the area has a range of z, and Z moves the focus, only where the mechanism moves in z.
@@ -149,6 +165,51 @@ fn refuse_rigid_backlash(
             );
         }
     }
+}
+
+/// Refuses several motors on a joint with nothing elastic between them: nothing would say what each bears.
+fn refuse_rigid_pairs(
+    mechanism: &MechanismKind,
+    axes: &Named<AxisTable>,
+    diagnostics: &mut Diagnostics,
+) {
+    if mechanism.is_elastic() {
+        return;
+    }
+    for (name, table) in &axes.entries {
+        let Some(actuators) = &table.actuator else { continue };
+        if let [_, (second, _), ..] = actuators.entries.as_slice() {
+            diagnostics.contradict(
+                second.span,
+                format!(
+                    "axis `{}` has {} actuators, and its transmission is rigid: nothing says what \
+                     each of them bears",
+                    name.value,
+                    actuators.entries.len()
+                ),
+                "give its transmission a stiffness: that of all its actuators together",
+            );
+        }
+    }
+}
+
+/// Refuses more actuators than a sample holds.
+fn refuse_many(
+    axes: &Named<AxisTable>,
+    driven: &[(Drive, Actuator)],
+    diagnostics: &mut Diagnostics,
+) {
+    let Some((first, _)) = driven.get(MAX_ACTUATORS) else { return };
+    let named = axes.entries.iter().flat_map(|(axis, table)| {
+        let own = table.actuator.iter().flat_map(|actuators| &actuators.entries);
+        own.map(move |(name, _)| (format!("{}.{}", axis.value, name.value), name.span))
+    });
+    let span = named.filter(|(name, _)| *name == first.name).map(|(_, span)| span).next();
+    diagnostics.contradict(
+        span.unwrap_or(axes.span),
+        format!("the machine has {} actuators", driven.len()),
+        &format!("a machine can have {MAX_ACTUATORS} of them, on all its axes together"),
+    );
 }
 
 /// Refuses delays that no source has: the stream would wait for them.

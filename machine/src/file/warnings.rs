@@ -8,7 +8,7 @@ use core::f64::consts::TAU;
 
 use super::axes::Joint;
 use super::tables::DcMotorTable;
-use crate::actuator::Axis;
+use crate::axis::Axis;
 use crate::document::{self, Diagnostics, Number, Positive, Quantity};
 use crate::machine::Warning;
 use crate::quantity::Speed;

@@ -57,6 +57,8 @@ pub enum FaultQuantity {
     ImpossibleEdges = 24,
     /// How far an axis is from where it is to be held as it is enabled [joint unit].
     HoldDistance = 25,
+    /// Distance of an actuator from the farthest other one of its axis [joint unit].
+    Racking = 26,
 }
 
 /// The unit of a quantity.
@@ -69,7 +71,7 @@ pub enum FaultUnit {
 }
 
 impl FaultQuantity {
-    const ALL: [Self; 26] = [
+    const ALL: [Self; 27] = [
         Self::None,
         Self::FollowingError,
         Self::Position,
@@ -96,6 +98,7 @@ impl FaultQuantity {
         Self::Mechanism,
         Self::ImpossibleEdges,
         Self::HoldDistance,
+        Self::Racking,
     ];
 
     /// The quantity with this number in a sample; an unknown number reads as [`Self::None`].
@@ -133,6 +136,7 @@ impl FaultQuantity {
             Self::Mechanism => ("distance that the mechanism must keep", Plain("")),
             Self::ImpossibleEdges => ("gate edges of an impossible laser cycle", Plain("")),
             Self::HoldDistance => ("distance from where it is to be held", Joint("")),
+            Self::Racking => ("distance of the actuators of the axis", Joint("")),
         }
     }
 }

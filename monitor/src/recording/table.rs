@@ -3,7 +3,7 @@
 
 use super::CycleRecord;
 use crate::trace::lit_share;
-use messages::MAX_AXES;
+use messages::MAX_ACTUATORS;
 use messages::feedback::status;
 use std::io::{self, Write};
 
@@ -11,7 +11,7 @@ use std::io::{self, Write};
 ///
 /// `cycle` counts from the start of drives; `stream_time` [s], `rate` and `stroke` are the
 /// command's. `lit` is the share of the time since the record before in which the laser marked, 0..=1; `tool_x`,
-/// `tool_y`, `tool_z` and `planned_…` are places in the machine frame [m]. Then per axis reference
+/// `tool_y`, `tool_z` and `planned_…` are places in the machine frame [m]. Then per actuator reference
 /// and position at the motor [rad], current measured [A] and voltage commanded, in volts.
 ///
 /// What was not known is an empty field: the command's in a cycle that the controller did not
@@ -19,23 +19,23 @@ use std::io::{self, Write};
 #[derive(Debug)]
 pub struct TableWriter<W: Write> {
     writer: W,
-    axes: usize,
+    actuators: usize,
 }
 
 impl<W: Write> TableWriter<W> {
-    /// Writes the column names to `writer`, which should be buffered. `axes` are the names of the
-    /// machine's axes; those beyond [`MAX_AXES`], which samples do not carry, are left out.
+    /// Writes the column names to `writer`, which should be buffered. `actuators` are the names of the
+    /// machine's actuators; those beyond [`MAX_ACTUATORS`], which samples do not carry, are left out.
     ///
     /// # Errors
     /// Whatever the writer reports.
-    pub fn new(mut writer: W, axes: &[String]) -> io::Result<Self> {
+    pub fn new(mut writer: W, actuators: &[String]) -> io::Result<Self> {
         write!(writer, "cycle,stream_time,rate,stroke,lit,tool_x,tool_y,tool_z")?;
         write!(writer, ",planned_x,planned_y,planned_z")?;
-        for axis in axes.iter().take(MAX_AXES) {
-            write!(writer, ",{axis}_reference,{axis}_position,{axis}_current,{axis}_voltage")?;
+        for name in actuators.iter().take(MAX_ACTUATORS) {
+            write!(writer, ",{name}_reference,{name}_position,{name}_current,{name}_voltage")?;
         }
         writeln!(writer)?;
-        Ok(Self { writer, axes: axes.len().min(MAX_AXES) })
+        Ok(Self { writer, actuators: actuators.len().min(MAX_ACTUATORS) })
     }
 
     /// Appends a record.
@@ -61,7 +61,7 @@ impl<W: Write> TableWriter<W> {
             .iter()
             .zip(&feedback.position)
             .zip(feedback.current.iter().zip(&command.voltage));
-        for ((reference, position), (current, voltage)) in columns.take(self.axes) {
+        for ((reference, position), (current, voltage)) in columns.take(self.actuators) {
             self.field(answered, reference)?;
             self.field(true, position)?;
             self.field(true, current)?;

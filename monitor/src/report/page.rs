@@ -7,7 +7,7 @@ use crate::latency::HopLatency;
 use crate::summary::text::{latency, rows};
 use crate::trace::envelope::Envelope;
 use messages::hop::Hop;
-use messages::{AxisArray, math};
+use messages::{ActuatorArray, math};
 use plotters::style::RGBColor;
 use std::fmt::Write;
 
@@ -40,7 +40,7 @@ impl Report<'_> {
             put(section("Deviation, magnified", &figure(picture, &note)));
         }
         put(section("Tool", &self.tool_charts()?));
-        put(section("Axes", &self.axis_charts()?));
+        put(section("Axes", &self.motor_charts()?));
         if self.histograms.named().any(|(_, histogram)| !histogram.is_empty()) {
             put(section("Latency", &self.latency_charts()?));
         }
@@ -86,16 +86,16 @@ impl Report<'_> {
             + &figure(gate.draw()?, "Laser: power while the gate was open, 0 in the dark."))
     }
 
-    fn axis_charts(&self) -> Result<String, PictureError> {
+    fn motor_charts(&self) -> Result<String, PictureError> {
         let trace = self.trace;
-        let gains = |values: &[f64]| -> AxisArray {
-            let mut array = [1e3; messages::MAX_AXES];
+        let gains = |values: &[f64]| -> ActuatorArray {
+            let mut array = [1e3; messages::MAX_ACTUATORS];
             array.iter_mut().zip(values).for_each(|(to, from)| *to = 1e3 * from);
             array
         };
-        let following = self.per_axis(&trace.following_error, &gains(&[]));
-        let torque = self.per_axis(&trace.current, &gains(self.torque_constants));
-        let voltage = self.per_axis(&trace.voltage, &[1.0; messages::MAX_AXES]);
+        let following = self.per_actuator(&trace.following_error, &gains(&[]));
+        let torque = self.per_actuator(&trace.current, &gains(self.torque_constants));
+        let voltage = self.per_actuator(&trace.voltage, &[1.0; messages::MAX_ACTUATORS]);
         Ok([
             ("following error [mrad]", following, "Reference minus feedback, at the motor."),
             (
@@ -111,8 +111,8 @@ impl Report<'_> {
         .concat())
     }
 
-    fn per_axis(&self, envelopes: &[Envelope], scales: &AxisArray) -> Vec<Curve> {
-        (self.summary.machine.axes.iter().zip(envelopes).zip(scales).enumerate())
+    fn per_actuator(&self, envelopes: &[Envelope], scales: &ActuatorArray) -> Vec<Curve> {
+        (self.summary.machine.actuators.iter().zip(envelopes).zip(scales).enumerate())
             .map(|(index, ((name, envelope), scale))| curve(name, colour(index), envelope, *scale))
             .collect()
     }

@@ -110,6 +110,7 @@ fn the_page_shows_the_run_and_needs_no_network() {
         name: "sample <machine>".into(),
         mechanism: "corexy".into(),
         axes: vec!["a".into(), "b".into()],
+        actuators: vec!["a".into(), "b".into()],
     };
     let job = JobSummary { name: "circle & cross".into(), strokes: 2, length: artwork.length() };
     let mut summary = Summary::new(Outcome::Completed, job, machine);

@@ -1,7 +1,7 @@
 //! A fault in words: what was found, with its quantity and unit, and the limit that it broke.
 
 use super::StallSummary;
-use machine::{Axis, JointUnit};
+use machine::{JointUnit, Machine};
 use messages::fault::FaultUnit;
 use messages::time::CYCLE_TIME;
 use messages::{Fault, FaultCode, FaultQuantity};
@@ -13,20 +13,24 @@ use serde::{Deserialize, Serialize};
 pub struct FaultSummary {
     /// The code, such as `following_error`.
     pub code: String,
-    /// The axis by name; null when it belongs to none.
+    /// The axis by name, or the actuator where an axis has several; null when it belongs to none.
     pub axis: Option<String>,
     /// What was found, with value, unit and limit.
     pub detail: String,
 }
 
 impl FaultSummary {
-    /// The summary of a fault of a machine with these axes; `None` when there is none.
-    pub fn of(fault: &Fault, axes: &[Axis]) -> Option<Self> {
-        let axis = (fault.axis as usize).checked_sub(1).and_then(|index| axes.get(index));
+    /// The summary of a fault of `machine`; `None` when there is none.
+    pub fn of(fault: &Fault, machine: &Machine) -> Option<Self> {
+        let index = |number: u16| usize::from(number).checked_sub(1);
+        let axis = index(fault.axis).and_then(|index| machine.axes.get(index));
+        let actuator = index(fault.actuator).and_then(|index| machine.actuators.get(index));
+        let driven = actuator.and_then(|actuator| machine.axes.get(actuator.axis));
+        let name = actuator.map(|it| &it.name).or(axis.map(|it| &it.name));
         fault.is_some().then(|| Self {
             code: fault.code().name().to_owned(),
-            axis: axis.map(|axis| axis.name.clone()),
-            detail: detail(fault, axis.map(|axis| axis.unit)),
+            axis: name.cloned(),
+            detail: detail(fault, driven.or(axis).map(|axis| axis.unit)),
         })
     }
 
@@ -107,17 +111,16 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use FaultQuantity as Quantity;
-    use machine::Machine;
 
     /// A CoreXY, whose joints are belts, with the second made to turn.
-    fn axes() -> Vec<Axis> {
-        let mut axes = Machine::builtin().axes;
-        axes[1].unit = JointUnit::Angle;
-        axes
+    fn machine() -> Machine {
+        let mut machine = Machine::builtin();
+        machine.axes[1].unit = JointUnit::Angle;
+        machine
     }
 
     fn check(fault: Fault, expect: &str) {
-        let summary = FaultSummary::of(&fault, &axes()).unwrap();
+        let summary = FaultSummary::of(&fault, &machine()).unwrap();
         assert_eq!(summary.detail, expect);
         assert_eq!(summary.code, fault.code().name());
     }
@@ -125,10 +128,11 @@ mod tests {
     #[test]
     fn quantity_and_unit_are_those_of_the_fault_and_the_axis() {
         let error = Fault::new(FaultCode::FollowingError);
-        let found = |axis, value| error.on(axis).beyond(Quantity::FollowingError, value, 2e-3);
+        let found =
+            |axis, value| error.on_actuator(axis).beyond(Quantity::FollowingError, value, 2e-3);
         check(found(0, 2.1e-3), "following error 2.1000 mm, limit 2.0000 mm");
         check(found(1, 0.0125), "following error 0.012500 rad, limit 0.002000 rad");
-        let planned = Fault::new(FaultCode::SetpointLimit).on(0);
+        let planned = Fault::new(FaultCode::SetpointLimit).on_axis(0);
         check(
             planned.beyond(Quantity::Velocity, 0.3, 0.25),
             "velocity 0.300000 m/s, limit 0.250000 m/s",
@@ -153,7 +157,7 @@ mod tests {
 
     #[test]
     fn a_limit_of_zero_is_a_limit() {
-        let fault = Fault::new(FaultCode::PositionLimit).on(0);
+        let fault = Fault::new(FaultCode::PositionLimit).on_axis(0);
         let expect = "position -1.5000 mm, limit 0.0000 mm";
         check(fault.beyond(Quantity::Position, -1.5e-3, 0.0), expect);
     }
@@ -166,9 +170,9 @@ mod tests {
         check(stale(0.0), "feedback did not go on");
         check(stale(1.0), "feedback came of another run of drives");
         check(stale(4.0), "cycles gone by 4 (4 ms), limit 3 (3 ms)");
-        let number = Fault::new(FaultCode::NotFinite).on(0).with(Quantity::Number, f64::NAN);
+        let number = Fault::new(FaultCode::NotFinite).on_axis(0).with(Quantity::Number, f64::NAN);
         check(number, "number in a sample NaN");
-        assert_eq!(FaultSummary::of(&Fault::default(), &axes()), None);
+        assert_eq!(FaultSummary::of(&Fault::default(), &machine()), None);
     }
 
     #[test]
@@ -177,7 +181,7 @@ mod tests {
         let stalls =
             StallSummary { count: 1, longest: 31e-3, longest_causes: causes, ..Default::default() };
         let told = |fault: Fault, stalls: &StallSummary| {
-            let mut summary = FaultSummary::of(&fault, &axes()).unwrap();
+            let mut summary = FaultSummary::of(&fault, &machine()).unwrap();
             summary.blame(stalls);
             summary.detail
         };
@@ -194,9 +198,9 @@ mod tests {
     fn a_fault_names_its_axis() {
         let on = |axis| {
             let fault = Fault { axis, ..Fault::new(FaultCode::FollowingError) };
-            FaultSummary::of(&fault, &axes()).unwrap().axis
+            FaultSummary::of(&fault, &machine()).unwrap().axis
         };
-        assert_eq!(on(2), Some(axes()[1].name.clone()));
+        assert_eq!(on(2), Some(machine().axes[1].name.clone()));
         assert_eq!((on(0), on(8)), (None, None));
     }
 }

@@ -76,7 +76,12 @@ impl Rows {
         let marked = length(job.length);
         self.add("job", format!("{}, {} strokes, {marked}", job.name, job.strokes));
         let axes = machine.axes.join(", ");
-        self.add("machine", format!("{} ({}), axes {axes}", machine.name, machine.mechanism));
+        let actuators = match &machine.actuators {
+            alone if *alone == machine.axes || alone.is_empty() => String::new(),
+            several => format!(", actuators {}", several.join(", ")),
+        };
+        let what = format!("{} ({}), axes {axes}{actuators}", machine.name, machine.mechanism);
+        self.add("machine", what);
     }
 
     fn times(&mut self, summary: &Summary) {

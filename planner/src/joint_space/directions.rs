@@ -4,7 +4,7 @@
 //! follow a flight says what is missing.
 
 use machine::kinematics::{Joints, KinematicsError, Pose, ToolMotion};
-use machine::{Axis, Machine, Mechanism, MechanismVisitor, Motor, PathLimits};
+use machine::{Actuator, Axis, Machine, Mechanism, MechanismVisitor, Motor, PathLimits};
 use nalgebra::{SMatrix, Vector3};
 
 use crate::geometry::attitude::AttitudeLaw;
@@ -46,11 +46,15 @@ pub(crate) fn directions<const N: usize, M: Mechanism<N>>(
     for (index, axis) in limits.axes.iter().enumerate().take(N) {
         let (share, parts) = (&shares.axes[index], &parts[index]);
         let joint: Vector3<f64> = rates.row(index).transpose();
-        found.extend(joint_direction(axis, &joint, share, parts));
-        let rotor = axis.motor.rotor_inertia() / axis.ratio;
-        let shaft = joint * rotor + loads.row(index).transpose() * axis.ratio;
-        let held = axis.ratio * gravity[index].abs() + axis.friction.coulomb;
-        found.extend(motor_direction(axis, &shaft, held, share, parts));
+        let actuators = axis.driven_by(limits.actuators);
+        found.extend(joint_direction(axis, actuators, &joint, share, parts));
+        for actuator in actuators {
+            let (ratio, part) = (actuator.ratio, actuator.share);
+            let rotor = actuator.motor.rotor_inertia() / ratio;
+            let shaft = joint * rotor + loads.row(index).transpose() * (part * ratio);
+            let held = ratio.abs() * (part * gravity[index].abs()) + actuator.friction.coulomb;
+            found.extend(motor_direction(actuator, &shaft, held, share, parts));
+        }
     }
     Ok(found)
 }
@@ -58,6 +62,7 @@ pub(crate) fn directions<const N: usize, M: Mechanism<N>>(
 /// |q̇|, |q̈| and |q⃛| of a joint that goes `joint` as fast as the tool.
 fn joint_direction(
     axis: &Axis,
+    actuators: &[Actuator],
     joint: &Vector3<f64>,
     share: &AxisShares,
     parts: &[f64; JointLimit::COUNT],
@@ -66,8 +71,9 @@ fn joint_direction(
     let direction = joint.try_normalize(f64::MIN_POSITIVE)?;
     let mut velocity =
         parts[JointLimit::Velocity as usize] * share.velocity * axis.velocity_limit().plan;
-    if let Motor::Stepper(motor) = &axis.motor {
-        let most = motor.pulse_rate / motor.pulses_per_radian() * axis.ratio;
+    for actuator in actuators {
+        let Motor::Stepper(motor) = &actuator.motor else { continue };
+        let most = motor.pulse_rate / motor.pulses_per_radian() * actuator.ratio.abs();
         velocity = velocity.min(parts[JointLimit::Voltage as usize] * share.velocity * most);
     }
     let acceleration = parts[JointLimit::Acceleration as usize]
@@ -85,7 +91,7 @@ fn joint_direction(
 /// The torque of a motor whose shaft is loaded by `shaft` per acceleration of the tool [kg·m] beside
 /// `held` [N·m]; and of a DC motor the voltage, as if it were all for the current or all for its change.
 fn motor_direction(
-    axis: &Axis,
+    actuator: &Actuator,
     shaft: &Vector3<f64>,
     held: f64,
     share: &AxisShares,
@@ -96,7 +102,7 @@ fn motor_direction(
     let left = |torque: f64| (torque - held).max(LEAST * torque);
     let [by_torque, by_voltage] =
         [JointLimit::Torque, JointLimit::Voltage].map(|limit| parts[limit as usize]);
-    let (torque, rate) = match &axis.motor {
+    let (torque, rate) = match &actuator.motor {
         Motor::Dc(motor) => {
             let current = share.torque * motor.current_limit().plan * motor.torque_constant;
             let voltage = share.voltage * motor.voltage_limit().plan * motor.torque_constant;
@@ -159,7 +165,7 @@ impl MechanismVisitor for Near<'_> {
             return Ok(Vec::new());
         }
         let home = Joints::<N>::from_fn(|axis, _| machine.home_joints[axis]);
-        let limits = MotionLimits::new(&mechanism, &machine.axes, path, &home, attitude, scope);
+        let limits = MotionLimits::new(&mechanism, machine, path, &home, attitude, scope);
         let tool = attitude.apply(&ToolMotion::rest(&Pose::at(place)))?;
         let joints = mechanism.inverse(&tool.pose(), limits.branches[0], &home)?;
         let near = Configuration { joints, branch: 0 };

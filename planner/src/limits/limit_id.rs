@@ -1,6 +1,6 @@
 //! Which limit a row of the time law is.
 
-use machine::Axis;
+use machine::Machine;
 use messages::plan::Binding;
 
 use crate::verify::checker::Quantity;
@@ -86,7 +86,7 @@ impl LimitId {
     }
 
     /// What a person reads, with the name of the axis.
-    pub(crate) fn describe(self, axes: &[Axis]) -> (String, Option<String>) {
+    pub(crate) fn describe(self, machine: &Machine) -> (String, Option<String>) {
         let Some((axis, limit)) = self.joint_limit() else {
             let name = match self {
                 Self::FEED => Binding::SPEED_ASKED_FOR,
@@ -98,8 +98,9 @@ impl LimitId {
             };
             return (name.to_owned(), None);
         };
-        let axis = axes.get(axis);
-        let is_stepper = axis.is_some_and(|axis| axis.motor.stepper().is_some());
+        let axis = machine.axes.get(axis);
+        let motors = axis.map(|axis| axis.driven_by(&machine.actuators)).unwrap_or_default();
+        let is_stepper = motors.iter().any(|actuator| actuator.motor.stepper().is_some());
         let quantity = match (limit, is_stepper) {
             (JointLimit::Velocity, _) => Quantity::JointVelocity,
             (JointLimit::Acceleration, _) => Quantity::JointAcceleration,
@@ -151,13 +152,13 @@ impl BindingTimes {
     }
 
     /// The shares of all time, the largest first.
-    pub(crate) fn report(&self, axes: &[Axis]) -> Vec<Binding> {
+    pub(crate) fn report(&self, machine: &Machine) -> Vec<Binding> {
         let all: f64 = self.found.values().map(|share| share.time).sum();
         let mut report: Vec<Binding> = self
             .found
             .iter()
             .map(|(source, share)| {
-                let (limit, axis) = source.describe(axes);
+                let (limit, axis) = source.describe(machine);
                 Binding {
                     limit,
                     axis,

@@ -1,7 +1,7 @@
 //! The limits at one place of a path, as rows of the time law: tool, joints and motors.
 
-use machine::Mechanism;
 use machine::kinematics::{JointMotion, KinematicsError, ToolMotion};
+use machine::{Actuator, Mechanism};
 use messages::math;
 use nalgebra::Vector3;
 
@@ -168,9 +168,15 @@ impl<const N: usize, M: Mechanism<N>> MotionLimits<'_, N, M> {
         let loads = [mass * motion.velocity, mass * motion.acceleration, mass * motion.jerk];
         // What of the effort goes with the square of the speed beside the joints' own acceleration.
         let turning = mechanism.bias(state, &motion.velocity) - gravity;
-        for (index, axis) in self.axes.iter().enumerate().take(N) {
-            let rotor = axis.motor.rotor_inertia() / axis.ratio;
-            let shaft = |joint: f64, load: f64| rotor * joint + axis.ratio * load;
+        for (number, actuator) in self.actuators.iter().enumerate() {
+            let Actuator { axis: index, ratio, share, .. } = *actuator;
+            // What one is asked for, all that are like it bear.
+            let first = self.axes[index].actuators.start;
+            if self.actuators[first..number].iter().any(|other| actuator.is_like(other)) {
+                continue;
+            }
+            let rotor = actuator.motor.rotor_inertia() / ratio;
+            let shaft = |joint: f64, load: f64| rotor * joint + ratio * (share * load);
             let [w1, w2, w3] = [
                 shaft(motion.velocity[index], loads[0][index]),
                 shaft(motion.acceleration[index], loads[1][index]),
@@ -179,18 +185,19 @@ impl<const N: usize, M: Mechanism<N>> MotionLimits<'_, N, M> {
             let motion = AxisMotion {
                 velocity: motion.velocity[index],
                 inertia: w1,
-                turning: w2 + axis.ratio * turning[index],
+                turning: w2 + ratio * (share * turning[index]),
                 rate: [w1, 3.0 * w2, w3],
-                gravity: axis.ratio * gravity[index],
+                gravity: ratio * (share * gravity[index]),
             };
-            let speed = motor_rows(axis, index, &motion, &shares.axes[index], local.speed, rows)
-                .map_err(|Overload { needed, limit }| KinematicsError {
-                    code: "overload",
-                    axis: Some(index),
-                    value: needed,
-                    limit,
-                    detail: "the motor's torque in N·m cannot hold the load here",
-                })?;
+            let speed =
+                motor_rows(actuator, index, &motion, &shares.axes[index], local.speed, rows)
+                    .map_err(|Overload { needed, limit }| KinematicsError {
+                        code: "overload",
+                        axis: Some(index),
+                        value: needed,
+                        limit,
+                        detail: "the motor's torque in N·m cannot hold the load here",
+                    })?;
             local.cap(speed, LimitId::voltage(index));
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! One machine's mechanism, axes and path, asked about one motion after the other.
 
 use machine::kinematics::{JointMotion, Joints, KinematicsError, ToolMotion};
-use machine::{Axis, Mechanism, Motor, PathLimits};
+use machine::{Actuator, Axis, Machine, Mechanism, Motor, PathLimits};
 
 use crate::geometry::attitude::AttitudeLaw;
 use crate::joint_space::configuration;
@@ -20,6 +20,7 @@ pub(crate) enum Scope {
 pub(crate) struct MotionLimits<'a, const N: usize, M: Mechanism<N>> {
     pub(crate) mechanism: &'a M,
     pub(crate) axes: &'a [Axis],
+    pub(crate) actuators: &'a [Actuator],
     pub(crate) path: PathLimits,
     pub(crate) branches: Vec<M::Branch>,
     pub(crate) attitude: AttitudeLaw,
@@ -29,17 +30,19 @@ pub(crate) struct MotionLimits<'a, const N: usize, M: Mechanism<N>> {
 }
 
 impl<'a, const N: usize, M: Mechanism<N>> MotionLimits<'a, N, M> {
-    /// For a machine whose joints stand near `near`.
+    /// For `machine`, whose joints stand near `near`.
     pub(crate) fn new(
         mechanism: &'a M,
-        axes: &'a [Axis],
+        machine: &'a Machine,
         path: PathLimits,
         near: &Joints<N>,
         attitude: AttitudeLaw,
         scope: Scope,
     ) -> Self {
         let branches = configuration::branches(mechanism, near);
-        Self { mechanism, axes, path, branches, attitude, scope, lowest: f64::NEG_INFINITY }
+        let Machine { axes, actuators, .. } = machine;
+        let lowest = f64::NEG_INFINITY;
+        Self { mechanism, axes, actuators, path, branches, attitude, scope, lowest }
     }
 
     /// The joints' motion for `tool`, turned as the job asks, continuous with `previous`.

@@ -9,7 +9,7 @@
 //! and a DC motor's voltage `R·i + L·i′ + k·ω` with `i = τ/k` adds the third order, in which the mass
 //! matrix is taken to be constant. What that leaves out, the check of the samples finds.
 
-use machine::{Axis, DcMotor, Motor, StepperMotor};
+use machine::{Actuator, DcMotor, Motor, StepperMotor};
 
 use crate::law::row::Row;
 use crate::limits::limit_id::LimitId;
@@ -19,10 +19,10 @@ use crate::limits::tightening::AxisShares;
 /// everything else leaves: torque falls ever more slowly, so a tangent lies below it.
 const TANGENT: f64 = 0.8;
 
-/// What one axis does along a path, by derivatives of its parameter.
+/// What one actuator does along a path, by derivatives of its parameter.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AxisMotion {
-    /// q′, with its sign.
+    /// q′ of its joint, with its sign.
     pub(crate) velocity: f64,
     /// Torque at the shaft per ü, per u̇² and, for the third order, the weights of u̇·ü′, u̇·ü and
     /// u̇·u̇² [N·m].
@@ -41,16 +41,16 @@ pub(crate) struct Overload {
 }
 
 /// Friction at the shaft while the path is followed: with the motion, and per unit of u̇.
-fn friction(axis: &Axis, motion: &AxisMotion) -> [f64; 2] {
-    let turns = motion.velocity / axis.ratio;
+fn friction(actuator: &Actuator, motion: &AxisMotion) -> [f64; 2] {
+    let turns = motion.velocity / actuator.ratio;
     let side = if turns == 0.0 { 0.0 } else { turns.signum() };
-    [axis.friction.coulomb * side, axis.friction.viscous * turns]
+    [actuator.friction.coulomb * side, actuator.friction.viscous * turns]
 }
 
-/// Appends the rows of the motor of `axis`, the `index`th, and gives the largest u̇ that it has
+/// Appends the rows of the motor of `actuator`, which drives the `index`th axis, and gives the largest u̇ that it has
 /// [m/s]. `speed` is what everything else leaves.
 pub(crate) fn motor_rows(
-    axis: &Axis,
+    actuator: &Actuator,
     index: usize,
     motion: &AxisMotion,
     shares: &AxisShares,
@@ -58,18 +58,18 @@ pub(crate) fn motor_rows(
     rows: &mut Vec<Row>,
 ) -> Result<f64, Overload> {
     let torque = LimitId::torque(index).0;
-    match &axis.motor {
+    match &actuator.motor {
         Motor::Dc(motor) => {
             let most = motor.current_limit().plan * motor.torque_constant;
-            torque_rows(axis, motion, [most, 0.0], shares.torque, torque, rows)?;
-            voltage_rows(axis, motor, motion, shares, LimitId::voltage(index).0, rows);
+            torque_rows(actuator, motion, [most, 0.0], shares.torque, torque, rows)?;
+            voltage_rows(actuator, motor, motion, shares, LimitId::voltage(index).0, rows);
             Ok(f64::INFINITY)
         }
         Motor::Stepper(motor) => {
-            let turns = (motion.velocity / axis.ratio).abs();
+            let turns = (motion.velocity / actuator.ratio).abs();
             let most = shares.velocity * motor.pulse_rate / (motor.pulses_per_radian() * turns);
             let line = tangent(motor, turns, TANGENT * speed.min(most));
-            torque_rows(axis, motion, line, shares.torque, torque, rows)?;
+            torque_rows(actuator, motion, line, shares.torque, torque, rows)?;
             Ok(most)
         }
     }
@@ -92,7 +92,7 @@ fn tangent(motor: &StepperMotor, turns: f64, speed: f64) -> [f64; 2] {
 /// τ within ±`share`·(`most[0]` + `most[1]`·u̇). Where that is less than the load needs at rest, a tenth of the
 /// torque beyond the load is left: enough for slow motion.
 fn torque_rows(
-    axis: &Axis,
+    actuator: &Actuator,
     motion: &AxisMotion,
     most: [f64; 2],
     share: f64,
@@ -101,7 +101,7 @@ fn torque_rows(
 ) -> Result<(), Overload> {
     /// Part of what is left beside the load.
     const LEAST: f64 = 0.1;
-    let [coulomb, viscous] = friction(axis, motion);
+    let [coulomb, viscous] = friction(actuator, motion);
     for sign in [1.0, -1.0] {
         let held = sign * (motion.gravity + coulomb);
         if most[0] <= held {
@@ -121,18 +121,18 @@ fn torque_rows(
 }
 
 fn voltage_rows(
-    axis: &Axis,
+    actuator: &Actuator,
     motor: &DcMotor,
     motion: &AxisMotion,
     shares: &AxisShares,
     limit: u16,
     rows: &mut Vec<Row>,
 ) {
-    let [coulomb, viscous] = friction(axis, motion);
+    let [coulomb, viscous] = friction(actuator, motion);
     let by_torque = motor.resistance / motor.torque_constant;
     let by_rate = motor.inductance / motor.torque_constant;
     let most = shares.voltage * motor.voltage_limit().plan;
-    let back = motor.torque_constant * motion.velocity / axis.ratio + by_torque * viscous;
+    let back = motor.torque_constant * motion.velocity / actuator.ratio + by_torque * viscous;
     for sign in [1.0, -1.0] {
         rows.push(Row {
             base: [0.0, sign * by_torque * motion.inertia, sign * by_torque * motion.turning],

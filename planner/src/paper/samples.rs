@@ -2,7 +2,7 @@
 //! do not bend.
 
 use machine::kinematics::{Joints, KinematicsError};
-use machine::{Machine, Mechanism, MechanismVisitor};
+use machine::{Actuator, Machine, Mechanism, MechanismVisitor};
 use messages::Setpoint;
 use messages::setpoint::flags;
 use messages::time::CYCLE_TIME;
@@ -72,13 +72,16 @@ impl<'a> MechanismVisitor for Sampling<'a> {
             setpoint.path_velocity = tool.velocity.norm();
             setpoint.path_acceleration = tool.acceleration.norm();
             setpoint.path_jerk = tool.jerk.norm();
-            for (axis, of) in machine.axes.iter().enumerate().take(N) {
+            for axis in 0..N {
                 setpoint.position[axis] = motion.position[axis];
                 setpoint.velocity[axis] = motion.velocity[axis];
                 setpoint.acceleration[axis] = motion.acceleration[axis];
                 setpoint.jerk[axis] = motion.jerk[axis];
-                setpoint.effort[axis] = of.ratio * effort[axis]
-                    + of.motor.rotor_inertia() * motion.acceleration[axis] / of.ratio;
+            }
+            for (number, of) in machine.actuators.iter().enumerate() {
+                let Actuator { axis, ratio, share, .. } = *of;
+                setpoint.effort[number] = ratio * (share * effort[axis])
+                    + of.motor.rotor_inertia() * motion.acceleration[axis] / ratio;
             }
             setpoint.laser.gate =
                 if is_lit { u32::try_from(stroke.max(1)).unwrap_or(u32::MAX) } else { 0 };

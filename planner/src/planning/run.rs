@@ -114,7 +114,7 @@ impl Facts<'_> {
             notes,
             uses: planning.utilization().clone(),
             interpolation: planning.interpolation(),
-            binding: account.shares.report(&planning.task.machine.axes),
+            binding: account.shares.report(planning.task.machine),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! How a window that breaks a limit is planned again.
 
-use machine::Axis;
+use machine::{Actuator, Axis};
 
 use crate::error::PlanError;
 use crate::limits::tightening::Tightening;
@@ -46,7 +46,12 @@ impl Trials {
     }
 
     /// Leaves less of what was broken. Says whether that is worth another trial.
-    pub(super) fn tighten(&mut self, violation: &LimitViolation, axes: &[Axis]) -> bool {
+    pub(super) fn tighten(
+        &mut self,
+        violation: &LimitViolation,
+        axes: &[Axis],
+        actuators: &[Actuator],
+    ) -> bool {
         let is_heat = violation.quantity == Quantity::HeatingCurrent;
         self.count += if is_heat { HEAT } else { 1 };
         if self.count > TIGHTER + SLOWER || violation.quantity.is_place() {
@@ -55,10 +60,11 @@ impl Trials {
         if self.count > TIGHTER || is_heat {
             self.slow();
         } else {
-            let index = violation
-                .axis
-                .as_ref()
-                .and_then(|name| axes.iter().position(|axis| axis.name == *name));
+            let index = violation.axis.as_ref().and_then(|name| {
+                let driven = || actuators.iter().find(|actuator| actuator.name == *name);
+                let axis = axes.iter().position(|axis| axis.name == *name);
+                axis.or_else(|| driven().map(|actuator| actuator.axis))
+            });
             self.shares.tighten(violation, index);
         }
         true

@@ -10,9 +10,9 @@
 //! load between them may lean on the other flank than the motor stands for.
 
 use crate::limits::motion_limits::torque_and_slew;
-use machine::Axis;
 use machine::kinematics::Joints;
 use machine::transmission::equilibrium;
+use machine::{Actuator, Axis};
 use messages::math;
 use messages::time::CYCLE_TIME;
 
@@ -29,6 +29,8 @@ const SHARES: [f64; 2] = [0.2, 0.25];
 pub(crate) struct BacklashCompensation<const N: usize> {
     /// Half of each backlash, 0 for none [joint units].
     half: Joints<N>,
+    /// Index of the actuator of each: one with a gap has no other.
+    actuator: [usize; N],
     /// ω of each crossing [rad/s], and what a step leaves of the way, `e^(−ω·step)`.
     rate: Joints<N>,
     decay: Joints<N>,
@@ -40,22 +42,29 @@ pub(crate) struct BacklashCompensation<const N: usize> {
 }
 
 impl<const N: usize> BacklashCompensation<N> {
-    /// The motors of `axes` at rest under `effort` [N or N·m], to be advanced by steps of `step` [s].
-    pub(crate) fn new(axes: &[Axis], effort: &Joints<N>, step: f64) -> Self {
+    /// The motors that drive `axes` at rest under `effort` [N or N·m], to be advanced by steps of `step` [s].
+    pub(crate) fn new(
+        axes: &[Axis],
+        actuators: &[Actuator],
+        effort: &Joints<N>,
+        step: f64,
+    ) -> Self {
+        let actuator = core::array::from_fn(|index| axes[index].actuators.start);
         let half = Joints::from_fn(|index, _| axes[index].backlash / 2.0);
         let rate = Joints::from_fn(|index, _| {
-            let axis = &axes[index];
-            let [torque, slew] = torque_and_slew(&axis.motor);
+            let drive = &actuators[actuator[index]];
+            let [torque, slew] = torque_and_slew(&drive.motor);
             let torque = (SHARES[0] * torque).min(SHARES[1] * slew * CYCLE_TIME);
             // A step of the whole backlash b starts with an acceleration of b·ω².
-            let acceleration = torque / axis.motor.rotor_inertia() * axis.ratio;
-            (acceleration / axis.backlash).sqrt().min(FASTEST)
+            let acceleration = torque / drive.motor.rotor_inertia() * drive.ratio.abs();
+            (acceleration / axes[index].backlash).sqrt().min(FASTEST)
         });
         let value = Joints::from_fn(|index, _| {
-            equilibrium::side(&axes[index], effort[index]) * half[index]
+            equilibrium::side(&actuators[actuator[index]], effort[index]) * half[index]
         });
         Self {
             half,
+            actuator,
             rate,
             decay: rate.map(|rate| math::exp(-rate * step)),
             step,
@@ -67,12 +76,12 @@ impl<const N: usize> BacklashCompensation<N> {
 
     /// Goes on by one step to an instant with `effort` on the joints [N or N·m], moving or not.
     #[inline]
-    pub(crate) fn advance(&mut self, axes: &[Axis], effort: &Joints<N>, is_moving: bool) {
+    pub(crate) fn advance(&mut self, actuators: &[Actuator], effort: &Joints<N>, is_moving: bool) {
         for index in 0..N {
             if self.half[index] == 0.0 {
                 continue;
             }
-            let side = equilibrium::side(&axes[index], effort[index]);
+            let side = equilibrium::side(&actuators[self.actuator[index]], effort[index]);
             if side != 0.0 || !is_moving {
                 self.target[index] = side * self.half[index];
             }
@@ -109,20 +118,20 @@ mod tests {
     const STEP: f64 = 0.25e-3;
 
     /// The built-in machine's motors, their first with a backlash of 40 µm.
-    fn axes() -> Vec<Axis> {
-        let mut axes = Machine::builtin().axes;
-        axes[0].backlash = 40e-6;
-        axes
+    fn machine() -> Machine {
+        let mut machine = Machine::builtin();
+        machine.axes[0].backlash = 40e-6;
+        machine
     }
 
     #[test]
     fn a_crossing_ends_on_the_side_that_is_pressed_and_does_not_pass_it() {
-        let axes = axes();
-        let mut gaps = BacklashCompensation::<2>::new(&axes, &Vector2::zeros(), STEP);
+        let Machine { axes, actuators, .. } = machine();
+        let mut gaps = BacklashCompensation::<2>::new(&axes, &actuators, &Vector2::zeros(), STEP);
         assert_eq!(*gaps.value(), Vector2::<f64>::zeros());
         let mut before = 0.0;
         for _ in 0..400 {
-            gaps.advance(&axes, &Vector2::new(3.0, 3.0), true);
+            gaps.advance(&actuators, &Vector2::new(3.0, 3.0), true);
             let value = gaps.value()[0];
             assert!(value >= before && value <= 20e-6, "{value:e}");
             // Speed is the slope of the value.
@@ -135,16 +144,16 @@ mod tests {
 
     #[test]
     fn a_motor_stays_on_its_side_while_nothing_presses_and_rests_in_the_middle() {
-        let axes = axes();
+        let Machine { axes, actuators, .. } = machine();
         let effort = Vector2::new(-3.0, 0.0);
-        let mut gaps = BacklashCompensation::<2>::new(&axes, &effort, STEP);
+        let mut gaps = BacklashCompensation::<2>::new(&axes, &actuators, &effort, STEP);
         assert_eq!(gaps.value()[0], -20e-6, "pressed at rest");
         for _ in 0..100 {
-            gaps.advance(&axes, &Vector2::zeros(), true);
+            gaps.advance(&actuators, &Vector2::zeros(), true);
         }
         assert_eq!(gaps.value()[0], -20e-6);
         for _ in 0..400 {
-            gaps.advance(&axes, &Vector2::zeros(), false);
+            gaps.advance(&actuators, &Vector2::zeros(), false);
         }
         assert!(gaps.value()[0].abs() < 1e-9 && gaps.speed()[0].abs() < 1e-6);
     }

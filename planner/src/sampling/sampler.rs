@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use machine::kinematics::{JointMotion, Joints, KinematicsError, Pose, ToolMotion};
-use machine::{Axis, Friction, Mechanism, StepperMotor};
+use machine::{Actuator, Axis, Friction, Mechanism, StepperMotor};
 use messages::time::CYCLE_TIME;
 use messages::{AxisArray, GateEdge, Setpoint, setpoint::flags};
 
@@ -41,7 +41,7 @@ pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
     /// What is known of the motion from a little before the next sample on.
     trajectory: Trajectory,
     is_complete: bool,
-    drives: [Drive; N],
+    drives: Arc<[Drive]>,
     stream: u64,
     sequence: u64,
     /// Index of the next look, in steps of [`STEP`] from the first sample.
@@ -57,7 +57,7 @@ pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
     assembly: M::ChainState,
     lead: Deflection<N>,
     gaps: BacklashCompensation<N>,
-    axes: Arc<[Axis]>,
+    actuators: Arc<[Actuator]>,
     /// Speed of the motor side [joint units/s], and effort on the load side, at the last look.
     motor_velocity: Joints<N>,
     effort: Joints<N>,
@@ -84,33 +84,48 @@ enum Stream {
     Broken(KinematicsError),
 }
 
-/// What the effort of an axis is made of.
+/// What the effort of an actuator is made of.
 #[derive(Debug, Clone, Copy)]
 struct Drive {
+    axis: usize,
     ratio: f64,
+    /// Share of the effort of its joint.
+    share: f64,
     inertia: f64,
     friction: Friction,
     stepper: Option<StepperMotor>,
 }
 
 impl Drive {
-    /// Adds to the lead of `axis` what a stepper's magnetic axis must be ahead of its rotor, which
+    fn of(actuator: &Actuator) -> Self {
+        Self {
+            axis: actuator.axis,
+            ratio: actuator.ratio,
+            share: actuator.share,
+            inertia: actuator.motor.rotor_inertia(),
+            friction: actuator.friction,
+            stepper: actuator.motor.stepper().copied(),
+        }
+    }
+
+    /// Adds to the lead of this actuator, the `index`th, what a stepper's magnetic axis must be ahead of its rotor, which
     /// moves at `velocity` [joint units/s]. A DC motor's angle is its rotor's.
     ///
     /// Like the rest of the lead it is then played with the square of the rate, the part of a
     /// change of rate taken at the stiffness around zero torque.
-    fn lead_rotor(&self, axis: usize, velocity: f64, setpoint: &mut Setpoint) {
+    fn lead_rotor(&self, index: usize, velocity: f64, setpoint: &mut Setpoint) {
         let Some(stepper) = &self.stepper else { return };
         let speed = velocity / self.ratio;
-        let torque = setpoint.effort[axis] + self.friction.torque(speed);
+        let torque = setpoint.effort[index] + self.friction.torque(speed);
         // Beyond its torque there is no load angle: the checker refuses the sample for that torque.
         let angle = stepper
             .load_angle(torque, speed)
             .unwrap_or_else(|_| stepper.largest_load_angle().copysign(torque));
-        setpoint.lead[axis] += self.ratio * angle;
-        let standing = stepper.load_angle(setpoint.static_effort[axis], 0.0);
-        setpoint.static_lead[axis] += self.ratio * standing.unwrap_or(0.0);
-        setpoint.lead_momentum[axis] += self.ratio * setpoint.momentum[axis] / stepper.stiffness();
+        setpoint.lead[index] += self.ratio * angle;
+        let standing = stepper.load_angle(setpoint.static_effort[index], 0.0);
+        setpoint.static_lead[index] += self.ratio * standing.unwrap_or(0.0);
+        setpoint.lead_momentum[index] +=
+            self.ratio * setpoint.momentum[index] / stepper.stiffness();
     }
 }
 
@@ -133,6 +148,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     pub(crate) fn new(
         mechanism: M,
         axes: &[Axis],
+        actuators: &[Actuator],
         rest: JointMove,
         attitude: AttitudeLaw,
         stream: u64,
@@ -143,17 +159,12 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         let assembly = mechanism.solve(&motion.position, branches[branch], None)?;
         let effort = mechanism.inverse_dynamics(&assembly, &motion.velocity, &motion.acceleration);
         let lead = Deflection::new(&mechanism, effort, STEP);
-        let gaps = BacklashCompensation::new(axes, &effort, STEP);
+        let gaps = BacklashCompensation::new(axes, actuators, &effort, STEP);
         let is_plain =
             mechanism.is_linear() && branches.len() == 1 && attitude == AttitudeLaw::Level;
         Ok(Self {
             mechanism,
-            drives: std::array::from_fn(|axis| Drive {
-                ratio: axes[axis].ratio,
-                inertia: axes[axis].motor.rotor_inertia(),
-                friction: axes[axis].friction,
-                stepper: axes[axis].motor.stepper().copied(),
-            }),
+            drives: actuators.iter().map(Drive::of).collect(),
             trajectory: Trajectory { attitude, ..Trajectory::default() },
             is_complete: false,
             stream,
@@ -167,7 +178,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             assembly,
             lead,
             gaps,
-            axes: axes.into(),
+            actuators: actuators.into(),
             motor_velocity: Joints::zeros(),
             effort,
             laser: Gate::default(),
@@ -309,7 +320,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         // Inertia changes slowly beside the jerk: its own rate is left out where only a spring
         // without damper asks for it.
         self.lead.advance(&effort, || self.mechanism.mass_matrix(&assembly) * motion.jerk);
-        self.gaps.advance(&self.axes, &effort, motion.velocity.amax() > 0.0);
+        self.gaps.advance(&self.actuators, &effort, motion.velocity.amax() > 0.0);
         self.joints = motion.position;
         self.assembly = assembly;
         self.effort = effort;
@@ -340,10 +351,11 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         }
         mean /= STEPS as f64;
         let acceleration = (self.motor_velocity - before) / CYCLE_TIME;
-        for (axis, drive) in self.drives.iter().enumerate() {
-            setpoint.effort[axis] =
-                drive.inertia * acceleration[axis] / drive.ratio + drive.ratio * mean[axis];
-            drive.lead_rotor(axis, at_sample[axis], setpoint);
+        for (index, drive) in self.drives.iter().enumerate() {
+            let Drive { axis, ratio, share, inertia, .. } = *drive;
+            setpoint.effort[index] =
+                inertia * acceleration[axis] / ratio + ratio * (share * mean[axis]);
+            drive.lead_rotor(index, at_sample[axis], setpoint);
         }
         Ok(())
     }
@@ -380,13 +392,17 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         copy(&mut setpoint.velocity, &motion.velocity);
         copy(&mut setpoint.acceleration, &motion.acceleration);
         copy(&mut setpoint.jerk, &motion.jerk);
-        copy(&mut setpoint.lead, &(self.lead.value() + in_gap));
-        copy(&mut setpoint.static_lead, &(self.lead.settled(&gravity) + in_gap));
-        copy(&mut setpoint.lead_momentum, &self.lead.settled(&impulse));
-        for (axis, drive) in self.drives.iter().enumerate() {
-            setpoint.static_effort[axis] = drive.ratio * gravity[axis];
-            setpoint.momentum[axis] =
-                drive.inertia * motion.velocity[axis] / drive.ratio + drive.ratio * impulse[axis];
+        let lead = self.lead.value() + in_gap;
+        let static_lead = self.lead.settled(&gravity) + in_gap;
+        let lead_momentum = self.lead.settled(&impulse);
+        for (index, drive) in self.drives.iter().enumerate() {
+            let Drive { axis, ratio, share, inertia, .. } = *drive;
+            setpoint.lead[index] = lead[axis];
+            setpoint.static_lead[index] = static_lead[axis];
+            setpoint.lead_momentum[index] = lead_momentum[axis];
+            setpoint.static_effort[index] = ratio * (share * gravity[axis]);
+            setpoint.momentum[index] =
+                inertia * motion.velocity[axis] / ratio + ratio * (share * impulse[axis]);
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use crate::job::Job;
 use machine::kinematics::{Joints, KinematicsError};
 use machine::transmission::equilibrium;
-use machine::{Axis, Machine, Mechanism, MechanismVisitor, Pose, WorkArea};
+use machine::{Actuator, Machine, Mechanism, MechanismVisitor, Pose};
 use messages::AxisArray;
 use messages::axis::axis_array;
 use nalgebra::Vector3;
@@ -39,26 +39,27 @@ impl MechanismVisitor for Standing<'_> {
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
         let Self { motors, machine, wanted } = self;
-        let Machine { axes, home_joints, .. } = machine;
+        let Machine { axes, actuators, home_joints, .. } = machine;
         if mechanism.is_linear() {
-            let departure = Departure { standing: motors, axes, area: &machine.area, wanted };
+            let departure = Departure { standing: motors, machine, wanted };
             return departure.joints(&mechanism);
         }
         let sag = |joints: &Joints<N>| -> Result<Joints<N>, KinematicsError> {
             let assembly = mechanism.solve(joints, mechanism.branch(), None)?;
             let gravity = mechanism.gravity(&assembly);
             let fields = Joints::from_fn(|index, _| {
-                equilibrium::field_ahead(&axes[index], gravity[index]).unwrap_or(0.0)
+                let of = |actuator: &Actuator| {
+                    let field = equilibrium::field_ahead(actuator, gravity[index]);
+                    actuator.share * field.unwrap_or(0.0)
+                };
+                axes[index].driven_by(actuators).iter().map(of).sum::<f64>()
             });
-            Ok(equilibrium::rotors_ahead(&mechanism, axes, &gravity) + fields)
+            Ok(equilibrium::rotors_ahead(&mechanism, axes, actuators, &gravity) + fields)
         };
         let motors = Joints::<N>::from_fn(|axis, _| motors[axis]);
         let home = Joints::<N>::from_fn(|axis, _| home_joints[axis]);
-        let near = |off: Joints<N>| {
-            axes.iter().enumerate().take(N).all(|(index, axis)| {
-                off[index].abs() <= COUNTS * axis.encoder.resolution() * axis.ratio.abs()
-            })
-        };
+        let near =
+            |off: Joints<N>| (0..N).all(|axis| off[axis].abs() <= COUNTS * count(machine, axis));
         // Steppers that were powered at home stand there: their rotors sag, their fields do not.
         let is_home = near(motors - home) || near(motors - home - sag(&home)?);
         let joints = if is_home { home } else { motors - sag(&motors)? };
@@ -66,12 +67,17 @@ impl MechanismVisitor for Standing<'_> {
     }
 }
 
+/// Joint travel of the coarsest count of an axis [m or rad].
+fn count(machine: &Machine, axis: usize) -> f64 {
+    let own = machine.axes[axis].driven_by(&machine.actuators);
+    own.iter().map(Actuator::count).fold(0.0, f64::max)
+}
+
 /// Where a job departs from on a machine whose joints go straight with the tool: where the drawing
 /// begins, if the encoders cannot tell that from where the axes stand.
 struct Departure<'a> {
     standing: &'a AxisArray,
-    axes: &'a [Axis],
-    area: &'a WorkArea,
+    machine: &'a Machine,
     wanted: Vector3<f64>,
 }
 
@@ -90,16 +96,15 @@ impl Departure<'_> {
         &self,
         mechanism: &M,
     ) -> Result<Vector3<f64>, KinematicsError> {
-        let Self { standing, axes, area, wanted } = *self;
+        let Self { standing, machine, wanted } = *self;
+        let area = &machine.area;
         let branch = mechanism.branch();
         let joints = Joints::<N>::from_fn(|axis, _| standing[axis]);
         let is_here = |point: &Vector3<f64>| {
             let there = mechanism.inverse(&Pose::at(*point), branch, &joints);
             there.is_ok_and(|there| {
-                axes.iter().enumerate().take(N).all(|(index, axis)| {
-                    let count = axis.encoder.resolution() * axis.ratio.abs();
-                    (there[index] - joints[index]).abs() <= COUNTS * count
-                })
+                (0..N)
+                    .all(|axis| (there[axis] - joints[axis]).abs() <= COUNTS * count(machine, axis))
             })
         };
         if is_here(&wanted) {

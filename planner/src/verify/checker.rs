@@ -2,9 +2,9 @@
 
 use machine::trip::Limit;
 use machine::trip::following::DISCONTINUITY;
-use machine::{Axis, DcMotor, Friction, Machine, Motor, PathLimits, WorkArea};
+use machine::{Actuator, Axis, DcMotor, Friction, Machine, Motor, PathLimits, WorkArea};
 use messages::time::CYCLE_TIME;
-use messages::{AxisArray, MAX_AXES, MAX_EDGES, Setpoint};
+use messages::{ActuatorArray, AxisArray, MAX_ACTUATORS, MAX_AXES, MAX_EDGES, Setpoint};
 
 use messages::plan::LimitUtilization;
 
@@ -173,6 +173,11 @@ struct AxisMost {
     velocity: Most,
     acceleration: Most,
     jerk: Most,
+}
+
+/// The largest values of an actuator.
+#[derive(Debug, Clone, Copy, Default)]
+struct MotorMost {
     current: Most,
     voltage: Most,
     /// Mean square of the current [A²].
@@ -197,39 +202,42 @@ pub(crate) struct Checker {
     dark: f64,
     scope: Scope,
     /// The motors at the sample before.
-    before: Option<[MotorState; MAX_AXES]>,
+    before: Option<[MotorState; MAX_ACTUATORS]>,
     /// The joints at the sample before: position and velocity.
     joints_before: Option<(AxisArray, AxisArray)>,
     /// Mean square of each motor's current, as the controller's watch averages it [A²].
-    heating: AxisArray,
+    heating: ActuatorArray,
     /// The tool's speed in the dark and lit, its acceleration and its jerk.
     most: [Most; 4],
     axes: [AxisMost; MAX_AXES],
+    motors: [MotorMost; MAX_ACTUATORS],
     uses: LimitUtilization,
 }
 
 impl Checker {
     /// Against those limits of `machine` that are in `scope`, and against `path`.
     pub(crate) fn new(machine: &Machine, path: PathLimits, scope: Scope) -> Self {
-        let count = if scope == Scope::Machine { machine.axes.len() } else { 0 };
-        let none = || vec![0.0; count];
+        let is_checked = usize::from(scope == Scope::Machine);
+        let none = || vec![0.0; is_checked * machine.axes.len()];
+        let no_motors = || vec![0.0; is_checked * machine.actuators.len()];
         Self {
             path,
             dark: path.rapid.max(path.speed),
             scope,
             before: None,
             joints_before: None,
-            heating: [0.0; MAX_AXES],
+            heating: [0.0; MAX_ACTUATORS],
             most: [Most::default(); 4],
             axes: [AxisMost::default(); MAX_AXES],
+            motors: [MotorMost::default(); MAX_ACTUATORS],
             uses: LimitUtilization {
                 velocity: none(),
                 acceleration: none(),
                 jerk: none(),
-                current: none(),
-                voltage: none(),
-                heat: none(),
-                sizing: none(),
+                current: no_motors(),
+                voltage: no_motors(),
+                heat: no_motors(),
+                sizing: no_motors(),
                 ..LimitUtilization::default()
             },
         }
@@ -240,11 +248,11 @@ impl Checker {
         &self.uses
     }
 
-    /// Checks the next sample against the limits of `axes` and `area`.
+    /// Checks the next sample against the limits of axes, actuators and `area`.
     pub(crate) fn check(
         &mut self,
         setpoint: &Setpoint,
-        axes: &[Axis],
+        (axes, actuators): (&[Axis], &[Actuator]),
         area: &WorkArea,
     ) -> Result<(), LimitViolation> {
         let time = setpoint.sequence as f64 * CYCLE_TIME;
@@ -260,7 +268,7 @@ impl Checker {
             within(value, limit, Named { time, axis: None, quantity, unit: "m" })?;
         }
         self.joints(setpoint, axes, time)?;
-        self.motors(setpoint, axes, time)
+        self.motors(setpoint, actuators, time)
     }
 
     fn path(&mut self, setpoint: &Setpoint, time: f64) -> Result<(), LimitViolation> {
@@ -336,21 +344,22 @@ impl Checker {
     fn motors(
         &mut self,
         setpoint: &Setpoint,
-        axes: &[Axis],
+        actuators: &[Actuator],
         time: f64,
     ) -> Result<(), LimitViolation> {
-        let mut now = [MotorState::default(); MAX_AXES];
-        for (index, axis) in axes.iter().enumerate() {
-            let angle = (setpoint.position[index] + setpoint.lead[index]) / axis.ratio;
+        let mut now = [MotorState::default(); MAX_ACTUATORS];
+        for (index, actuator) in actuators.iter().enumerate() {
+            let axis = actuator.axis;
+            let angle = (setpoint.position[axis] + setpoint.lead[index]) / actuator.ratio;
             let before = self.before.as_ref().map(|motors| motors[index]);
             let speed = before.map_or(0.0, |before| (angle - before.angle) / CYCLE_TIME);
             let effort = setpoint.effort[index];
-            let torque = effort + axis.friction.torque(speed);
-            let sizing = sizing(axis, effort, setpoint.acceleration[index], speed);
-            let name = axis.name.as_str();
+            let torque = effort + actuator.friction.torque(speed);
+            let sizing = sizing(actuator, effort, setpoint.acceleration[axis], speed);
+            let name = actuator.name.as_str();
             let named = |quantity, unit| Named { time, axis: Some(name), quantity, unit };
-            let (uses, most) = (&mut self.uses, &mut self.axes[index]);
-            let motor = match &axis.motor {
+            let (uses, most) = (&mut self.uses, &mut self.motors[index]);
+            let motor = match &actuator.motor {
                 Motor::Dc(motor) => motor,
                 Motor::Stepper(motor) => {
                     let size = sizing / motor.pull_out_torque(standing(speed));
@@ -403,9 +412,9 @@ impl Checker {
 /// The torque that the motor of `axis` needs at `speed` [rad/s] by the efficiencies of its gear, which
 /// data sheets give in place of friction [N·m]: its rotor's part of `effort` [N·m], taken from the
 /// joint's acceleration, reaches no gear.
-fn sizing(axis: &Axis, effort: f64, acceleration: f64, speed: f64) -> f64 {
-    let rotor = axis.motor.rotor_inertia() * acceleration / axis.ratio;
-    (rotor + axis.efficiency.torque(effort - rotor, standing(speed))).abs()
+fn sizing(actuator: &Actuator, effort: f64, acceleration: f64, speed: f64) -> f64 {
+    let rotor = actuator.motor.rotor_inertia() * acceleration / actuator.ratio;
+    (rotor + actuator.efficiency.torque(effort - rotor, standing(speed))).abs()
 }
 
 /// `speed`, or 0 of a motor that stands: whatever stands is taken to be starting.
@@ -477,7 +486,7 @@ mod tests {
         let mut setpoint = Setpoint { tool: machine.home, ..Setpoint::default() };
         setpoint.laser.power = beyond;
         let mut checker = Checker::new(&machine, machine.path, Scope::PathAlone);
-        let checked = checker.check(&setpoint, &machine.axes, &machine.area);
+        let checked = checker.check(&setpoint, (&machine.axes, &machine.actuators), &machine.area);
         assert_eq!(checked.unwrap_err().quantity, Quantity::LaserPower);
     }
 }

@@ -195,7 +195,9 @@ impl Case {
             if let Some(power) = self.limits.axis_jerk {
                 axis.limits.jerk = arm * machine.path.jerk * ten(power);
             }
-            if let Motor::Dc(motor) = &mut axis.motor {
+        }
+        for actuator in &mut machine.actuators {
+            if let Motor::Dc(motor) = &mut actuator.motor {
                 motor.current *= self.limits.current;
                 motor.voltage *= self.limits.voltage;
             }

@@ -1,7 +1,7 @@
 //! What every plan must keep, seen from its setpoints alone: nothing here believes what a setpoint says
 //! of its own derivatives.
 
-use machine::{Axis, DcMotor, Machine, Motor, StepperMotor};
+use machine::{Actuator, Axis, DcMotor, Machine, Motor, StepperMotor};
 use messages::Setpoint;
 use messages::setpoint::flags;
 use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
@@ -45,18 +45,17 @@ pub fn keeps_everything(setpoints: &[Setpoint], job: &Job, machine: &Machine) ->
     keeps_tool_limits(setpoints, machine)?;
     for (index, axis) in machine.axes.iter().enumerate() {
         keeps_axis_limits(setpoints, index, axis)?;
-        keeps_motor_limits(setpoints, index, axis)?;
+    }
+    for (index, actuator) in machine.actuators.iter().enumerate() {
+        keeps_motor_limits(setpoints, index, actuator)?;
     }
     keeps_dark(setpoints, job, machine)
 }
 
 fn is_finite(setpoint: &Setpoint) -> Found {
     let own = [setpoint.path_velocity, setpoint.path_acceleration, setpoint.path_jerk];
-    let arrays = [
-        setpoint.position,
-        setpoint.velocity,
-        setpoint.acceleration,
-        setpoint.jerk,
+    let joints = [setpoint.position, setpoint.velocity, setpoint.acceleration, setpoint.jerk];
+    let motors = [
         setpoint.lead,
         setpoint.static_lead,
         setpoint.lead_momentum,
@@ -68,7 +67,8 @@ fn is_finite(setpoint: &Setpoint) -> Found {
     let mut all = own
         .into_iter()
         .chain(setpoint.tool)
-        .chain(arrays.into_iter().flatten())
+        .chain(joints.into_iter().flatten())
+        .chain(motors.into_iter().flatten())
         .chain(powers)
         .chain([setpoint.laser.power]);
     if all.all(f64::is_finite) && setpoint.laser.is_valid() {
@@ -164,26 +164,26 @@ struct Shaft {
 
 /// Torque is the effort and the friction of a shaft that turns; the spring of the transmission makes
 /// the motor turn otherwise than the joint.
-fn shafts(setpoints: &[Setpoint], index: usize, axis: &Axis) -> Vec<Shaft> {
-    let angle =
-        |setpoint: &Setpoint| (setpoint.position[index] + setpoint.lead[index]) / axis.ratio;
+fn shafts(setpoints: &[Setpoint], index: usize, actuator: &Actuator) -> Vec<Shaft> {
+    let Actuator { axis, ratio, friction, .. } = *actuator;
+    let angle = |setpoint: &Setpoint| (setpoint.position[axis] + setpoint.lead[index]) / ratio;
     let turns = setpoints.windows(2).map(|pair| {
         let speed = (angle(&pair[1]) - angle(&pair[0])) / CYCLE_TIME;
         let stands = speed.abs() < STANDING_SHAFT;
-        let coulomb = if stands { 0.0 } else { axis.friction.coulomb.copysign(speed) };
-        let torque = pair[1].effort[index] + coulomb + axis.friction.viscous * speed;
+        let coulomb = if stands { 0.0 } else { friction.coulomb.copysign(speed) };
+        let torque = pair[1].effort[index] + coulomb + friction.viscous * speed;
         Shaft { speed, torque }
     });
     turns.collect()
 }
 
-fn keeps_motor_limits(setpoints: &[Setpoint], index: usize, axis: &Axis) -> Found {
-    let shafts = shafts(setpoints, index, axis);
-    match &axis.motor {
+fn keeps_motor_limits(setpoints: &[Setpoint], index: usize, actuator: &Actuator) -> Found {
+    let shafts = shafts(setpoints, index, actuator);
+    match &actuator.motor {
         Motor::Dc(motor) => keeps_dc_limits(&shafts, motor),
         Motor::Stepper(motor) => keeps_stepper_limits(&shafts, motor),
     }
-    .map_err(|found| format!("axis {}: {found}", axis.name))
+    .map_err(|found| format!("axis {}: {found}", actuator.name))
 }
 
 /// i = τ/k and R·i + L·i′ + k·ω, within what the machine leaves a plan of the power stage.

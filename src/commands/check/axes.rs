@@ -1,13 +1,13 @@
 //! The axes of a machine and what their motors can do.
 
 use machine::transmission::gear::LoadClass;
-use machine::{Axis, JointUnit, Machine};
+use machine::{Actuator, Axis, JointUnit, Machine};
 use serde::Serialize;
 
-/// One axis and what its motor can do.
+/// One axis and what its motor can do; of an axis with several actuators, one of them.
 #[derive(Debug, Serialize, schemars::JsonSchema)]
 pub struct AxisReport {
-    /// Its name.
+    /// Its name, or that of the actuator where the axis has several.
     pub name: String,
     /// What its joint is measured in.
     pub unit: Unit,
@@ -90,27 +90,27 @@ impl From<JointUnit> for Unit {
     }
 }
 
-/// The axes of `machine`, in order.
+/// The actuators of `machine` with their axes, in order.
 pub fn axes(machine: &Machine) -> Vec<AxisReport> {
-    machine.axes.iter().map(report).collect()
+    machine.drives().map(report).collect()
 }
 
-fn report(axis: &Axis) -> AxisReport {
-    let motor = &axis.motor;
+fn report((actuator, axis): (&Actuator, &Axis)) -> AxisReport {
+    let motor = &actuator.motor;
     let has_rotor = motor.stepper().is_none_or(|stepper| !stepper.is_planar());
-    let inertia_ratio = has_rotor.then(|| axis.gains.inertia / motor.rotor_inertia() - 1.0);
-    let lost = axis.efficiency.dynamic * axis.efficiency.at_start;
+    let inertia_ratio = has_rotor.then(|| actuator.gains.inertia / motor.rotor_inertia() - 1.0);
+    let lost = actuator.efficiency.dynamic * actuator.efficiency.at_start;
     AxisReport {
-        name: axis.name.clone(),
+        name: actuator.name.clone(),
         unit: axis.unit.into(),
         position: axis.limits.position.map(|limit| limit.is_finite().then_some(limit)),
         velocity: axis.limits.velocity,
-        no_load_velocity: motor.largest_speed() * axis.ratio,
+        no_load_velocity: motor.largest_speed() * actuator.ratio.abs(),
         stall_torque: motor.stall_torque(),
-        stall_effort: motor.stall_torque() / axis.ratio * lost,
+        stall_effort: actuator.effort(motor.stall_torque()) * lost,
         inertia_ratio,
         load_class: inertia_ratio.map(|ratio| LoadClass::of(ratio).into()),
         backlash: axis.backlash,
-        resolution: axis.encoder.resolution() * axis.ratio,
+        resolution: actuator.count(),
     }
 }

@@ -53,13 +53,13 @@ impl JobReport {
     }
 }
 
-/// The checker's uses by axis; for a stepper it keeps pull-out torque and pulse rate where a DC
+/// The checker's uses by actuator; for a stepper it keeps pull-out torque and pulse rate where a DC
 /// motor has current and voltage.
 fn motors(machine: &Machine, uses: &LimitUtilization) -> Vec<MotorUse> {
     let at = |list: &[f64], index: usize| list.get(index).copied().unwrap_or_default();
-    let motor = |(index, axis): (usize, &machine::Axis)| {
+    let motor = |(index, actuator): (usize, &machine::Actuator)| {
         let second = at(&uses.voltage, index);
-        let (voltage, heat, pulse_rate) = match &axis.motor {
+        let (voltage, heat, pulse_rate) = match &actuator.motor {
             Motor::Dc(motor) => {
                 let heat = motor.continuous_current.map(|_| at(&uses.heat, index));
                 (Some(second), heat, None)
@@ -67,8 +67,8 @@ fn motors(machine: &Machine, uses: &LimitUtilization) -> Vec<MotorUse> {
             Motor::Stepper(_) => (None, None, Some(second)),
         };
         MotorUse {
-            axis: axis.name.clone(),
-            speed: at(&uses.velocity, index),
+            axis: actuator.name.clone(),
+            speed: at(&uses.velocity, actuator.axis),
             torque: at(&uses.current, index),
             sizing: at(&uses.sizing, index),
             voltage,
@@ -76,5 +76,5 @@ fn motors(machine: &Machine, uses: &LimitUtilization) -> Vec<MotorUse> {
             pulse_rate,
         }
     };
-    machine.axes.iter().enumerate().map(motor).collect()
+    machine.actuators.iter().enumerate().map(motor).collect()
 }

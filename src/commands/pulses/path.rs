@@ -58,7 +58,8 @@ impl<'a, const N: usize, M: Mechanism<N>> PulsePath<'a, N, M> {
         let chain = mechanism.solve(&joints(&first.position), mechanism.branch(), None)?;
         let mut per_length = [f64::INFINITY; N];
         for train in trains {
-            per_length[train.axis] = (train.per_radian / train.ratio).abs();
+            let coarsest = &mut per_length[train.axis];
+            *coarsest = coarsest.min((train.per_radian / train.ratio).abs());
         }
         Ok(Self {
             mechanism,
@@ -95,7 +96,7 @@ impl<'a, const N: usize, M: Mechanism<N>> PulsePath<'a, N, M> {
     pub(super) fn look(&mut self, share: f64, trains: &[Train]) -> Result<Place, KinematicsError> {
         let mut q = Joints::from_fn(|axis, _| self.joints[axis].at(share).0);
         for (train, count) in trains.iter().zip(&self.counts) {
-            q[train.axis] += train.beyond(*count, share);
+            q[train.axis] += train.share * train.beyond(*count, share);
         }
         let tool = self.locate(&q)?;
         let time = (self.before.sequence as f64 + share) * CYCLE_TIME;
@@ -129,11 +130,12 @@ impl<'a, const N: usize, M: Mechanism<N>> PulsePath<'a, N, M> {
     /// What all of it came to.
     pub(super) fn facts(self, trains: &[Train]) -> PulseFacts {
         let mut facts = self.found;
-        facts.counts = vec![0; N];
-        facts.largest_rate = vec![0.0; N];
+        let actuators = trains.iter().map(|train| train.actuator + 1).max().unwrap_or(0).max(N);
+        facts.counts = vec![0; actuators];
+        facts.largest_rate = vec![0.0; actuators];
         for (train, count) in trains.iter().zip(&self.counts) {
-            facts.counts[train.axis] = *count;
-            facts.largest_rate[train.axis] = train.largest_rate;
+            facts.counts[train.actuator] = *count;
+            facts.largest_rate[train.actuator] = train.largest_rate;
         }
         let time = self.last.map_or(0.0, |(last, _)| last - self.start);
         if time > 0.0 {

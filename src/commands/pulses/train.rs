@@ -1,15 +1,18 @@
 //! The pulses of one stepper, cycle by cycle.
 
 use drives::pulses::{Direction, Segment};
-use machine::Axis;
+use machine::Actuator;
 use messages::Setpoint;
 use messages::time::CYCLE_TIME;
 
 /// One stepper, counted from where it stands at the start of the plan.
 #[derive(Debug)]
 pub(super) struct Train {
-    /// Its axis among all of them.
+    /// Its actuator among all of them.
+    pub(super) actuator: usize,
+    /// Its axis among all of them, and its share of that.
     pub(super) axis: usize,
+    pub(super) share: f64,
     pub(super) name: String,
     /// Joint units per radian.
     pub(super) ratio: f64,
@@ -35,14 +38,17 @@ pub(super) struct Due {
 }
 
 impl Train {
-    pub(super) fn new(index: usize, axis: &Axis, start: &Setpoint) -> Option<Self> {
-        let motor = axis.motor.stepper()?;
+    pub(super) fn new(index: usize, actuator: &Actuator, start: &Setpoint) -> Option<Self> {
+        let motor = actuator.motor.stepper()?;
+        let Actuator { axis, ratio, share, .. } = *actuator;
         Some(Self {
-            axis: index,
-            name: axis.name.clone(),
-            ratio: axis.ratio,
+            actuator: index,
+            axis,
+            share,
+            name: actuator.name.clone(),
+            ratio,
             per_radian: motor.pulses_per_radian(),
-            origin: (start.position[index] + start.lead[index]) / axis.ratio,
+            origin: (start.position[axis] + start.lead[index]) / ratio,
             segment: Segment::rest(0.0),
             count: 0,
             largest_rate: 0.0,
@@ -58,9 +64,9 @@ impl Train {
         after: &Setpoint,
         due: &mut Vec<Due>,
     ) {
-        let axis = self.axis;
-        let lead_speed = (after.lead[axis] - before.lead[axis]) / (2.0 * CYCLE_TIME);
-        let angle = (now.position[axis] + now.lead[axis]) / self.ratio - self.origin;
+        let (axis, index) = (self.axis, self.actuator);
+        let lead_speed = (after.lead[index] - before.lead[index]) / (2.0 * CYCLE_TIME);
+        let angle = (now.position[axis] + now.lead[index]) / self.ratio - self.origin;
         self.segment = self.segment.then(angle, (now.velocity[axis] + lead_speed) / self.ratio);
         self.largest_rate = self.largest_rate.max(self.segment.fastest() * self.per_radian);
         let count = &mut self.count;

@@ -27,12 +27,12 @@ pub fn mismatched(plant: &Machine, seed: u64) -> Machine {
     let mut plant = plant.clone();
     let (load, stiffness) = (factor(spread::LOAD), factor(spread::STIFFNESS));
     plant.mechanism = plant.mechanism.scaled(load, stiffness);
-    for axis in &mut plant.axes {
-        axis.friction.coulomb *= factor(spread::FRICTION);
-        axis.friction.viscous *= factor(spread::FRICTION);
+    for actuator in &mut plant.actuators {
+        actuator.friction.coulomb *= factor(spread::FRICTION);
+        actuator.friction.viscous *= factor(spread::FRICTION);
         let [rotor, torque, resistance] =
             [factor(spread::ROTOR), factor(spread::TORQUE), factor(spread::RESISTANCE)];
-        match &mut axis.motor {
+        match &mut actuator.motor {
             Motor::Dc(motor) => {
                 motor.rotor_inertia *= rotor;
                 motor.torque_constant *= torque;
@@ -59,12 +59,12 @@ mod tests {
         assert_ne!(mismatched(&machine, 3), mismatched(&machine, 4));
         for seed in 0..200 {
             let plant = mismatched(&machine, seed);
-            for (axis, own) in plant.axes.iter().zip(&machine.axes) {
+            for (actuator, own) in plant.actuators.iter().zip(&machine.actuators) {
                 let within = |found: f64, nominal: f64, spread: f64| {
                     assert!((found / nominal - 1.0).abs() <= spread, "{seed}: {found} {nominal}");
                 };
-                within(axis.friction.coulomb, own.friction.coulomb, 0.5);
-                let [motor, nominal] = [axis, own].map(|axis| axis.motor.dc().copied());
+                within(actuator.friction.coulomb, own.friction.coulomb, 0.5);
+                let [motor, nominal] = [actuator, own].map(|it| it.motor.dc().copied());
                 let (Some(motor), Some(nominal)) = (motor, nominal) else { panic!() };
                 within(motor.torque_constant, nominal.torque_constant, 0.05);
                 within(motor.resistance, nominal.resistance, 0.2);

@@ -48,15 +48,15 @@ impl Drawn {
     /// Where its mechanism has no solution at home.
     pub(super) fn of(machine: &Machine, runs: &[Run]) -> Result<Self, KinematicsError> {
         let [lower, upper] = [machine.area.lower, machine.area.upper];
-        let motor = |(index, axis): (usize, &machine::Axis)| {
+        let motor = |(index, actuator): (usize, &machine::Actuator)| {
             let points = runs.iter().filter_map(|run| run.points.get(index)).flatten();
-            let fastest = axis.motor.largest_speed();
+            let fastest = actuator.motor.largest_speed();
             let limit = (0..=LIMIT_POINTS).map(|step| {
                 let speed = fastest * step as f64 / LIMIT_POINTS as f64;
-                [speed, axis.motor.largest_torque(speed)]
+                [speed, actuator.motor.largest_torque(speed)]
             });
             MotorDrawn {
-                name: axis.name.clone(),
+                name: actuator.name.clone(),
                 points: points.copied().collect(),
                 limit: limit.filter(|point| point.iter().all(|it| it.is_finite())).collect(),
             }
@@ -66,7 +66,7 @@ impl Drawn {
             home: [machine.home[0], machine.home[1]],
             ground: survey(machine)?.ground,
             artwork: runs.first().map(|run| run.artwork.clone()),
-            motors: machine.axes.iter().enumerate().map(motor).collect(),
+            motors: machine.actuators.iter().enumerate().map(motor).collect(),
         })
     }
 

@@ -18,7 +18,7 @@ pub(super) fn add(subject: &Subject, figures: &mut Figures) -> Result<(), Figure
     let job = subject.jobs.iter().find(|job| job.stem == "N5").or_else(|| subject.jobs.first());
     let plan = job.and_then(|job| planner::plan(&subject.machine, &job.job).ok());
     let courses = plan.map(|plan| operating::courses(&subject.machine, &plan));
-    for (index, axis) in subject.machine.axes.iter().enumerate() {
+    for (index, actuator) in subject.machine.actuators.iter().enumerate() {
         let used = courses.as_ref().map(|courses| Use {
             course: &courses[index],
             job: job.map_or("", |job| job.title.as_str()),
@@ -28,9 +28,10 @@ pub(super) fn add(subject: &Subject, figures: &mut Figures) -> Result<(), Figure
             (Some(3), 1) => "3-24",
             _ => "",
         };
-        let stem = format!("motor_{}_{}", subject.stem, axis.name);
-        let title = format!("{}, axis {}: what the motor gives", subject.machine.name, axis.name);
-        figures.figures.push(figure(stem, source, title, &axis.motor, used)?);
+        let stem = format!("motor_{}_{}", subject.stem, actuator.name);
+        let machine = &subject.machine.name;
+        let title = format!("{machine}, axis {}: what the motor gives", actuator.name);
+        figures.figures.push(figure(stem, source, title, &actuator.motor, used)?);
     }
     Ok(())
 }

@@ -109,7 +109,7 @@ fn torques_are_those_of_masses_rotors_and_friction() {
         ["t", "a_speed", "a_speed_rpm", "a_torque", "a_load", "a_rotor", "a_friction", "a_power"]
             .map(of);
     assert_eq!(time.len(), setpoints.len());
-    let axis = &subject.machine.axes[0];
+    let axis = &subject.machine.actuators[0];
     // τ = r·(m_x·ẍ + m_y·ÿ)/2, the joints being x + y and x − y.
     let mut even = 0;
     let (same, cross) = ((0.33 + 1.06) / 4.0, (0.33 - 1.06) / 4.0);
@@ -236,7 +236,7 @@ fn accelerations_and_forces_lie_in_the_sources_sectors() {
     near(column(found, "acceleration_without_rotors")[180], 13.113_208, 1e-7);
     // With its own motors and rotors: two rotors of 2e-6 kg·m² beside the masses.
     let own = table(&figures, "acceleration_corexy");
-    let Motor::Dc(motor) = subject("corexy").machine.axes[0].motor else { panic!() };
+    let Motor::Dc(motor) = subject("corexy").machine.actuators[0].motor else { panic!() };
     let rotors = 2.0 * 2e-6 / (1.25e-3 * 1.25e-3);
     let stall = motor.stall_torque();
     near(column(own, "acceleration")[0], 2.0 * stall / 1.25e-3 / (0.33 + rotors), 1e-9);

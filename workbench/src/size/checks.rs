@@ -100,7 +100,7 @@ pub fn uses(
     }
     uses.push(resolution(candidate, need));
     parts::output(candidate, need, ratio, options.margin, &mut uses);
-    let is_named = |axis: &str| axis == need.name;
+    let is_named = |axis: &str| axis == need.axis;
     if let Some(screw) = catalogue.screws.iter().find(|screw| is_named(&screw.axis)) {
         uses.push(parts::whip(screw, need, options.margin));
     }
@@ -230,9 +230,9 @@ fn stepper(motor: &StepperMotor, points: &[OperatingPoint], margin: f64, uses: &
 fn resolution(candidate: &Candidate, need: &AxisNeed) -> Use {
     let counts = match &candidate.motor {
         Motor::Stepper(motor) => motor.pulses_per_turn(),
-        Motor::Dc(_) => need.axis.encoder.counts,
+        Motor::Dc(_) => need.actuator.encoder.counts,
     };
-    let now = need.axis.encoder.resolution() * need.axis.ratio;
+    let now = need.actuator.encoder.resolution() * need.actuator.ratio;
     let limit = now.max(need.tolerance / COUNTS);
     let unit = match need.unit {
         JointUnit::Length => "m",

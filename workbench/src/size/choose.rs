@@ -88,14 +88,14 @@ pub fn axis(need: &AxisNeed, catalogue: &Catalogue, options: &Options, is_asked:
             class: LoadClass::of(inertia_ratio).into(),
         },
         belt: need.pulley.map(|_| BeltSize::new(need)),
-        screw: catalogue.screws.iter().find(|it| it.axis == need.name).map(ScrewSize::new),
+        screw: catalogue.screws.iter().find(|it| it.axis == need.axis).map(ScrewSize::new),
         now: Drive::new(&present, uses.clone()),
         is_asked,
-        kind: kind(&need.axis.motor),
+        kind: kind(&need.actuator.motor),
         candidates: catalogue
             .motors
             .iter()
-            .filter(|motor| is_like(&need.axis.motor, &motor.motor))
+            .filter(|motor| is_like(&need.actuator.motor, &motor.motor))
             .count(),
         chosen: None,
         rejected: Vec::new(),
@@ -122,7 +122,7 @@ pub fn axis(need: &AxisNeed, catalogue: &Catalogue, options: &Options, is_asked:
 fn judge(need: &AxisNeed, catalogue: &Catalogue, options: &Options) -> (Vec<Judged>, Vec<Judged>) {
     let (mut fitting, mut others) = (Vec::new(), Vec::new());
     for motor in &catalogue.motors {
-        if !is_like(&need.axis.motor, &motor.motor) {
+        if !is_like(&need.actuator.motor, &motor.motor) {
             continue;
         }
         let mut nearest: Option<Judged> = None;

@@ -58,7 +58,7 @@ pub fn confirm(
         Some(format!("the simulation ended as {}", summary.outcome.name()))
     } else if time > LONGER * asked {
         let binding = plan.facts.binding.iter().find(|binding| {
-            binding.axis.as_ref().is_some_and(|axis| super::named(needs, axis).is_some())
+            binding.axis.as_ref().is_some_and(|axis| needs.iter().any(|need| need.axis == *axis))
         });
         let what = binding.map_or_else(
             || "the motors slow the job down".to_owned(),

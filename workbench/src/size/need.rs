@@ -1,4 +1,5 @@
-//! What a job asks of each joint, whatever drives it.
+//! What a job asks at each joint of what drives it, whatever that is: of several actuators of a joint
+//! each bears its share.
 
 use super::{MachineFile, SizeError};
 use core::f64::consts::TAU;
@@ -7,7 +8,9 @@ use machine::file::bounds::BOUNDS;
 use machine::file::tables::{AxisTable, MachineTable};
 use machine::kinematics::Joints;
 use machine::transmission::gear::Efficiency;
-use machine::{Axis, DcMotor, Friction, JointUnit, Machine, Mechanism, MechanismVisitor, Motor};
+use machine::{
+    Actuator, DcMotor, Friction, JointUnit, Machine, Mechanism, MechanismVisitor, Motor,
+};
 use messages::time::CYCLE_TIME;
 use planner::{Job, Plan};
 
@@ -28,11 +31,13 @@ pub struct NeedPoint {
     pub effort: f64,
 }
 
-/// What a job asks of one joint, and what stands between it and its motor.
+/// What a job asks of one actuator at its joint, and what stands between the joint and its motor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisNeed {
-    /// Name of the axis.
+    /// Name of the actuator: that of its axis where it is the only one.
     pub name: String,
+    /// Name of its axis.
+    pub axis: String,
     /// What the joint is measured in.
     pub unit: JointUnit,
     /// What it does, one point a cycle.
@@ -41,14 +46,14 @@ pub struct AxisNeed {
     pub travel: f64,
     /// Inertia that turns stiffly with the gear's output, such as a screw [kg·m²].
     pub stiff_inertia: f64,
-    /// Load that the joint moves at home, the other joints at rest [kg or kg·m²].
+    /// Its share of the load that the joint moves at home, the other joints at rest [kg or kg·m²].
     pub load: f64,
     /// Pitch diameter of the pulley on the gear's output; `None` where a coupling stands there [m].
     pub pulley: Option<f64>,
     /// The ratio of the gear that the machine has.
     pub gear: f64,
-    /// The axis as the machine has it.
-    pub axis: Axis,
+    /// The actuator as the machine has it, its ratio without the sign: which way it turns takes nothing.
+    pub actuator: Actuator,
     /// Its motor's own inertia [kg·m²].
     pub rotor_inertia: f64,
     /// The path's tolerance at the joint, by how far the joint moves the tool at home [m or rad].
@@ -61,18 +66,18 @@ impl AxisNeed {
     /// What gear and screw or belt lose, and friction at a shaft that turns the joint by `ratio`
     /// [joint unit/rad]: the joint's friction is the same, whatever drives it.
     pub fn friction_at(&self, ratio: f64) -> Friction {
-        let share = ratio / self.axis.ratio;
+        let share = ratio / self.actuator.ratio;
         Friction {
-            coulomb: self.axis.friction.coulomb * share,
-            viscous: self.axis.friction.viscous * share * share,
+            coulomb: self.actuator.friction.coulomb * share,
+            viscous: self.actuator.friction.viscous * share * share,
         }
     }
 
     /// The efficiency behind a gear that passes on `gear`: what the machine file says of gear and screw
     /// together, but no more than the gear alone.
     pub fn efficiency_with(&self, gear: Option<Efficiency>) -> Efficiency {
-        let Efficiency { dynamic, at_start } = self.axis.efficiency;
-        gear.map_or(self.axis.efficiency, |gear| Efficiency {
+        let Efficiency { dynamic, at_start } = self.actuator.efficiency;
+        gear.map_or(self.actuator.efficiency, |gear| Efficiency {
             dynamic: dynamic.min(gear.dynamic),
             at_start: at_start.min(gear.at_start),
         })
@@ -103,7 +108,8 @@ pub fn needs(
     let mut needs = axes(machine, table);
     let setpoints: Vec<_> = plan.setpoints(1).collect();
     for (index, need) in needs.iter_mut().enumerate() {
-        let motor_side = |at: usize| setpoints[at].position[index] + setpoints[at].lead[index];
+        let Actuator { axis, ratio, .. } = machine.actuators[index];
+        let motor_side = |at: usize| setpoints[at].position[axis] + setpoints[at].lead[index];
         let last = setpoints.len().saturating_sub(1);
         need.points = (0..setpoints.len())
             .map(|at| {
@@ -116,9 +122,8 @@ pub fn needs(
                     is_lit: setpoint.laser.is_lit(),
                     stroke: setpoint.stroke,
                     speed: (motor_side(at) - motor_side(before)) / CYCLE_TIME,
-                    acceleration: setpoint.acceleration[index]
-                        + bending / (CYCLE_TIME * CYCLE_TIME),
-                    effort: setpoint.effort[index] / machine.axes[index].ratio,
+                    acceleration: setpoint.acceleration[axis] + bending / (CYCLE_TIME * CYCLE_TIME),
+                    effort: setpoint.effort[index] / ratio,
                 }
             })
             .collect();
@@ -126,12 +131,17 @@ pub fn needs(
     Ok((plan, needs))
 }
 
-/// The joints of `machine`, whose file has `table`, before anything is asked of them.
+/// The actuators of `machine`, whose file has `table`, before anything is asked of them.
 pub fn axes(machine: &Machine, table: &MachineTable) -> Vec<AxisNeed> {
-    let need = |(index, axis): (usize, &Axis)| {
-        Some(axis_need(machine, table, index, axis_table(table, &axis.name)?))
+    let need = |actuator: &Actuator| {
+        let axis = axis_table(table, &machine.axes.get(actuator.axis)?.name)?;
+        let entries = axis.actuator.iter().flat_map(|actuators| &actuators.entries);
+        let name = actuator.name.split_once('.').map(|(_, name)| name);
+        let own = entries.into_iter().find(|(found, _)| Some(found.value.as_str()) == name);
+        let axis = own.map_or_else(|| axis.clone(), |(_, own)| axis.with_own(own));
+        Some(axis_need(machine, table, actuator, &axis))
     };
-    machine.axes.iter().enumerate().filter_map(need).collect()
+    machine.actuators.iter().filter_map(need).collect()
 }
 
 fn axis_table<'a>(table: &'a MachineTable, name: &str) -> Option<&'a AxisTable> {
@@ -141,30 +151,33 @@ fn axis_table<'a>(table: &'a MachineTable, name: &str) -> Option<&'a AxisTable> 
 fn axis_need(
     machine: &Machine,
     table: &MachineTable,
-    index: usize,
+    actuator: &Actuator,
     axis_table: &AxisTable,
 ) -> AxisNeed {
-    let axis = &machine.axes[index];
+    let axis = &machine.axes[actuator.axis];
+    let actuator = Actuator { ratio: actuator.ratio.abs(), ..actuator.clone() };
+    let Actuator { ratio, ref motor, .. } = actuator;
     let gear = axis_table.gear.value;
     let own = match (&axis_table.motor.dc, &axis_table.motor.stepper) {
         (Some(dc), _) => dc.rotor_inertia.value,
         (_, Some(stepper)) => stepper.rotor_inertia.value,
-        _ => axis.motor.rotor_inertia(),
+        _ => motor.rotor_inertia(),
     };
     let corexy = table.mechanism.corexy.as_ref().map(|corexy| corexy.pulley_radius.value);
     let belt = axis_table.transmission.belt.as_ref().map(|belt| belt.pulley_radius.value);
     AxisNeed {
-        name: axis.name.clone(),
+        name: actuator.name.clone(),
+        axis: axis.name.clone(),
         unit: axis.unit,
         points: Vec::new(),
-        travel: axis.ratio * gear,
-        stiff_inertia: (axis.motor.rotor_inertia() - own).max(0.0) * gear * gear,
-        load: (axis.gains.inertia - axis.motor.rotor_inertia()) / (axis.ratio * axis.ratio),
+        travel: ratio * gear,
+        stiff_inertia: (motor.rotor_inertia() - own).max(0.0) * gear * gear,
+        load: (actuator.gains.inertia - motor.rotor_inertia()) / (ratio * ratio),
         pulley: corexy.or(belt).map(|radius| 2.0 * radius),
         gear,
-        axis: axis.clone(),
+        actuator: actuator.clone(),
         rotor_inertia: own,
-        tolerance: machine.path.tolerance / lever(machine, index),
+        tolerance: machine.path.tolerance / lever(machine, actuator.axis),
         velocity: axis_table.limits.velocity.map(|velocity| velocity.value),
     }
 }
@@ -192,8 +205,8 @@ fn lever(machine: &Machine, index: usize) -> f64 {
 /// `machine` with motors that give anything and weigh nothing, so that only path and joints limit it.
 fn unbounded(machine: &Machine, table: &MachineTable) -> Machine {
     let mut unbounded = machine.clone();
-    for axis in &mut unbounded.axes {
-        axis.motor = Motor::Dc(DcMotor {
+    for actuator in &mut unbounded.actuators {
+        actuator.motor = Motor::Dc(DcMotor {
             resistance: 1e-6,
             inductance: 1e-9,
             torque_constant: 1.0,
@@ -202,10 +215,11 @@ fn unbounded(machine: &Machine, table: &MachineTable) -> Machine {
             current: 1e9,
             continuous_current: None,
         });
+        let axis = &mut unbounded.axes[actuator.axis];
         axis.backlash = 0.0;
         let limits = axis_table(table, &axis.name).map(|table| &table.limits);
         if limits.is_none_or(|limits| limits.velocity.is_none()) {
-            axis.limits.velocity = FASTEST * axis.ratio.max(1.0);
+            axis.limits.velocity = FASTEST * actuator.ratio.abs().max(1.0);
         }
     }
     unbounded

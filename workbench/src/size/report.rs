@@ -268,7 +268,7 @@ pub fn bus(needs: &[AxisNeed], axes: &[AxisSize], catalogue: &Catalogue) -> Supp
     }
     let nominal = needs.iter().zip(axes).fold(0.0, |most: f64, (need, axis)| {
         let chosen = axis.judged.as_ref().map(|judged| &judged.candidate.motor);
-        most.max(match chosen.unwrap_or(&need.axis.motor) {
+        most.max(match chosen.unwrap_or(&need.actuator.motor) {
             Motor::Dc(motor) => motor.voltage,
             Motor::Stepper(motor) => motor.voltage,
         })

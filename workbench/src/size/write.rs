@@ -22,10 +22,10 @@ pub fn machine_file(
         text.parse().map_err(|error: toml_edit::TomlError| SizeError::Write(error.to_string()))?;
     for size in axes {
         let (Some(judged), Some(need)) = (&size.judged, named(needs, &size.axis)) else { continue };
-        let missing = || SizeError::Write(format!("there is no table `axis.{}`", size.axis));
+        let missing = || SizeError::Write(format!("there is no table `axis.{}`", need.axis));
         let axis = document
             .get_mut("axis")
-            .and_then(|axes| axes.get_mut(&size.axis))
+            .and_then(|axes| axes.get_mut(&need.axis))
             .ok_or_else(missing)?
             .as_table_like_mut()
             .ok_or_else(missing)?;
@@ -56,17 +56,18 @@ pub fn with_sample(text: &str, sample: Option<&str>) -> Result<String, SizeError
 
 fn write_axis(axis: &mut dyn TableLike, candidate: &Candidate, need: &AxisNeed) -> Option<()> {
     if candidate.gear_ratio != need.gear {
-        set(axis, "gear", number(candidate.gear_ratio));
-        let friction = axis.get_mut("friction")?.as_table_like_mut()?;
+        set(table_of(axis, need, "gear")?, "gear", number(candidate.gear_ratio));
+        let friction = table_of(axis, need, "friction")?.get_mut("friction")?;
+        let friction = friction.as_table_like_mut()?;
         set(friction, "coulomb", quantity(candidate.friction.coulomb, "N m"));
         set(friction, "viscous", quantity(candidate.friction.viscous, "N m s/rad"));
-        if need.axis.brake.torque > 0.0 {
+        if need.actuator.brake.torque > 0.0 {
             // As strong at the joint as before.
-            let brake = need.axis.brake.torque * candidate.ratio / need.axis.ratio;
+            let brake = need.actuator.brake.torque * candidate.ratio / need.actuator.ratio;
             set(friction, "brake", quantity(brake, "N m"));
         }
     }
-    let before = need.axis.efficiency;
+    let before = need.actuator.efficiency;
     let after = candidate.efficiency;
     if after.dynamic != before.dynamic {
         set(axis, "efficiency", number(after.dynamic));
@@ -84,7 +85,7 @@ fn write_axis(axis: &mut dyn TableLike, candidate: &Candidate, need: &AxisNeed) 
         let allowed: f64 = format!("{:.2e}", SPEED_SHARE * reached).parse().ok()?;
         set(limits, "velocity", quantity(allowed, unit));
     }
-    let motor = axis.get_mut("motor")?.as_table_like_mut()?;
+    let motor = table_of(axis, need, "motor")?.get_mut("motor")?.as_table_like_mut()?;
     let key = match &candidate.motor {
         Motor::Dc(_) => "dc",
         Motor::Stepper(_) => "stepper",
@@ -102,6 +103,23 @@ fn write_axis(axis: &mut dyn TableLike, candidate: &Candidate, need: &AxisNeed) 
         table.insert(key, Item::Value(value));
     }
     Some(())
+}
+
+/// The table in which `key` of the actuator of `need` stands: its own, or that of its axis.
+fn table_of<'a>(
+    axis: &'a mut dyn TableLike,
+    need: &AxisNeed,
+    key: &str,
+) -> Option<&'a mut dyn TableLike> {
+    let name = need.name.split_once('.').map(|(_, name)| name);
+    let own = |name: &str| axis.get("actuator")?.as_table_like()?.get(name)?.as_table_like();
+    match name {
+        Some(name) if own(name).is_some_and(|own| own.contains_key(key)) => {
+            let actuators = axis.get_mut("actuator")?.as_table_like_mut()?;
+            actuators.get_mut(name)?.as_table_like_mut()
+        }
+        _ => Some(axis),
+    }
 }
 
 /// What the table of a stepper says of its driver, which stays.

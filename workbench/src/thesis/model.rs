@@ -128,7 +128,7 @@ impl MechanismVisitor for Loads<'_> {
     type Output = Result<Vec<Vec<f64>>, KinematicsError>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let mut loads = vec![Vec::new(); N];
+        let mut loads = vec![Vec::new(); self.machine.actuators.len()];
         let (branch, mut near) = (mechanism.branch(), None);
         for setpoint in self.plan.setpoints(1) {
             let [position, velocity, acceleration] =
@@ -136,8 +136,8 @@ impl MechanismVisitor for Loads<'_> {
                     .map(|values| Joints::<N>::from_fn(|axis, _| values[axis]));
             let chain = mechanism.solve(&position, branch, near.as_ref())?;
             let efforts = mechanism.inverse_dynamics(&chain, &velocity, &acceleration);
-            for (index, axis) in self.machine.axes.iter().enumerate().take(N) {
-                loads[index].push(efforts[index] * axis.ratio);
+            for (load, actuator) in loads.iter_mut().zip(&self.machine.actuators) {
+                load.push(efforts[actuator.axis] * actuator.share * actuator.ratio);
             }
             near = Some(chain);
         }

@@ -197,8 +197,7 @@ impl Column {
     fn built(&self, machine: &Machine) -> Result<Vec<Cell>, KinematicsError> {
         let name = self.machine.name();
         let mechanics = Mechanics::of(machine)?;
-        let axis = machine.axes.first();
-        let efficiency = axis.map(|axis| axis.efficiency.dynamic);
+        let efficiency = machine.actuators.first().map(|actuator| actuator.efficiency.dynamic);
         let ratio = Values {
             printed: Some(self.ratio),
             errata: Some(self.ratio_right),
@@ -249,7 +248,7 @@ impl Column {
 
     /// Turns of the motor per turn of the gear's output.
     fn gear(&self, machine: &Machine) -> Option<f64> {
-        machine.axes.first().map(|axis| self.travel / axis.ratio)
+        machine.actuators.first().map(|actuator| self.travel / actuator.ratio)
     }
 
     /// The spring of the first axis as the source has it: at the screw, the belt or the arm [N·m/rad or

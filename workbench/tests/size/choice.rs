@@ -124,12 +124,12 @@ fn ratio_and_motor_are_chosen_together() {
     assert!((0..2).any(|axis| ratio(&any, axis) != 3.0));
     let machine = Machine::parse("new.toml", &written.unwrap(), &[]).unwrap();
     let before = Machine::parse("old.toml", &text, &[]).unwrap();
-    for (index, axis) in machine.axes.iter().enumerate() {
+    for (index, axis) in machine.actuators.iter().enumerate() {
         close(axis.ratio, 0.015 / core::f64::consts::TAU / ratio(&any, index));
         // The joint's friction is what it was.
-        let old = &before.axes[index];
+        let old = &before.actuators[index];
         close(axis.friction.coulomb / axis.ratio, old.friction.coulomb / old.ratio);
-        let square = |axis: &machine::Axis| axis.friction.viscous / (axis.ratio * axis.ratio);
+        let square = |axis: &machine::Actuator| axis.friction.viscous / (axis.ratio * axis.ratio);
         close(square(axis), square(old));
     }
 }
@@ -146,7 +146,7 @@ fn the_file_that_is_written_keeps_its_comments_and_is_sized_to_itself() {
     assert!(written.contains("# Source: made for this."));
     assert!(!written.contains("nominal_torque") && !written.contains("2.3 ohm"));
     let machine = Machine::parse("new.toml", &written, &[]).unwrap();
-    for (axis, size) in machine.axes.iter().zip(&report.axes) {
+    for (axis, size) in machine.actuators.iter().zip(&report.axes) {
         let candidate = &size.judged.as_ref().unwrap().candidate;
         let (Motor::Dc(written), Motor::Dc(chosen)) = (&axis.motor, &candidate.motor) else {
             panic!("no DC motor")
@@ -181,7 +181,7 @@ fn steppers_are_chosen_by_their_pull_out_torque() {
     }
     assert!(report.confirmation.unwrap().is_right);
     let machine = Machine::parse("new.toml", &written.unwrap(), &[]).unwrap();
-    for (axis, size) in machine.axes.iter().zip(&report.axes) {
+    for (axis, size) in machine.actuators.iter().zip(&report.axes) {
         let candidate = &size.judged.as_ref().unwrap().candidate;
         let [written, chosen] =
             [&axis.motor, &candidate.motor].map(|motor| *motor.stepper().unwrap());
