@@ -14,6 +14,7 @@
 //! |---|---|---|---|
 //! | `Disabled`, `Faulted` | off | follow the feedback | off |
 //! | `Enabling` | voltage, against the weight | follow the feedback until the power is on, then stand | off |
+//! | `Squaring` | voltage | to where the actuators of each axis are together | off |
 //! | `Idle` | voltage | stand | off |
 //! | `Running` | voltage | the stream, at a rate | as the stream says |
 //! | `Holding`, `Stopping` | voltage | along the stream to rest | off |
@@ -47,6 +48,7 @@ use crate::exchange::{Inputs, Outputs, Peers, Presence};
 use crate::feedforward::{Feedforward, Planned};
 use crate::intake::Intake;
 use crate::player::{Event, Player};
+use crate::squaring::Squaring;
 use crate::standing::Standing;
 use crate::state::{AfterRest, State};
 use crate::statistics::Statistics;
@@ -87,6 +89,7 @@ pub struct Controller {
     drive: CommandMode,
     supervision: Supervision,
     standing: Standing,
+    squaring: Squaring,
     /// Where the motors stood when they were to be enabled [rad].
     enabled_at: ActuatorArray,
     statistics: Statistics,
@@ -126,6 +129,7 @@ impl Controller {
             },
             supervision: Supervision::new(machine),
             standing: Standing::new(machine),
+            squaring: Squaring::default(),
             enabled_at: ActuatorArray::default(),
             statistics: Statistics::new(machine),
             playing: 0,
@@ -306,7 +310,8 @@ impl Controller {
             return 0;
         }
         let catch_up = self.feedforward.coasted(&last, elapsed.missed);
-        if self.drive == CommandMode::Position {
+        // Squaring is so slow that what it goes on by matters nothing.
+        if self.drive == CommandMode::Position && self.playing != 0 {
             self.feedforward.put_coasted(&last, elapsed.missed);
             self.catch_up = catch_up;
         }
@@ -352,11 +357,12 @@ impl Controller {
             for cascade in self.cascades.iter_mut().flatten() {
                 cascade.reset();
             }
-            self.catch_up = CatchUp::default();
+            (self.catch_up, self.squaring) = (CatchUp::default(), Squaring::default());
             return;
         }
         if self.playing == 0 {
-            self.feedforward.advance(*self.feedforward.after());
+            let next = self.squaring.advance().unwrap_or(*self.feedforward.after());
+            self.feedforward.advance(next);
             return;
         }
         let event = self.player.advance(self.intake.lookahead());

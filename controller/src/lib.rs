@@ -18,6 +18,7 @@ pub mod motion_limits;
 pub mod player;
 pub mod ramp;
 pub mod service;
+pub mod squaring;
 pub mod standing;
 mod state;
 pub mod statistics;

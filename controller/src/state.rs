@@ -14,6 +14,12 @@ pub(crate) enum State {
         held: u32,
         settled: u32,
     },
+    /// Enabled, and on the way to where the actuators of each axis are together, for so many cycles, having
+    /// stood there for so many.
+    Squaring {
+        waited: u32,
+        settled: u32,
+    },
     Idle,
     Running,
     Holding(AfterRest),
@@ -41,7 +47,7 @@ impl State {
     pub(crate) fn to_wire(self) -> ControllerState {
         match self {
             Self::Disabled => ControllerState::Disabled,
-            Self::Enabling { .. } => ControllerState::Enabling,
+            Self::Enabling { .. } | Self::Squaring { .. } => ControllerState::Enabling,
             Self::Idle => ControllerState::Idle,
             Self::Running => ControllerState::Running,
             Self::Holding(_) => ControllerState::Holding,

@@ -24,7 +24,10 @@ impl Controller {
             (OperatorVerb::Enable, State::Disabled) => {
                 self.state = State::Enabling { waited: 0, held: 0, settled: 0 };
             }
-            (OperatorVerb::Disable, State::Idle | State::Enabling { .. }) => {
+            (
+                OperatorVerb::Disable,
+                State::Idle | State::Enabling { .. } | State::Squaring { .. },
+            ) => {
                 self.state = State::Disabled;
             }
             (OperatorVerb::Hold, State::Running | State::Holding(_)) => {
@@ -40,9 +43,10 @@ impl Controller {
                 self.player.hold();
                 self.state = State::Stopping;
             }
-            (OperatorVerb::Stop, State::Idle | State::Disabled | State::Enabling { .. })
-                if self.intake.started() != 0 =>
-            {
+            (
+                OperatorVerb::Stop,
+                State::Idle | State::Disabled | State::Enabling { .. } | State::Squaring { .. },
+            ) if self.intake.started() != 0 => {
                 self.give_up(cycle);
             }
             (OperatorVerb::Reset, State::Faulted) => {
@@ -52,7 +56,10 @@ impl Controller {
                 self.supervision.reset();
             }
             (OperatorVerb::Override, _) => return self.player.ask_rate(request.value),
-            (OperatorVerb::Start, State::Disabled | State::Enabling { .. } | State::Idle) => {
+            (
+                OperatorVerb::Start,
+                State::Disabled | State::Enabling { .. } | State::Squaring { .. } | State::Idle,
+            ) => {
                 let stream = request.value as u64;
                 return stream as f64 == request.value && self.intake.start(stream);
             }

@@ -2,6 +2,7 @@
 
 use super::Controller;
 use crate::alignment::Alignment;
+use crate::squaring::Squaring;
 use crate::standing::Strayed;
 use crate::state::{AfterRest, State};
 use crate::supervision::{Finding, Tracking};
@@ -25,6 +26,7 @@ impl Controller {
             State::Enabling { waited, held, settled } => {
                 self.enable(now, feedback, [waited, held, settled]);
             }
+            State::Squaring { waited, settled } => self.square(now, feedback, [waited, settled]),
             // Drives may not have found all peers yet.
             State::Idle if feedback.has(status::GATE_INHIBITED) => {}
             State::Idle if self.intake.is_ready() => self.begin(now, feedback.cycle),
@@ -84,7 +86,12 @@ impl Controller {
         let rests = held > self.standing.release() && stands && strayed.is_none();
         let settled = if rests { settled + 1 } else { 0 };
         if settled >= STANDING {
-            self.state = State::Idle;
+            self.squaring = Squaring::new(&self.machine, self.feedforward.after());
+            self.state = if self.squaring.is_done() {
+                State::Idle
+            } else {
+                State::Squaring { waited: 0, settled: 0 }
+            };
             return;
         }
         self.state =
@@ -95,6 +102,25 @@ impl Controller {
             if !feedback.has(status::POWERED) {
                 self.end_in_fault(feedback.cycle);
             }
+        }
+    }
+
+    /// Goes to where the actuators of each axis are together, and waits until all have stood there for a
+    /// moment.
+    fn square(&mut self, now: Nanoseconds, feedback: &Feedback, [waited, settled]: [u32; 2]) {
+        if !self.squaring.is_done() {
+            return;
+        }
+        let strayed = self.standing.strayed(&self.feedforward.now().angle, &feedback.position);
+        let rests = self.supervision.standing() > 0 && strayed.is_none();
+        let settled = if rests { settled + 1 } else { 0 };
+        if settled >= STANDING {
+            self.state = State::Idle;
+            return;
+        }
+        self.state = State::Squaring { waited: waited + 1, settled };
+        if waited >= PATIENCE {
+            self.fail(Finding::lost(self.restless(feedback, strayed, waited)), now);
         }
     }
 
@@ -178,7 +204,7 @@ impl Controller {
 
     /// Whether the stream rests, and what a stall left behind has been compensated: without that the next motion would jump by it.
     fn stands_on_plan(&self) -> bool {
-        self.player.is_at_rest() && self.catch_up.is_done()
+        self.player.is_at_rest() && self.catch_up.is_done() && self.squaring.is_done()
     }
 
     /// Whether the stream in hand has been played to its last setpoint, with no light left to make up for.
