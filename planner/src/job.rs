@@ -77,7 +77,7 @@ impl Job {
 }
 
 /// How a job wants its lines marked; what is `None` the machine file's `[path]` table rules.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marking {
     /// Speed while the laser is on; `None` leaves it to each line of the job, then to
     /// [`MarkingSpeed::Optimum`].
@@ -91,6 +91,21 @@ pub struct Marking {
     pub policy: Option<Policy>,
     /// How the tool gets from one line to the next.
     pub turns: Turns,
+    /// The stroke to begin with, from 1: what is marked before is left out.
+    pub from_stroke: u64,
+}
+
+impl Default for Marking {
+    fn default() -> Self {
+        Self {
+            speed: None,
+            max_speed: None,
+            tolerance: None,
+            policy: None,
+            turns: Turns::default(),
+            from_stroke: 1,
+        }
+    }
 }
 
 impl Marking {

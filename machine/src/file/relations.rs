@@ -310,8 +310,10 @@ impl Subject<'_> {
         // Springs give way by the load's acceleration over ω², the field of a stepper by what all that
         // it turns takes of its stiffness.
         let springs = resonance.map_or(0.0, |resonance| 1.0 / (resonance * resonance));
-        let field =
-            axis.motor.stepper().map_or(0.0, |motor| axis.gains.inertia / motor.stiffness());
+        let field = actuator
+            .motor
+            .stepper()
+            .map_or(0.0, |motor| actuator.gains.inertia / motor.stiffness());
         let lead = jerk * CYCLE_TIME * (springs + field) / LEAD_STEP;
         let least = jump.max(lead);
         if limit < least {

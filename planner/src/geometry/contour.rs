@@ -209,6 +209,17 @@ impl Contour {
         self.is_lit
     }
 
+    /// How many stretches of light it has; of the next part of another contour, those that begin in it.
+    pub(crate) fn strokes(&self) -> u64 {
+        let mut was_lit = self.goes_on_from_before();
+        let begins = |demand: &Demand| {
+            let is_lit = demand.power > 0.0;
+            let was_lit = core::mem::replace(&mut was_lit, is_lit);
+            is_lit && !was_lit
+        };
+        self.demands.iter().map(begins).filter(|begins| *begins).count() as u64
+    }
+
     /// Length that is marked [m].
     pub(crate) fn lit_length(&self) -> f64 {
         self.stretches()

@@ -16,6 +16,7 @@ use super::composition::tables::{DrawingTable, FrameTable, LayerTable, OrderTabl
 use super::composition::{Composed, Defaults, Part, Parts, compose};
 use super::letters::{self, Letter, Style};
 use super::path_table::{self, PathTable};
+use super::whole::whole;
 use super::workpiece_table::{self, AttitudeTable, SurfaceTable};
 use super::{Job, JobError, Marking, MarkingSpeed, gcode, points};
 
@@ -169,6 +170,9 @@ table! {
         /// in the dark, `proportional` lights from rest to rest with power in proportion to the speed.
         /// When left out, a G-code program's M3 and M4 say it, and other jobs are `constant`.
         pub policy: Option<Spanned<Policy>>,
+        /// The stroke to begin with, from 1, as after a job that was stopped; a path is not cut, so
+        /// those of its path that come before it are marked again.
+        pub from_stroke: Number<Positive> = 1.0,
     }
 }
 
@@ -183,6 +187,9 @@ machine::keyword! {
     Optimum, "a speed",
     "optimum" => Self::Optimum,
 }
+
+/// The most strokes of a job.
+const MOST_STROKES: u64 = 1 << 53;
 
 /// Why style h2 is for paper only.
 const REPLICA: &str = "style h2 replicates a printed table with free moves of up to 0.99 m/s, which \
@@ -221,6 +228,7 @@ pub(super) fn job(
         marking,
         span: place,
     } = table;
+    check_start(&marking, &mut diagnostics);
     let home = Vector3::from(machine.home);
     let surface = surface.and_then(|table| workpiece_table::surface(&table, &mut diagnostics));
     let on_surface = workpiece_table::flat(machine, surface.as_ref());
@@ -361,7 +369,8 @@ pub(super) fn program(
     most: u64,
 ) -> Result<Job, JobError> {
     let empty = Document::parse(&path.display().to_string(), "")?;
-    let (table, diagnostics) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
+    let (table, mut diagnostics) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
+    check_start(&table.marking, &mut diagnostics);
     let dialect = machine::dialect_choices!(table.gcode);
     of_program(path, &dialect, &table.marking, diagnostics, machine, most)
 }
@@ -375,6 +384,7 @@ pub(super) fn drawing(
     let empty = Document::parse(&path.display().to_string(), "")?;
     let (table, mut diagnostics) =
         empty.override_with(overrides, "")?.decode::<DrawingFileTable>()?;
+    check_start(&table.marking, &mut diagnostics);
     let home = Vector3::from(machine.home);
     let surface =
         table.surface.and_then(|table| workpiece_table::surface(&table, &mut diagnostics));
@@ -523,6 +533,11 @@ fn job_of(drawing: Drawing, marking: &MarkingTable) -> Job {
     Job { marking: how(marking), ..Job::of(drawing) }
 }
 
+/// Notes a stroke to begin with that is none.
+fn check_start(table: &MarkingTable, diagnostics: &mut Diagnostics) {
+    whole(&table.from_stroke, 1..=MOST_STROKES, "from_stroke", diagnostics);
+}
+
 fn how(table: &MarkingTable) -> Marking {
     Marking {
         speed: table.speed.as_ref().map(|speed| match speed {
@@ -533,6 +548,7 @@ fn how(table: &MarkingTable) -> Marking {
         tolerance: table.tolerance.as_ref().map(|tolerance| tolerance.value),
         policy: table.policy.as_ref().map(|policy| policy.value),
         turns: Turns::default(),
+        from_stroke: table.from_stroke.value as u64,
     }
 }
 

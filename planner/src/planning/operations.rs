@@ -22,12 +22,21 @@ pub(crate) struct OperationQueue<'a> {
     /// The number of the first operation that is still here.
     first: usize,
     is_read: bool,
+    /// The stroke to begin with, from 1, and how many have been passed over.
+    begins: u64,
+    passed: u64,
 }
 
 impl<'a> OperationQueue<'a> {
     /// Of `steps`, which `operations` takes.
     pub(crate) fn new(steps: Steps<'a>, operations: Operations<'a>) -> Self {
-        Self { steps, operations, made: VecDeque::new(), first: 0, is_read: false }
+        let made = VecDeque::new();
+        Self { steps, operations, made, first: 0, is_read: false, begins: 1, passed: 0 }
+    }
+
+    /// Begins with the path that has this stroke, from 1, in it; what is marked before is left out.
+    pub(crate) fn from_stroke(self, begins: u64) -> Self {
+        Self { begins, ..self }
     }
 
     /// The operation with this number, from 0; `None` behind the last.
@@ -71,6 +80,9 @@ impl<'a> OperationQueue<'a> {
     fn make(&mut self) -> Result<Option<Operation>, PlanError> {
         loop {
             if let Some(operation) = self.operations.next() {
+                if self.is_passed_over(&operation) {
+                    continue;
+                }
                 return Ok(Some(operation));
             }
             if self.is_read {
@@ -87,6 +99,28 @@ impl<'a> OperationQueue<'a> {
                 }
             }
         }
+    }
+}
+
+impl OperationQueue<'_> {
+    /// Whether an operation comes before the stroke to begin with; outputs are switched all the same.
+    fn is_passed_over(&mut self, operation: &Operation) -> bool {
+        if self.passed + 1 >= self.begins {
+            return false;
+        }
+        let strokes = match &operation.kind {
+            OperationKind::Output { .. } => return false,
+            OperationKind::Path(contour) => contour.strokes(),
+            OperationKind::Dot(_) => 1,
+            OperationKind::Rapid(_) | OperationKind::Rest(_) | OperationKind::Pause => 0,
+        };
+        if strokes > 0 && self.passed + strokes >= self.begins {
+            // The next ones are all marked.
+            self.begins = 0;
+            return false;
+        }
+        self.passed += strokes;
+        true
     }
 }
 

@@ -77,7 +77,11 @@ pub(crate) fn plan_windows(
         job.steps()
             .map_err(|error| PlanError::Unreadable { line: 0, message: error.to_string() })?,
     );
-    let source = OperationQueue::new(steps, operations());
+    let source = OperationQueue::new(steps, operations()).from_stroke(job.marking.from_stroke);
+    if job.marking.from_stroke > 1 {
+        let text = format!("begins with stroke {}, as the job says", job.marking.from_stroke);
+        notes.push(Note { line: 0, text });
+    }
     let nothing = match job.program {
         Some(_) => "nothing is marked: no G1, G2 or G3 is made with M3 or M4 on and S above 0",
         None => "nothing is marked",

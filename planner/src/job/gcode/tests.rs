@@ -59,7 +59,9 @@ fn check_sound(program: &Program, input: &str) {
                 assert!(time > 0.0, "{step:?}\n{input}");
                 continue;
             }
-            Action::Follow { .. } => panic!("no program has poses"),
+            Action::Follow { .. } | Action::Trace { .. } => {
+                panic!("no program has poses or curves")
+            }
             Action::Output { .. } | Action::Pause | Action::Corners(_) => continue,
         };
         if let Curve::Arc { centre, major, .. } = curve {
