@@ -122,7 +122,7 @@ fn a_carriage_runs_on_a_screw_a_belt_or_a_rack() {
         let machine = Machine::parse("m.toml", &driven(transmission), &[]).unwrap();
         let MechanismKind::Cartesian(built) = machine.mechanism else { panic!("not cartesian") };
         let springs = built.elasticity.map(|springs| springs.map(|spring| spring.stiffness));
-        (machine.axes[0].ratio, machine.axes[0].motor.rotor_inertia(), springs)
+        (machine.actuators[0].ratio, machine.actuators[0].motor.rotor_inertia(), springs)
     };
     let gear = 3.0;
     // The rotor of cartesian.toml, and what turns with the gear.
@@ -225,7 +225,7 @@ fn a_corexy_lifts_its_head() {
     assert_eq!(machine.home_joints, [0.2, 0.0, 0.0]);
     let belt = "[axis.z.transmission.belt]\npulley_radius = \"6 mm\"\nstiffness = \"20 N/mm\"";
     let machine = Machine::parse("m.toml", &lifted("", belt), &[]).unwrap();
-    assert_eq!(machine.axes[2].ratio, 6e-3 / 8.0);
+    assert_eq!(machine.actuators[2].ratio, 6e-3 / 8.0);
     let rigid = lifted("lead = \"4 mm/rev\"", "");
     assert_eq!(
         refusal(&rigid),
@@ -252,7 +252,7 @@ fn a_chuck_turns_what_lies_across() {
     assert_eq!(built.elasticity.unwrap()[1].stiffness, 300.0);
     let axis = &machine.axes[1];
     assert_eq!(
-        (axis.name.as_str(), axis.unit, axis.ratio),
+        (axis.name.as_str(), axis.unit, machine.actuators[1].ratio),
         ("a", machine::JointUnit::Angle, 1.0 / 3.0)
     );
     // Half of y is 100 mm, four radii.

@@ -140,7 +140,6 @@ pub struct MachineSummary {
     pub axes: Vec<String>,
     /// The actuators' names, in the order of every per-actuator list here: those of their axes, but where
     /// an axis has several.
-    #[serde(default)]
     pub actuators: Vec<String>,
 }
 

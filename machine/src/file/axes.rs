@@ -117,8 +117,8 @@ pub(super) fn drives(
     let drive = |(name, own): &(Spanned<String>, AxisActuatorTable)| {
         refuse_name(name, diagnostics);
         let square = own.square.as_ref().map_or(0.0, |square| {
-            joint.unit.expect(square, joint.name, diagnostics);
-            square.value
+            let fits = joint.unit.expect(square, joint.name, diagnostics);
+            if fits { square.value } else { 0.0 }
         });
         Drive {
             name: format!("{}.{}", joint.name, name.value),
