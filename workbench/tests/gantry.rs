@@ -72,7 +72,6 @@ fn run(machine: &Machine, plant: &Machine, text: &str) -> Result<Simulated, Simu
 fn assert_accurate(what: &str, run: &Simulated) {
     assert_eq!((run.report.completed, run.report.fault.code), (1, 0), "{what}: {:?}", run.report);
     let marks = run.marks.as_ref().unwrap();
-    println!("{what}: error {:e}, racking {:e}", marks.error_max, run.racking[0]);
     assert!(marks.error_max <= 15e-6, "{what}: error {:e}", marks.error_max);
     assert!(marks.tracking_max <= 15e-6, "{what}: tracking {:e}", marks.tracking_max);
     assert!(marks.error_rms <= 8e-6, "{what}: error rms {:e}", marks.error_rms);
@@ -141,7 +140,6 @@ fn a_pair_that_is_less_alike_than_planned_follows_and_stays_together() {
     right.motor.dc_mut().unwrap().torque_constant *= 0.9;
     let run = run(&machine, &plant, "S").unwrap();
     assert_eq!((run.report.completed, run.report.fault.code), (1, 0), "{:?}", run.report);
-    println!("racking {:e}", run.racking[0]);
     assert!(run.racking[0] < 0.1 * machine.axes[1].limits.racking, "{:e}", run.racking[0]);
 }
 
