@@ -237,12 +237,7 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             return Err(PlantError::Actuators);
         }
         let branch = mechanism.branch();
-        // On crooked references a joint stands where its springs pull it to.
-        let load = Joints::from_fn(|row, _| {
-            let home = home.get(row).copied().unwrap_or(f64::NAN);
-            let driven = axes[row].driven_by(actuators).iter();
-            home + driven.map(|actuator| actuator.share * actuator.square).sum::<f64>()
-        });
+        let load = Joints::from_fn(|row, _| home.get(row).copied().unwrap_or(f64::NAN));
         let chain = mechanism.solve(&load, branch, None).map_err(PlantError::Home)?;
 
         let gravity = mechanism.gravity(&chain);
@@ -252,8 +247,9 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
         let mut origin = angle;
         for (row, actuator) in actuators.iter().enumerate() {
             let Actuator { axis, ratio, square, .. } = *actuator;
-            // Where it stands where springs pull it alone, and as far off as its reference is.
-            let mean = load[axis] - home.get(axis).copied().unwrap_or(f64::NAN);
+            // The joint stands at home on crooked references too, in the mean of its springs.
+            let own = axes[axis].driven_by(actuators).iter();
+            let mean: f64 = own.map(|actuator| actuator.share * actuator.square).sum();
             angle[row] = (load[axis] + ahead[axis] + (square - mean)) / ratio;
             let field =
                 equilibrium::field_ahead(actuator, gravity[axis]).map_err(PlantError::Hold)?;
