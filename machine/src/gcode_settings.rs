@@ -69,6 +69,8 @@ pub struct WordMeanings {
     pub inch_by_g70: bool,
     /// Whether the words of 3D printers are known: I of M3, M4 and M5, M82, M83, M400.
     pub printer_words: bool,
+    /// How far a degree of A leads around the workpiece [m], on a machine with a chuck in the place of y.
+    pub way_per_degree: Option<f64>,
 }
 
 impl Dialect {
@@ -85,6 +87,7 @@ impl Dialect {
             fan_is_laser: false,
             inch_by_g70: false,
             printer_words: false,
+            way_per_degree: None,
         };
         match self {
             Self::Standard | Self::Grbl => standard,

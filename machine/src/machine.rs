@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::actuator::Actuator;
-use crate::axis::Axis;
+use crate::axis::{Axis, JointUnit};
 use crate::document::{Concern, DocumentError, Override};
 use crate::gcode_settings::GcodeSettings;
 use crate::laser::LaserSource;
@@ -82,6 +82,16 @@ impl Machine {
             line => format!("machine file, line {line}: {text}"),
         })
         .collect()
+    }
+
+    /// Radius of the workpiece in the chuck that stands in the place of y [m]; `None` without one.
+    pub fn chuck_radius(&self) -> Option<f64> {
+        let radius = match &self.mechanism {
+            MechanismKind::Cartesian(cartesian) => cartesian.travel[1],
+            MechanismKind::CartesianLift(cartesian) => cartesian.travel[1],
+            _ => return None,
+        };
+        self.axes.get(1).is_some_and(|axis| axis.unit == JointUnit::Angle).then_some(radius)
     }
 
     /// The CoreXY of source 003, the machine when none is named: `machines/corexy.toml`, built in.

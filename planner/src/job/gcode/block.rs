@@ -28,6 +28,8 @@ pub(super) struct Block {
     pub(super) axes_taken: bool,
     /// Whether it has any word.
     pub(super) begun: bool,
+    /// Way of a degree [m], where the line's Y was written as A.
+    way_per_degree: Option<f64>,
 }
 
 impl Block {
@@ -42,6 +44,7 @@ impl Block {
             cluster: Vec::new(),
             axes_taken: false,
             begun: false,
+            way_per_degree: None,
         }
     }
 
@@ -54,13 +57,14 @@ impl Block {
         self.cluster.clear();
         self.axes_taken = false;
         self.begun = false;
+        self.way_per_degree = None;
     }
 
     /// Takes one word.
     pub(super) fn take(
         &mut self,
         line: &[u8],
-        word: Word,
+        mut word: Word,
         words: &WordMeanings,
     ) -> Result<(), Box<Refusal>> {
         let first = !std::mem::replace(&mut self.begun, true);
@@ -89,6 +93,11 @@ impl Block {
             b'E' | b'F' | b'I' | b'J' | b'K' | b'P' | b'Q' | b'R' | b'S' | b'X' | b'Y' | b'Z' => {}
             b'H' | b'L' | b'T' => {
                 whole(&word)?;
+            }
+            // The chuck stands in the place of y: degrees are a way around the workpiece.
+            b'A' if words.way_per_degree.is_some() => {
+                self.way_per_degree = words.way_per_degree;
+                word.letter = b'Y';
             }
             b'A' | b'B' | b'C' | b'U' | b'V' | b'W' => {
                 return Err(Refusal::new(
@@ -182,6 +191,12 @@ impl Block {
         }
         self.used |= bit(letter);
         Some(self.numbers[usize::from(letter - b'A')])
+    }
+
+    /// The coordinate of an axis, X, Y or Z, where a unit is so many metres [m].
+    pub(super) fn coordinate(&mut self, letter: u8, unit: f64) -> Option<f64> {
+        let scale = self.way_per_degree.filter(|_| letter == b'Y').unwrap_or(unit);
+        self.number(letter).map(|number| number * scale)
     }
 
     /// Where `letter` stands.

@@ -358,9 +358,9 @@ impl Interpreter {
             ));
         }
         for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
-            if let Some(number) = block.number(letter) {
+            if let Some(length) = block.coordinate(letter, self.modal.unit) {
                 self.modal.shift[axis] =
-                    self.tracer.position[axis] - self.modal.origin[axis] - number * self.modal.unit;
+                    self.tracer.position[axis] - self.modal.origin[axis] - length;
             }
         }
         self.modal.kept_shift = self.modal.shift;
@@ -460,8 +460,7 @@ impl Interpreter {
     fn target(&self, block: &mut Block, machine_frame: bool) -> Vector3<f64> {
         let mut to = self.tracer.position;
         for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
-            let Some(number) = block.number(letter) else { continue };
-            let length = number * self.modal.unit;
+            let Some(length) = block.coordinate(letter, self.modal.unit) else { continue };
             to[axis] = if machine_frame {
                 length
             } else if self.modal.distance == Reference::Incremental {

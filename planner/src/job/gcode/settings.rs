@@ -2,6 +2,7 @@
 
 use machine::Machine;
 use machine::gcode_settings::GcodeSettings;
+use messages::math::TURN;
 use nalgebra::Vector3;
 
 /// How a machine reads programs, and how fast it is.
@@ -24,8 +25,11 @@ const MOST_LINES: u64 = 10_000_000;
 
 impl ReaderSettings {
     pub(super) fn of(machine: &Machine) -> Self {
+        let mut gcode = machine.gcode;
+        let radius = machine.chuck_radius();
+        gcode.words.way_per_degree = radius.map(|radius| radius * TURN / 360.0);
         Self {
-            gcode: machine.gcode,
+            gcode,
             home: Vector3::from(machine.home),
             mark_speed: machine.path.speed,
             rapid: machine.path.rapid,

@@ -45,8 +45,7 @@ impl Interpreter {
             }
         };
         for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
-            let Some(number) = block.number(letter) else { continue };
-            let length = number * self.modal.unit;
+            let Some(length) = block.coordinate(letter, self.modal.unit) else { continue };
             self.modal.origins[system][axis] = if from_here {
                 self.tracer.position[axis] - self.modal.shift[axis] - length
             } else {

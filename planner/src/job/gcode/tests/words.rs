@@ -223,3 +223,32 @@ fn under_inverse_time_the_speed_is_the_length_by_the_time() {
     assert!(speeds.iter().zip(expected).all(|(speed, wanted)| (speed - wanted).abs() < 1e-15));
     assert_eq!(speeds.len(), expected.len());
 }
+
+#[test]
+fn degrees_of_a_lead_around_a_workpiece_in_a_chuck() {
+    let text = include_str!("../../../../../machines/rotary.toml");
+    let machine = Machine::parse("rotary.toml", text, &[]).unwrap();
+    let quarter = machine.chuck_radius().unwrap() * core::f64::consts::FRAC_PI_2;
+    let ends = |program: &str| -> Vec<f64> {
+        let steps = read("a.nc", program, &machine).unwrap().drawing.steps;
+        let to = steps.iter().filter_map(|step| match step.action {
+            Action::Rapid { to } => Some(to.y),
+            Action::Mark { curve, .. } => Some(curve.to().y),
+            _ => None,
+        });
+        to.map(|y| y - machine.gcode.origins[0][1]).collect()
+    };
+    let near = |found: Vec<f64>, right: &[f64]| {
+        assert_eq!(found.len(), right.len());
+        let are_near = found.iter().zip(right).all(|(one, other)| (one - other).abs() < 1e-12);
+        assert!(are_near, "{found:?} {right:?}");
+    };
+    near(
+        ends("G0 A90 X1\nM3 S500 G1 F600 A-90\nG91 G20 A45"),
+        &[quarter, -quarter, -quarter / 2.0],
+    );
+    near(ends("G0 A90\nG92 A0\nG0 A90\nY0"), &[quarter, 2.0 * quarter, quarter]);
+    assert!(read("a.nc", "G0 A90 Y1", &machine).unwrap_err().message.contains("twice"));
+    let refused = read("a.nc", "G0 A90", &Machine::builtin()).unwrap_err();
+    assert!(refused.message.contains("no rotary axis"), "{}", refused.message);
+}
