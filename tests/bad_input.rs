@@ -281,6 +281,17 @@ fn broken_job_files_are_refused_at_their_line() {
     }
 }
 
+/// The machine file that has `job` as its sample; `None` for the built-in machine.
+fn machine_of(job: &Path) -> Option<PathBuf> {
+    let name = job.file_name().unwrap().to_string_lossy().into_owned();
+    let files = std::fs::read_dir(source("machines")).unwrap();
+    let mut files = files.map(|entry| entry.unwrap().path()).filter(|path| {
+        path.extension().is_some_and(|extension| extension == "toml")
+            && std::fs::read_to_string(path).unwrap().contains(&format!("\"../jobs/{name}\""))
+    });
+    files.next()
+}
+
 #[test]
 fn broken_programs_are_refused_at_their_line() {
     let place = Place::new();
@@ -294,14 +305,19 @@ fn broken_programs_are_refused_at_their_line() {
     assert!(jobs.len() >= 3, "{jobs:?}");
     for job in jobs {
         let text = std::fs::read_to_string(&job).unwrap();
-        assert!(matches!(judge(None, &job, &[]), Verdict::Sound), "{job:?}");
+        let machine = machine_of(&job);
+        let machine = machine.as_deref();
+        assert!(matches!(judge(machine, &job, &[]), Verdict::Sound), "{job:?}");
         let mut refused = Vec::new();
         for (what, broken) in gcode_mutations(&text, &mut random) {
             std::fs::write(&path, &broken).unwrap();
             let what = format!("{}, {what}", job.display());
-            if assert_told(&path, None, &path, &[], &what) {
+            if assert_told(&path, machine, &path, &[], &what) {
                 let kept = format!("{}\n{broken}", path.display());
-                refused.push((kept, vec![path.display().to_string()]));
+                let named = |file: &Path| ["--machine".to_owned(), file.display().to_string()];
+                let mut arguments = vec![path.display().to_string()];
+                arguments.extend(machine.map(named).into_iter().flatten());
+                refused.push((kept, arguments));
             }
         }
         assert_refused_by_binary(&place, &refused, &mut random);

@@ -85,7 +85,7 @@ pub fn read_file(path: &Path) -> Result<Graphic, ReadError> {
     File::open(path).and_then(|file| file.take(limit).read_to_end(&mut bytes)).map_err(
         |error| {
             ReadError::new(
-                format!("{} cannot be read: {error}", path.display()),
+                format!("cannot be read: {error}"),
                 "give a file that exists and may be read",
             )
         },

@@ -35,7 +35,7 @@ impl<'a> OperationQueue<'a> {
     }
 
     /// Begins with the path that has this stroke, from 1, in it; what is marked before is left out.
-    pub(crate) fn from_stroke(self, begins: u64) -> Self {
+    pub(crate) fn beginning_with(self, begins: u64) -> Self {
         Self { begins, ..self }
     }
 

@@ -77,7 +77,7 @@ pub(crate) fn plan_windows(
         job.steps()
             .map_err(|error| PlanError::Unreadable { line: 0, message: error.to_string() })?,
     );
-    let source = OperationQueue::new(steps, operations()).from_stroke(job.marking.from_stroke);
+    let source = OperationQueue::new(steps, operations()).beginning_with(job.marking.from_stroke);
     if job.marking.from_stroke > 1 {
         let text = format!("begins with stroke {}, as the job says", job.marking.from_stroke);
         notes.push(Note { line: 0, text });

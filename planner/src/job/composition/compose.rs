@@ -204,7 +204,7 @@ impl Maker {
         if let Some(last) = marks.last() {
             self.at = last.shape.ends()[1];
         }
-        (!marks.is_empty()).then(|| Section { recipe: way.recipe, marks })
+        (!marks.is_empty()).then_some(Section { recipe: way.recipe, marks })
     }
 
     /// Contours in the order of marking.

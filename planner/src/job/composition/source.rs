@@ -51,7 +51,18 @@ impl<'a> Source<'a> {
             return Some(Self::File { path: path.to_owned() });
         }
         if let Some(file) = &table.file {
-            return Some(Self::File { path: folder.join(&file.value) });
+            let path = folder.join(&file.value);
+            // What cannot be opened is a fault of the job, what is in it one of the file.
+            if let Err(error) = std::fs::File::open(&path) {
+                let text = format!("{}: cannot be read: {error}", path.display());
+                diagnostics.contradict(
+                    file.span,
+                    text,
+                    "a path is relative to the job file's folder",
+                );
+                return None;
+            }
+            return Some(Self::File { path });
         }
         if let Some(text) = &table.text {
             return Self::of_text(text, folder, diagnostics);
