@@ -53,8 +53,12 @@ impl<'a> Source<'a> {
         if let Some(file) = &table.file {
             let path = folder.join(&file.value);
             // What cannot be opened is a fault of the job, what is in it one of the file.
-            if let Err(error) = std::fs::File::open(&path) {
-                let text = format!("{}: cannot be read: {error}", path.display());
+            let cause = match std::fs::File::open(&path).and_then(|opened| opened.metadata()) {
+                Err(error) => Some(error.to_string()),
+                Ok(data) => data.is_dir().then(|| "it is a folder".to_owned()),
+            };
+            if let Some(cause) = cause {
+                let text = format!("{}: cannot be read: {cause}", path.display());
                 diagnostics.contradict(
                     file.span,
                     text,
