@@ -195,12 +195,9 @@ mod tests {
         std::fs::write(&path, PLOT).expect("written");
         assert_eq!(read_file(&path).expect("a plot").shapes.len(), 1);
         assert!(read_file(folder.path()).is_err());
-        assert!(
-            read_file(&folder.path().join("gone.svg"))
-                .expect_err("gone")
-                .message
-                .contains("gone.svg")
-        );
+        // Who asks for it knows the path.
+        let gone = read_file(&folder.path().join("gone.svg")).expect_err("gone");
+        assert!(gone.message.starts_with("cannot be read"), "{}", gone.message);
         let huge = vec![b' '; MOST_BYTES + 1];
         assert!(read(&huge, "plt").expect_err("too large").message.contains("64 MiB"));
     }
