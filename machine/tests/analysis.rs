@@ -335,14 +335,16 @@ fn the_largest_acceleration_uses_one_motor_fully_on_every_machine() {
             motion.acceleration = along * acceleration;
             let joints = mechanism.joint_motion(&motion, mechanism.branch(), &q).unwrap();
             let effort = mechanism.inverse_dynamics(&chain, &Joints::zeros(), &joints.acceleration);
-            let actuators = machine.actuators.iter().enumerate();
-            actuators
-                .map(|(axis, settings)| {
-                    settings.ratio * effort[axis]
-                        + settings.motor.rotor_inertia() * joints.acceleration[axis]
-                            / settings.ratio
-                })
-                .collect()
+            // The motors of an axis together, as if all were at the first one's shaft.
+            let axes = machine.driven().enumerate();
+            axes.map(|(axis, (_, actuators))| {
+                let at_joint = |actuator: &machine::Actuator| {
+                    actuator.motor.rotor_inertia() / (actuator.ratio * actuator.ratio)
+                };
+                let rotors: f64 = actuators.iter().map(at_joint).sum();
+                actuators[0].ratio.abs() * (effort[axis] + rotors * joints.acceleration[axis])
+            })
+            .collect()
         }
     }
     for machine in machines() {
