@@ -26,6 +26,8 @@ mod interpreter;
 mod lexer;
 mod lines;
 mod parameters;
+#[cfg(test)]
+mod pieces;
 mod recognise;
 mod settings;
 mod steps;

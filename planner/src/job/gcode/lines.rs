@@ -243,19 +243,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
-
-    /// Gives out its text in pieces of one length, as a slow pipe does.
-    struct Pieces<'a>(&'a [u8], usize);
-
-    impl Read for Pieces<'_> {
-        fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-            let length = self.1.min(self.0.len()).min(into.len());
-            let (piece, rest) = self.0.split_at(length);
-            into[..length].copy_from_slice(piece);
-            self.0 = rest;
-            Ok(length)
-        }
-    }
+    use crate::job::gcode::pieces::Pieces;
 
     fn read(text: &str, piece: usize) -> Vec<String> {
         let mut lines = Lines::new(Pieces(text.as_bytes(), piece));

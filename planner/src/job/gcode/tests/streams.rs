@@ -6,21 +6,9 @@ use super::samples::ALL;
 use super::*;
 use crate::drawing::{Note, Step};
 use crate::job::gcode::Steps;
+use crate::job::gcode::pieces::Pieces;
 use crate::job::gcode::settings::ReaderSettings;
 use messages::random::SplitMix64;
-
-/// Gives out a program in pieces.
-struct Pieces<'a>(&'a [u8], usize);
-
-impl Read for Pieces<'_> {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let length = self.1.min(self.0.len()).min(into.len());
-        let (piece, rest) = self.0.split_at(length);
-        into[..length].copy_from_slice(piece);
-        self.0 = rest;
-        Ok(length)
-    }
-}
 
 /// The steps of `text` up to its end or its error.
 fn stream(text: &str, piece: usize) -> (Vec<Step>, Option<String>) {
