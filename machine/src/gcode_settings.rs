@@ -1,7 +1,5 @@
 //! How a machine reads G-code: the meaning of words that differ from machine to machine.
 
-use crate::document::{Number, Positive, Spanned};
-
 /// What Z means in a G-code program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ZMeaning {
@@ -120,55 +118,52 @@ impl Dialect {
     }
 }
 
-/// What a machine file or a job says of its dialect; what is `None` stays as it was.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct DialectChoices {
-    /// All meanings at once.
-    pub dialect: Option<Spanned<Dialect>>,
-    /// [`WordMeanings::full_scale`].
-    pub full_scale: Option<Number<Positive>>,
-    /// [`WordMeanings::dwell_unit`].
-    pub dwell_unit: Option<Spanned<DwellUnit>>,
-    /// [`WordMeanings::m3`].
-    pub m3: Option<Spanned<LaserMode>>,
-    /// [`WordMeanings::m4`].
-    pub m4: Option<Spanned<LaserMode>>,
-    /// [`WordMeanings::nested_comments`].
-    pub nested_comments: Option<Spanned<bool>>,
-    /// [`WordMeanings::fan_is_laser`].
-    pub fan_is_laser: Option<Spanned<bool>>,
-}
-
-impl DialectChoices {
-    /// These choices instead of those of `meanings`: a dialect replaces all of them, and what is
-    /// chosen beside it holds before it.
-    #[must_use]
-    pub fn over(&self, meanings: WordMeanings) -> WordMeanings {
-        let base = self.dialect.map_or(meanings, |dialect| dialect.value.meanings());
-        WordMeanings {
-            full_scale: self.full_scale.map_or(base.full_scale, |number| number.value),
-            dwell_unit: self.dwell_unit.map_or(base.dwell_unit, |unit| unit.value),
-            m3: self.m3.map_or(base.m3, |mode| mode.value),
-            m4: self.m4.map_or(base.m4, |mode| mode.value),
-            nested_comments: self.nested_comments.map_or(base.nested_comments, |is| is.value),
-            fan_is_laser: self.fan_is_laser.map_or(base.fan_is_laser, |is| is.value),
-            ..base
-        }
-    }
-}
-
-/// The [`DialectChoices`] of a table with the keys of a dialect.
+/// A table of a document, as [`table!`](crate::table!) declares them, with the keys of a dialect before its
+/// own. What the file leaves out stays as it was.
 #[macro_export]
-macro_rules! dialect_choices {
-    ($table:expr) => {
-        $crate::gcode_settings::DialectChoices {
-            dialect: $table.dialect,
-            full_scale: $table.full_scale,
-            dwell_unit: $table.dwell_unit,
-            m3: $table.m3,
-            m4: $table.m4,
-            nested_comments: $table.nested_comments,
-            fan_is_laser: $table.fan_is_laser,
+macro_rules! dialect_table {
+    ($(#[doc = $about:expr])* pub struct $name:ident { $($rest:tt)* }) => {
+        $crate::table! {
+            $(#[doc = $about])*
+            pub struct $name {
+                /// For which controller programs are written: all of the following at once.
+                pub dialect: Option<$crate::document::Spanned<$crate::gcode_settings::Dialect>>,
+                /// The S word that means full power; left out, the dialect says it, 1000 by default.
+                pub full_scale: Option<$crate::document::Number<$crate::document::Positive>>,
+                /// In what P of G4 is: `s` or `ms`.
+                pub dwell_unit: Option<$crate::document::Spanned<$crate::gcode_settings::DwellUnit>>,
+                /// What M3 is: `constant` power, or `proportional` to the speed.
+                pub m3: Option<$crate::document::Spanned<$crate::gcode_settings::LaserMode>>,
+                /// What M4 is, likewise.
+                pub m4: Option<$crate::document::Spanned<$crate::gcode_settings::LaserMode>>,
+                /// Whether a comment in parentheses may have others in it.
+                pub nested_comments: Option<$crate::document::Spanned<bool>>,
+                /// Whether M106 and M107 switch the laser.
+                pub fan_is_laser: Option<$crate::document::Spanned<bool>>,
+                $($rest)*
+            }
+        }
+
+        impl $name {
+            /// What the table says instead of `meanings`: a dialect replaces all of them, and what is
+            /// said beside it holds before it.
+            pub fn over(
+                &self,
+                meanings: $crate::gcode_settings::WordMeanings,
+            ) -> $crate::gcode_settings::WordMeanings {
+                let base = self.dialect.map_or(meanings, |dialect| dialect.value.meanings());
+                $crate::gcode_settings::WordMeanings {
+                    full_scale: self.full_scale.map_or(base.full_scale, |number| number.value),
+                    dwell_unit: self.dwell_unit.map_or(base.dwell_unit, |unit| unit.value),
+                    m3: self.m3.map_or(base.m3, |mode| mode.value),
+                    m4: self.m4.map_or(base.m4, |mode| mode.value),
+                    nested_comments: self
+                        .nested_comments
+                        .map_or(base.nested_comments, |is| is.value),
+                    fan_is_laser: self.fan_is_laser.map_or(base.fan_is_laser, |is| is.value),
+                    ..base
+                }
+            }
         }
     };
 }

@@ -8,7 +8,7 @@
 use super::frame::MachineFrameTable;
 use super::mechanism::MechanismTable;
 use crate::document::{Either, Fraction, Named, NonNegative, Number, Point, Positive, Spanned};
-use crate::gcode_settings::{Dialect, DwellUnit, LaserMode, ZMeaning};
+use crate::gcode_settings::ZMeaning;
 use crate::limits::CornerMode;
 use crate::quantity as unit;
 use crate::table;
@@ -326,23 +326,9 @@ table! {
     }
 }
 
-table! {
+crate::dialect_table! {
     /// How the machine reads G-code.
     pub struct GcodeTable {
-        /// For which controller programs are written: all of the following at once.
-        pub dialect: Option<Spanned<Dialect>>,
-        /// The S word that means full power; 1000 unless the dialect has another.
-        pub full_scale: Option<Number<Positive>>,
-        /// In what P of G4 is: `s` or `ms`.
-        pub dwell_unit: Option<Spanned<DwellUnit>>,
-        /// What M3 is: `constant` power, or `proportional` to the speed.
-        pub m3: Option<Spanned<LaserMode>>,
-        /// What M4 is, likewise.
-        pub m4: Option<Spanned<LaserMode>>,
-        /// Whether a comment in parentheses may have others in it.
-        pub nested_comments: Option<Spanned<bool>>,
-        /// Whether M106 and M107 switch the laser.
-        pub fan_is_laser: Option<Spanned<bool>>,
         /// What Z means: `ignored`, or the height of the `focus` on a machine with a z axis.
         pub z: Spanned<ZMeaning> = "ignored",
         /// Whether M7 and M8 switch an air assist.

@@ -67,7 +67,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         stall,
         laser,
         gcode: GcodeSettings {
-            words: crate::dialect_choices!(gcode).over(Dialect::Standard.meanings()),
+            words: gcode.over(Dialect::Standard.meanings()),
             z: gcode.z.value,
             origins: origins(&gcode.origins, home),
             air_assist: gcode.air_assist.value,

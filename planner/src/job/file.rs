@@ -6,7 +6,7 @@ use machine::document::{
     Diagnostics, Document, Either, Fraction, Named, Number, Point, Positive, Quantity, Spanned,
     schema_text,
 };
-use machine::gcode_settings::{Dialect, DialectChoices, DwellUnit, LaserMode};
+use machine::gcode_settings::WordMeanings;
 use machine::quantity::{Duration, Length, Speed};
 use machine::{DocumentError, Machine, Override, table};
 use nalgebra::Vector3;
@@ -112,45 +112,17 @@ table! {
     }
 }
 
-table! {
+machine::dialect_table! {
     /// A G-code program.
     pub struct GcodeTable {
         /// The file, relative to this one.
         pub file: Spanned<String>,
-        /// For which controller programs are written: all of the following at once.
-        pub dialect: Option<Spanned<Dialect>>,
-        /// The S word that means full power.
-        pub full_scale: Option<Number<Positive>>,
-        /// In what P of G4 is: `s` or `ms`.
-        pub dwell_unit: Option<Spanned<DwellUnit>>,
-        /// What M3 is: `constant` power, or `proportional` to the speed.
-        pub m3: Option<Spanned<LaserMode>>,
-        /// What M4 is, likewise.
-        pub m4: Option<Spanned<LaserMode>>,
-        /// Whether a comment in parentheses may have others in it.
-        pub nested_comments: Option<Spanned<bool>>,
-        /// Whether M106 and M107 switch the laser.
-        pub fan_is_laser: Option<Spanned<bool>>,
     }
 }
 
-table! {
+machine::dialect_table! {
     /// What the words of a G-code program mean.
     pub struct DialectTable {
-        /// For which controller programs are written: all of the following at once.
-        pub dialect: Option<Spanned<Dialect>>,
-        /// The S word that means full power.
-        pub full_scale: Option<Number<Positive>>,
-        /// In what P of G4 is: `s` or `ms`.
-        pub dwell_unit: Option<Spanned<DwellUnit>>,
-        /// What M3 is: `constant` power, or `proportional` to the speed.
-        pub m3: Option<Spanned<LaserMode>>,
-        /// What M4 is, likewise.
-        pub m4: Option<Spanned<LaserMode>>,
-        /// Whether a comment in parentheses may have others in it.
-        pub nested_comments: Option<Spanned<bool>>,
-        /// Whether M106 and M107 switch the laser.
-        pub fan_is_laser: Option<Spanned<bool>>,
     }
 }
 
@@ -334,8 +306,8 @@ fn of_tables(
         Ok(diagnostics.finish(Job { files, ..job_of(drawing, marking) })?)
     } else if let Some(program) = gcode {
         let path: PathBuf = folder.join(&program.file.value);
-        let dialect = machine::dialect_choices!(program);
-        of_program(&path, &dialect, marking, diagnostics, machine, most)
+        let words = program.over(machine.gcode.words);
+        of_program(&path, words, marking, diagnostics, machine, most)
     } else if drawing.is_some() || drawings.is_some() {
         let named = drawings.iter().flat_map(|drawings| &drawings.entries).map(|(_, table)| table);
         let parts = drawing.iter().chain(named).map(|table| Part { table, file: None }).collect();
@@ -371,8 +343,8 @@ pub(super) fn program(
     let empty = Document::parse(&path.display().to_string(), "")?;
     let (table, mut diagnostics) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
     check_start(&table.marking, &mut diagnostics);
-    let dialect = machine::dialect_choices!(table.gcode);
-    of_program(path, &dialect, &table.marking, diagnostics, machine, most)
+    let words = table.gcode.over(machine.gcode.words);
+    of_program(path, words, &table.marking, diagnostics, machine, most)
 }
 
 /// Reads the drawing at `path` as a job of its own, with `overrides` of its tables.
@@ -497,7 +469,7 @@ fn of_points(
 
 fn of_program(
     path: &Path,
-    dialect: &DialectChoices,
+    words: WordMeanings,
     marking: &MarkingTable,
     mut diagnostics: Diagnostics,
     machine: &Machine,
@@ -511,7 +483,7 @@ fn of_program(
         );
     }
     diagnostics.finish(())?;
-    let (program, steps) = gcode::ProgramFile::open(path, dialect, machine, most)?;
+    let (program, steps) = gcode::ProgramFile::open(path, words, machine, most)?;
     let survey = program.survey.clone();
     let rest = if steps.is_none() { Some(program) } else { None };
     let drawing = Drawing {

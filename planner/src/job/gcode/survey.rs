@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use machine::Machine;
-use machine::gcode_settings::DialectChoices;
+use machine::gcode_settings::WordMeanings;
 
 use super::settings::ReaderSettings;
 use super::steps::Steps;
@@ -63,7 +63,7 @@ pub struct Survey {
 /// Where it cannot be read; the first thing that is not G-code, not supported here, or contradicts
 /// itself, and with it what else is wrong further down.
 pub fn survey(path: &Path, machine: &Machine) -> Result<Survey, JobError> {
-    let (program, _) = ProgramFile::open(path, &DialectChoices::default(), machine, 0)?;
+    let (program, _) = ProgramFile::open(path, machine.gcode.words, machine, 0)?;
     Ok(program.survey)
 }
 
@@ -81,19 +81,18 @@ pub struct ProgramFile {
 pub type FileSteps = Steps<Watched>;
 
 impl ProgramFile {
-    /// Reads the program at `path` through, in the dialect of the machine or what is chosen over it. Gives back its steps too if it has no more than `most`
-    /// lines, and always if it is no regular file, which can be read only once.
+    /// Reads the program at `path` through, whose words mean what `words` say. Gives back its steps too if
+    /// it has no more than `most` lines, and always if it is no regular file, which can be read only once.
     ///
     /// # Errors
     /// As of [`survey`].
     pub(in crate::job) fn open(
         path: &Path,
-        dialect: &DialectChoices,
+        words: WordMeanings,
         machine: &Machine,
         most: u64,
     ) -> Result<(Self, Option<Vec<Step>>), JobError> {
-        let mut settings = ReaderSettings::of(machine);
-        settings.gcode.words = dialect.over(settings.gcode.words);
+        let settings = ReaderSettings::of(machine).with_words(words);
         let watched = Watched::open(path)?;
         let stamp = watched.stamp;
         let most = if stamp.is_some() { most } else { u64::MAX };

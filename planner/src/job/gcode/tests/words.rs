@@ -1,7 +1,11 @@
 //! What single words mean.
 
+use machine::gcode_settings::Dialect;
+
 use super::*;
 use crate::drawing::{Corners, Power};
+use crate::job::gcode::read_by;
+use crate::job::gcode::settings::ReaderSettings;
 
 /// The ends of all moves [mm], a letter for each: rapid, mark or feed in the dark.
 pub(super) fn moves(text: &str) -> Vec<(char, f64, f64)> {
@@ -248,6 +252,9 @@ fn degrees_of_a_lead_around_a_workpiece_in_a_chuck() {
         &[quarter, -quarter, -quarter / 2.0],
     );
     near(ends("G0 A90\nG92 A0\nG0 A90\nY0"), &[quarter, 2.0 * quarter, quarter]);
+    // Another dialect leaves the chuck where it is.
+    let settings = ReaderSettings::of(&machine).with_words(Dialect::Marlin.meanings());
+    assert!(read_by("a.nc", "G0 A90", &settings).is_ok());
     assert!(read("a.nc", "G0 A90 Y1", &machine).unwrap_err().message.contains("twice"));
     let refused = read("a.nc", "G0 A90", &Machine::builtin()).unwrap_err();
     assert!(refused.message.contains("no rotary axis"), "{}", refused.message);
