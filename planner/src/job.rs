@@ -4,12 +4,17 @@ pub mod cloud;
 pub mod cloud_table;
 pub mod composition;
 mod drawing_error;
+pub mod drawing_table;
 mod estimate;
 pub mod file;
 pub mod gcode;
 pub mod letters;
+pub mod letters_table;
+pub mod marking_table;
 pub mod path_table;
 pub mod points;
+pub mod points_table;
+pub mod program_table;
 mod whole;
 mod within_reach;
 pub mod workpiece_table;
@@ -216,14 +221,14 @@ impl Job {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or("");
         let extension = extension.to_ascii_lowercase();
         if GCODE.contains(&extension.as_str()) {
-            return file::program(path, overrides, machine, most);
+            return program_table::program(path, overrides, machine, most);
         }
         if DRAWINGS.contains(&extension.as_str()) {
-            return file::drawing(path, overrides, machine);
+            return drawing_table::drawing(path, overrides, machine);
         }
         if extension != JOB_FILE {
             if gcode::is_program(path) {
-                return file::program(path, overrides, machine, most);
+                return program_table::program(path, overrides, machine, most);
             }
             let known = || GCODE.into_iter().chain([JOB_FILE]).chain(DRAWINGS);
             let help = match nearest(&extension, known()) {

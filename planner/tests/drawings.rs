@@ -157,6 +157,28 @@ fn layers_say_how_their_colours_are_marked() {
 }
 
 #[test]
+fn the_optimum_is_for_layers_without_a_speed_of_their_own() {
+    let job = read(DRAWING, &["layers.blue.speed=50 mm/s", "marking.speed=optimum"]).unwrap();
+    let asked: Vec<Option<f64>> = steps(&job)
+        .iter()
+        .filter_map(|step| match step.action {
+            Action::Mark { speed, .. } => Some(speed),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(asked, [Some(0.05), None, None, None, None, None]);
+    let facts = planner::plan(&Machine::builtin(), &job).unwrap().facts;
+    assert!(facts.speed > 0.05 && facts.speed <= 0.25 + 1e-9, "{}", facts.speed);
+}
+
+#[test]
+fn an_order_is_for_drawings_alone() {
+    let text = "[letters]\ntext = \"N\"\n[order]\nrepeat = 2\n";
+    let error = Job::parse("job.toml", text, &Machine::builtin()).unwrap_err();
+    assert!(error.to_string().contains("[order] is for drawings"), "{error}");
+}
+
+#[test]
 fn what_lies_inside_is_marked_first() {
     let is_circle =
         |step: &Step| matches!(step.action, Action::Mark { curve: Curve::Arc { .. }, .. });

@@ -9,7 +9,9 @@ use messages::math;
 use nalgebra::Vector3;
 
 use super::cloud::{self, Cloud, Glass, Height};
+use super::file::Reading;
 use super::whole::whole;
+use super::{Job, JobError};
 use crate::drawing::Drawing;
 
 table! {
@@ -69,8 +71,18 @@ table! {
     }
 }
 
+/// The job that marks a cloud.
+pub(super) fn read(table: &CloudTable, mut reading: Reading<'_>) -> Result<Job, JobError> {
+    let power = reading.beside.marking.level();
+    let (folder, machine) = (reading.folder, reading.machine);
+    let drawing = draw(table, folder, power, &mut reading.diagnostics, machine)?;
+    let files = table.file.iter().map(|file| folder.join(&file.value)).collect();
+    let job = Job { files, ..reading.job_of(drawing) };
+    reading.finish(job)
+}
+
 /// The drawing of a cloud; what is wrong with the table goes to `diagnostics`.
-pub(super) fn draw(
+fn draw(
     table: &CloudTable,
     folder: &Path,
     power: f64,

@@ -83,6 +83,11 @@ impl Composition {
         (0..self.repeat).flat_map(|_| self.sections.iter().flat_map(Section::steps))
     }
 
+    /// Whether the speed of some layer is for the planner to choose.
+    pub(crate) fn leaves_speeds_open(&self) -> bool {
+        self.sections.iter().any(|section| section.recipe.speed.is_none())
+    }
+
     /// The smallest upright rectangle around all of it, machine frame [m]; `None` where there is nothing.
     pub(crate) fn bounds(&self) -> Option<Rect> {
         let marks = self.sections.iter().flat_map(|section| &section.marks);

@@ -9,7 +9,8 @@ use machine::quantity::{Angle, Length};
 use machine::{Machine, Mechanism, MechanismVisitor, Pose, table};
 use nalgebra::{Matrix3, Vector3};
 
-use super::Job;
+use super::file::Reading;
+use super::{Job, JobError};
 use crate::drawing::{Action, Curve, Drawing, Power, Step};
 use crate::geometry::attitude::{AttitudeLaw, turned};
 use crate::geometry::posed_path::{Between, PathPose, PosedPath};
@@ -58,9 +59,31 @@ table! {
     }
 }
 
+/// The job that marks a path.
+pub(super) fn read(table: &PathTable, mut reading: Reading<'_>) -> Result<Job, JobError> {
+    let (surface, attitude) = (reading.beside.surface.is_some(), reading.beside.attitude.is_some());
+    if surface && table.smooth.value {
+        let text = "a smooth curve through points is not put on a surface".to_owned();
+        let help = "leave `smooth` or [surface] out";
+        reading.diagnostics.contradict(table.smooth.span, text, help);
+    }
+    if let Some(poses) = &table.poses {
+        let given = [surface.then_some("[surface]"), attitude.then_some("[attitude]")];
+        for other in given.into_iter().flatten() {
+            let place = poses.first().map_or(table.span, |pose| pose.at.span);
+            let text = format!("{other} and `poses` both say how the tool is turned");
+            reading.diagnostics.contradict(place, text, "keep one of them");
+        }
+    }
+    let (line, name) = (reading.line(table.span), reading.stem("path"));
+    let marking = &reading.beside.marking;
+    let job = job(table, &name, marking.level(), reading.machine, line, &mut reading.diagnostics);
+    reading.finish(Job { marking: marking.marking(), ..job })
+}
+
 /// The job that marks a path at `power` on `machine`, named `name`, as asked for in `line` of its file;
 /// what is wrong with the table goes to `diagnostics`.
-pub(super) fn job(
+fn job(
     table: &PathTable,
     name: &str,
     power: f64,

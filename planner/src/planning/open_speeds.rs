@@ -4,6 +4,7 @@ use super::operations::{OperationQueue, Steps};
 use crate::drawing::{Action, Step};
 use crate::error::PlanError;
 use crate::geometry::operation::Operation;
+use crate::job::composition::Composition;
 use crate::job::{Job, MarkingSpeed};
 use crate::light::Policy;
 
@@ -23,7 +24,11 @@ pub(super) fn leaves_speeds_open(job: &Job) -> bool {
     match job.marking.speed {
         Some(MarkingSpeed::Constant(_)) => false,
         Some(MarkingSpeed::Optimum) => true,
-        None => job.drawing.steps.iter().any(is_open),
+        None => {
+            let composition = job.composition.as_ref();
+            job.drawing.steps.iter().any(is_open)
+                || composition.is_some_and(Composition::leaves_speeds_open)
+        }
     }
 }
 

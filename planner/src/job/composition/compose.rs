@@ -27,7 +27,7 @@ const MOST_REPEATS: u64 = 100_000;
 pub(in crate::job) struct Parts<'a> {
     pub(in crate::job) drawings: Vec<Part<'a>>,
     pub(in crate::job) layers: Option<&'a Named<LayerTable>>,
-    pub(in crate::job) order: &'a OrderTable,
+    pub(in crate::job) order: Option<&'a OrderTable>,
     pub(in crate::job) frame: Option<&'a FrameTable>,
     pub(in crate::job) defaults: Defaults,
 }
@@ -103,9 +103,12 @@ pub(in crate::job) fn compose(
             .map(|name| Note { line: 0, text: format!("nothing is on the layer `{name}`") }),
     );
     let contents = layers.take();
-    let repeat = whole(&parts.order.repeat, 1..=MOST_REPEATS, "repeat", diagnostics).unwrap_or(1);
+    let repeat = parts
+        .order
+        .and_then(|order| whole(&order.repeat, 1..=MOST_REPEATS, "repeat", diagnostics))
+        .unwrap_or(1);
     let mut maker = Maker {
-        order: parts.order.by.value,
+        order: parts.order.map_or(OrderWord::Shortest, |order| order.by.value),
         at: Point::new(machine.home[0], machine.home[1]),
         saved: [0.0; 2],
         notes,
