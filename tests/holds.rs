@@ -282,7 +282,12 @@ impl<'a> Bench<'a> {
 
     fn ask(&mut self, verb: OperatorVerb, value: f64) {
         self.ticket += 1;
-        self.cycle(Some(OperatorRequest { verb: verb as u32, ticket: self.ticket, value }));
+        self.cycle(Some(OperatorRequest {
+            verb: verb as u32,
+            ticket: self.ticket,
+            value,
+            ..OperatorRequest::default()
+        }));
         let reply = self.outputs.reply.unwrap();
         assert_eq!(reply.accepted, 1, "{}: {verb:?} in {:?}", self.planned.name, self.state());
     }

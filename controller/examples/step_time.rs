@@ -65,6 +65,7 @@ fn main() {
                 verb: verb as u32,
                 ticket: cycle,
                 value,
+                ..OperatorRequest::default()
             });
             feedback.cycle = Cycle(u64::from(cycle));
             if outputs.command.mode() == CommandMode::Voltage {

@@ -52,6 +52,7 @@ fn assert_no_step_allocates(machine: &Machine, speed: f64) {
             verb: verb as u32,
             ticket: cycle as u32,
             value,
+            ..OperatorRequest::default()
         });
         // Stalls of drives while it plays, while it is held, and on the way back for light; and commands
         // that come too late.

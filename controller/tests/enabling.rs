@@ -73,7 +73,12 @@ impl Rig {
         let before = feedback.position[SLIDE];
         feedback.position[SLIDE] = self.home[SLIDE] + away;
         feedback.velocity[SLIDE] = (feedback.position[SLIDE] - before) / CYCLE_TIME;
-        let request = verb.map(|verb| OperatorRequest { verb: verb as u32, ticket: 1, value: 0.0 });
+        let request = verb.map(|verb| OperatorRequest {
+            verb: verb as u32,
+            ticket: 1,
+            value: 0.0,
+            ..OperatorRequest::default()
+        });
         let now = feedback.deadline;
         let peers = Peers::default();
         let inputs = Inputs { feedback, received: now, setpoints: &[], request, peers };

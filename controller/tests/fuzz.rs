@@ -95,7 +95,12 @@ fn play(machine: &Machine, job: &Job, doubts: u64, random: &mut SplitMix64) -> (
             }
             _ => None,
         };
-        let request = request.map(|(verb, value)| OperatorRequest { verb, ticket: 9, value });
+        let request = request.map(|(verb, value)| OperatorRequest {
+            verb,
+            ticket: 9,
+            value,
+            ..OperatorRequest::default()
+        });
         // A planner that is late now and then.
         let room = controller.room().min(random.below(9) as usize);
         let end = (sent + room).min(job.setpoints.len());

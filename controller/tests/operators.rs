@@ -43,7 +43,7 @@ fn each_state_takes_only_what_makes_sense() {
     let mut bench = Bench::new(&machine);
     bench.run(None, 2);
     refuse(&mut bench, &[Disable, Hold, Resume, Stop, Reset, Override, Start]);
-    let unknown = OperatorRequest { verb: 99, ticket: 7, value: 0.0 };
+    let unknown = OperatorRequest { verb: 99, ticket: 7, value: 0.0, ..OperatorRequest::default() };
     assert_eq!(bench.cycle(None, Some(unknown), |_| {}).unwrap().accepted, 0);
     assert!(bench.ask(None, Enable, 0.0));
     refuse(&mut bench, &[Enable, Hold, Resume, Stop, Reset]);

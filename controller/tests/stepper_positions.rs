@@ -130,7 +130,12 @@ impl Drivers {
         let request = verb.map(|verb| {
             self.ticket += 1;
             let value = if verb == OperatorVerb::Start { 1.0 } else { 0.0 };
-            OperatorRequest { verb: verb as u32, ticket: self.ticket, value }
+            OperatorRequest {
+                verb: verb as u32,
+                ticket: self.ticket,
+                value,
+                ..OperatorRequest::default()
+            }
         });
         let now = self.feedback.deadline;
         let inputs = Inputs {

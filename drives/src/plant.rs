@@ -36,6 +36,7 @@ pub mod motors;
 pub mod source;
 pub mod state;
 pub mod stepping;
+pub mod switches;
 pub mod winding;
 
 use machine::kinematics::{Joints, KinematicsError};
@@ -153,7 +154,8 @@ impl SimulatedPlant {
         machine: &Machine,
         options: PlantOptions,
     ) -> Result<Box<dyn Port + Send>, PlantError> {
-        machine.mechanism.visit(Build { machine, options })
+        let plant = machine.mechanism.visit(Build { machine, options })?;
+        Ok(switches::Switched::new(machine, plant))
     }
 }
 

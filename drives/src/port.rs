@@ -95,8 +95,8 @@ pub struct Measurement {
     pub current: ActuatorArray,
     /// Tool centre point in the machine frame [m], where the port knows it.
     pub tool: Option<[f64; 3]>,
-    /// Digital inputs, one bit each.
-    pub inputs: u16,
+    /// Digital inputs in the order of the machine file, one bit each: 1 is active, whichever level that is.
+    pub inputs: u64,
     /// What the laser did since the previous exchange; offsets count from there, through the cycles
     /// that passed since.
     pub laser: LaserCycle,
@@ -124,5 +124,11 @@ pub trait Port {
     /// touched here. A plant that moves only when it is told moves on.
     fn pass(&mut self, actuation: &Actuation) {
         let _ = actuation;
+    }
+
+    /// Sets the inputs of a simulated machine that have no place of their own, one bit each; hardware has
+    /// its own and ignores this.
+    fn set_inputs(&mut self, inputs: u64) {
+        let _ = inputs;
     }
 }

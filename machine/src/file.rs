@@ -7,6 +7,7 @@ pub mod bounds;
 pub mod frame;
 pub mod mechanism;
 pub mod motors;
+pub mod operating;
 mod relations;
 pub mod tables;
 mod unused;

@@ -9,6 +9,7 @@ use crate::gcode_settings::GcodeSettings;
 use crate::laser::LaserSource;
 use crate::limits::{CornerMode, PathLimits, StallTolerance, WorkArea};
 use crate::mechanisms::MechanismKind;
+use crate::operating::Operating;
 
 /// The built-in machine's file.
 pub const BUILTIN: &str = include_str!("../../machines/corexy.toml");
@@ -39,6 +40,8 @@ pub struct Machine {
     pub corners: CornerMode,
     /// How long the axes may go on without a fresh command.
     pub stall: StallTolerance,
+    /// Its switches, how its axes are homed, and what is done for safety.
+    pub operating: Operating,
     /// The laser source.
     pub laser: LaserSource,
     /// How it reads G-code.

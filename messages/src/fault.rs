@@ -47,6 +47,14 @@ pub enum FaultCode {
     StreamStart = 16,
     /// Two actuators of one axis are too far from each other.
     Racking = 17,
+    /// The emergency stop was pressed.
+    EmergencyStop = 18,
+    /// An axis ran onto its limit switch.
+    HardLimit = 19,
+    /// The door was opened.
+    DoorOpened = 20,
+    /// An axis did not find its reference.
+    HomingFailed = 21,
 }
 
 impl FaultCode {
@@ -70,6 +78,10 @@ impl FaultCode {
             15 => Self::SupervisorLost,
             16 => Self::StreamStart,
             17 => Self::Racking,
+            18 => Self::EmergencyStop,
+            19 => Self::HardLimit,
+            20 => Self::DoorOpened,
+            21 => Self::HomingFailed,
             _ => Self::DriveFault,
         }
     }
@@ -95,6 +107,10 @@ impl FaultCode {
             Self::SupervisorLost => "supervisor_lost",
             Self::StreamStart => "stream_start",
             Self::Racking => "racking",
+            Self::EmergencyStop => "emergency_stop",
+            Self::HardLimit => "hard_limit",
+            Self::DoorOpened => "door_opened",
+            Self::HomingFailed => "homing_failed",
         }
     }
 }

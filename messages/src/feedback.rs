@@ -21,7 +21,7 @@ pub mod status {
 
 sample! {
     /// One measurement, taken at the deadline of `cycle`.
-    Feedback = "graver.Feedback.v3" {
+    Feedback = "graver.Feedback.v4" {
         /// Identifies this run of drives: its start on the monotonic clock [ns].
         epoch: u64,
         /// The cycle that starts with this measurement.
@@ -49,12 +49,14 @@ sample! {
         overruns: u64,
         /// Bits of [`status`].
         status: u32,
-        /// Digital inputs, one bit each.
-        inputs: u16,
         /// Cycles left out between the feedback before and this one: drives was too late for their
         /// deadlines. Nobody measured in them, and the gate was closed. The largest number stands
         /// for all above it: so long a stall is a fault in any case.
         skipped: u16,
+        /// Always 0; keeps the sample free of padding.
+        reserved: u16,
+        /// Digital inputs in the order of the machine file, one bit each: 1 is active, whichever level that is.
+        inputs: u64,
         /// Encoder counts since power-on.
         counts: [i64; MAX_ACTUATORS],
         /// Motor position from the encoder [rad].

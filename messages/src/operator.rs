@@ -23,6 +23,17 @@ pub enum OperatorVerb {
     Override = 7,
     /// Play the stream whose number is `value`; no other stream is ever played.
     Start = 8,
+    /// Find the reference of the axes whose bits `axis` has, 0 for all, in the machine file's order.
+    Home = 9,
+    /// Move axis `axis` at speed `value`, with its sign, for as long as this request is repeated within the
+    /// machine file's `safety.dead_man`; 0 stops it.
+    Jog = 10,
+    /// Move axis `axis` on by `value`, at speed `second` at most.
+    Step = 11,
+    /// Light with power `value`, 0..=1, for `second` [s].
+    TestPulse = 12,
+    /// Move axis `axis` on by `value` at speed `second` until the probe touches.
+    Probe = 13,
 }
 
 impl OperatorVerb {
@@ -37,6 +48,11 @@ impl OperatorVerb {
             6 => Self::Reset,
             7 => Self::Override,
             8 => Self::Start,
+            9 => Self::Home,
+            10 => Self::Jog,
+            11 => Self::Step,
+            12 => Self::TestPulse,
+            13 => Self::Probe,
             _ => return None,
         })
     }
@@ -44,28 +60,42 @@ impl OperatorVerb {
 
 sample! {
     /// One request, from the domain holder to the controller.
-    OperatorRequest = "graver.OperatorRequest.v1" {
+    OperatorRequest = "graver.OperatorRequest.v2" {
         /// An [`OperatorVerb`].
         verb: u32,
         /// Numbers requests, so that an answer can be told from an older one.
         ticket: u32,
+        /// The axis from 1, or bits of axes, where the verb is about axes; else 0.
+        axis: u32,
+        /// Always 0; keeps the sample free of padding.
+        reserved: u32,
         /// The verb's argument, 0 without.
         value: f64,
+        /// Its second one, 0 without.
+        second: f64,
     }
 }
 
 sample! {
     /// The controller's answer, given as soon as the request is accepted or refused; its effect
     /// shows in the progress.
-    OperatorReply = "graver.OperatorReply.v1" {
+    OperatorReply = "graver.OperatorReply.v2" {
         /// The request's ticket.
         ticket: u32,
-        /// 1 when it was carried out, 0 when the state does not allow it.
+        /// 1 when it is carried out, 0 when it is refused.
         accepted: u32,
         /// The [`ControllerState`](crate::ControllerState) it met.
         state: u32,
+        /// A [`Refusal`](crate::Refusal): why it is refused.
+        refusal: u32,
+        /// The axis that it is refused for, from 1; 0 for none.
+        axis: u32,
         /// Always 0; keeps the sample free of padding.
         reserved: u32,
+        /// What was found, as the refusal says.
+        found: f64,
+        /// What was due, as the refusal says.
+        limit: f64,
         /// The rate that is asked for since the last override, 1 before the first.
         value: f64,
     }

@@ -4,7 +4,7 @@ use crate::{Fault, Nanoseconds, sample};
 
 sample! {
     /// Published every few cycles; the planner's licence to send more.
-    Progress = "graver.Progress.v4" {
+    Progress = "graver.Progress.v5" {
         /// When it was published.
         published: Nanoseconds,
         /// The stream in the look-ahead, 0 for none.
@@ -28,6 +28,14 @@ sample! {
         tool: [f64; 3],
         /// Joint reference now, load side [m or rad]: where a new stream must start.
         position: crate::AxisArray,
+        /// Digital inputs in the order of the machine file, one bit each: 1 is active.
+        inputs: u64,
+        /// Axes that know their place, one bit each.
+        homed: u32,
+        /// The axis that was probed last, from 1; 0 before the probe has touched.
+        probed_axis: u32,
+        /// Where its joint was when the probe touched [m or rad].
+        probed: f64,
         /// A [`ControllerState`](crate::ControllerState).
         state: u32,
         /// 1 if the newest finished stream was played to its end, else 0.

@@ -7,6 +7,7 @@
 ///     ▲                            ▲  ◄──end──────┤  └────hold────►  │
 ///     └──────────── disable ───────┘              ▼                  │
 ///                                  Idle ◄──── Stopping ◄────stop─────┘
+/// Idle ─home, jog, step, probe, test pulse─► Homing, Jogging, Probing, Pulsing ─► Idle
 /// any state ──fault──► Stopping or Faulted; Faulted ──reset──► Disabled
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -27,6 +28,16 @@ pub enum ControllerState {
     Stopping = 5,
     /// At rest, unpowered, laser off, until a person resets the fault.
     Faulted = 6,
+    /// Looking for the axes' references.
+    Homing = 7,
+    /// Axes moved by hand.
+    Jogging = 8,
+    /// Moving until the probe touches.
+    Probing = 9,
+    /// A test pulse of the laser, at rest.
+    Pulsing = 10,
+    /// At rest, powered, laser off, until a person resets the fault: an emergency stop of category 2.
+    Halted = 11,
 }
 
 impl ControllerState {
@@ -39,6 +50,11 @@ impl ControllerState {
             3 => Self::Running,
             4 => Self::Holding,
             5 => Self::Stopping,
+            7 => Self::Homing,
+            8 => Self::Jogging,
+            9 => Self::Probing,
+            10 => Self::Pulsing,
+            11 => Self::Halted,
             _ => Self::Faulted,
         }
     }
@@ -53,6 +69,11 @@ impl ControllerState {
             Self::Holding => "holding",
             Self::Stopping => "stopping",
             Self::Faulted => "faulted",
+            Self::Homing => "homing",
+            Self::Jogging => "jogging",
+            Self::Probing => "probing",
+            Self::Pulsing => "pulsing",
+            Self::Halted => "halted",
         }
     }
 }

@@ -240,9 +240,19 @@ impl OperatorLink {
         value: f64,
         patience: Duration,
     ) -> Result<OperatorReply, OperatorError> {
+        let request = OperatorRequest { verb: verb as u32, value, ..OperatorRequest::default() };
+        self.ask_within(request, patience)
+    }
+
+    /// Like [`Self::request_within`], with every argument; the ticket is given here.
+    pub fn ask_within(
+        &self,
+        request: OperatorRequest,
+        patience: Duration,
+    ) -> Result<OperatorReply, OperatorError> {
         let lost = || OperatorError::Channel(ChannelError::Lost { channel: SERVICE });
         let ticket = self.tickets.fetch_add(1, Ordering::Relaxed).wrapping_add(1);
-        let request = OperatorRequest { verb: verb as u32, ticket, value };
+        let request = OperatorRequest { ticket, ..request };
         let (answer, answered) = bounded(1);
         let questions = self.questions.as_ref().ok_or_else(lost)?;
         questions.send(Question { request, patience, answer }).map_err(|_| lost())?;

@@ -78,8 +78,12 @@ impl<'a> Chain<'a> {
             START => Some((OperatorVerb::Start, 1.0)),
             _ => ask,
         };
-        let request =
-            verb.map(|(verb, value)| OperatorRequest { verb: verb as u32, ticket: 1, value });
+        let request = verb.map(|(verb, value)| OperatorRequest {
+            verb: verb as u32,
+            ticket: 1,
+            value,
+            ..OperatorRequest::default()
+        });
         let plays = self.cycle > START && self.is_fed;
         let room = if plays { self.controller.room().min(DRAIN) } else { 0 };
         let setpoints: Vec<Setpoint> = self.setpoints.by_ref().take(room).collect();

@@ -127,7 +127,7 @@ impl Pipeline {
 }
 
 fn request(verb: OperatorVerb, value: f64) -> OperatorRequest {
-    OperatorRequest { verb: verb as u32, ticket: 1, value }
+    OperatorRequest { verb: verb as u32, ticket: 1, value, ..OperatorRequest::default() }
 }
 
 /// Plays `plan` on a controller for `machine` and a simulated `plant`; `examine` gets every record

@@ -2,7 +2,7 @@
 
 use super::Controller;
 use crate::state::{AfterRest, State};
-use messages::{Cycle, Fault, OperatorReply, OperatorRequest, OperatorVerb};
+use messages::{Cycle, Fault, OperatorReply, OperatorRequest, OperatorVerb, Refusal};
 
 impl Controller {
     /// Carries a request out in `cycle`, or refuses it.
@@ -14,7 +14,11 @@ impl Controller {
             ticket: request.ticket,
             accepted: u32::from(accepted),
             state: met as u32,
+            refusal: if accepted { Refusal::None } else { Refusal::State } as u32,
+            axis: 0,
             reserved: 0,
+            found: 0.0,
+            limit: 0.0,
             value: self.player.asked_rate(),
         }
     }

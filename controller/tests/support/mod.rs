@@ -330,7 +330,12 @@ impl Bench {
 
     pub fn request(&mut self, verb: OperatorVerb, value: f64) -> OperatorRequest {
         self.ticket += 1;
-        OperatorRequest { verb: verb as u32, ticket: self.ticket, value }
+        OperatorRequest {
+            verb: verb as u32,
+            ticket: self.ticket,
+            value,
+            ..OperatorRequest::default()
+        }
     }
 
     /// One cycle: measure, answer, move on with the command before.

@@ -7,6 +7,7 @@
 
 use super::frame::MachineFrameTable;
 use super::mechanism::MechanismTable;
+use super::operating::{HomingTable, InputTable, OutputTable, SafetyTable};
 use crate::document::{Either, Fraction, Named, NonNegative, Number, Point, Positive, Spanned};
 use crate::gcode_settings::ZMeaning;
 use crate::limits::CornerMode;
@@ -43,6 +44,12 @@ table! {
         /// One table for each axis, named as the mechanism names them: `x` and `y` (and `z`) of a
         /// cartesian, `a` and `b` of a corexy, `th1`, `th2` and `d` of a polar.
         pub axis: Named<AxisTable>,
+        /// Its digital inputs, named.
+        pub inputs: Option<Named<InputTable>>,
+        /// Its digital outputs, named.
+        pub outputs: Option<Named<OutputTable>>,
+        /// What an emergency stop and an open door do, and how far a test may go.
+        pub safety: SafetyTable,
         /// What the machine bears of a computer that is late.
         pub realtime: RealtimeTable,
         /// The laser source.
@@ -147,6 +154,8 @@ table! {
         /// Where several motors drive the axis: a table for each, named, in their order. What it leaves
         /// out is as the axis has it.
         pub actuator: Option<Named<AxisActuatorTable>>,
+        /// How the axis finds its reference; when left out, it knows its place from the start.
+        pub homing: Option<HomingTable>,
     }
 }
 

@@ -6,6 +6,7 @@ use super::axes::{Drive, Joint, axis};
 use super::bounds::BOUNDS;
 use super::mechanism::{self, Built};
 use super::motors;
+use super::operating::{self, operating};
 use super::relations;
 use super::tables::{
     AreaTable, AxisTable, LaserTable, MachineTable, OriginsTable, PathTable, RealtimeTable,
@@ -21,6 +22,7 @@ use crate::laser::LaserSource;
 use crate::limits::{PathLimits, StallTolerance, WorkArea};
 use crate::machine::Machine;
 use crate::mechanisms::MechanismKind;
+use crate::operating::Operating;
 use messages::{MAX_ACTUATORS, Nanoseconds};
 
 pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
@@ -46,13 +48,22 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     check_z(&table, &mechanism, &mut diagnostics);
     let laser = laser(&table.laser, &mut diagnostics);
     let stall = stall(&table.realtime, &mut diagnostics);
+    let actuators: Vec<Actuator> = driven.into_iter().map(|(_, actuator)| actuator).collect();
+    let operating = if axes.len() == joints.len() {
+        let (inputs, outputs) = (table.inputs.as_ref(), table.outputs.as_ref());
+        let safety = &table.safety;
+        let own = operating::Tables { inputs, outputs, safety, axes: &tables, joints: &joints };
+        operating(&own, &axes, &actuators, &mut diagnostics)
+    } else {
+        Operating::default()
+    };
     let PathTable { speed, rapid, acceleration, jerk, tolerance, corners, span: _ } = &table.path;
     let gcode = &table.gcode;
     let machine = Machine {
         name: table.name.value.clone(),
         mechanism,
         axes,
-        actuators: driven.into_iter().map(|(_, actuator)| actuator).collect(),
+        actuators,
         area,
         home,
         home_joints: joints.iter().map(|joint| joint.home).collect(),
@@ -65,6 +76,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         },
         corners: corners.value,
         stall,
+        operating,
         laser,
         gcode: GcodeSettings {
             words: gcode.over(Dialect::Standard.meanings()),

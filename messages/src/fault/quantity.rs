@@ -59,6 +59,8 @@ pub enum FaultQuantity {
     HoldDistance = 25,
     /// Distance of an actuator from the farthest other one of its axis [joint unit].
     Racking = 26,
+    /// Way that an axis went without finding its reference [joint unit].
+    SearchDistance = 27,
 }
 
 /// The unit of a quantity.
@@ -71,7 +73,7 @@ pub enum FaultUnit {
 }
 
 impl FaultQuantity {
-    const ALL: [Self; 27] = [
+    const ALL: [Self; 28] = [
         Self::None,
         Self::FollowingError,
         Self::Position,
@@ -99,6 +101,7 @@ impl FaultQuantity {
         Self::ImpossibleEdges,
         Self::HoldDistance,
         Self::Racking,
+        Self::SearchDistance,
     ];
 
     /// The quantity with this number in a sample; an unknown number reads as [`Self::None`].
@@ -137,6 +140,7 @@ impl FaultQuantity {
             Self::ImpossibleEdges => ("gate edges of an impossible laser cycle", Plain("")),
             Self::HoldDistance => ("distance from where it is to be held", Joint("")),
             Self::Racking => ("distance of the actuators of the axis", Joint("")),
+            Self::SearchDistance => ("way without finding the reference", Joint("")),
         }
     }
 }
