@@ -3,3 +3,8 @@
 //!
 //! Nothing here is part of the shipped program. Each emulator moves the motors of the simulated plant, so that
 //! a job runs on it as it would on a machine.
+
+// Units stand in brackets throughout, `[m]`, which rustdoc takes for links.
+#![allow(rustdoc::broken_intra_doc_links)]
+
+pub mod hostmot2;
