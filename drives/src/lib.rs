@@ -12,6 +12,7 @@
 #![allow(rustdoc::broken_intra_doc_links)]
 
 pub mod bridge;
+pub mod hostmot2;
 pub mod plant;
 pub mod port;
 pub mod pulses;

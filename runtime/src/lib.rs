@@ -23,6 +23,7 @@ mod membership;
 pub mod message;
 pub mod operator;
 pub mod peer;
+pub mod ready;
 pub mod room;
 pub mod service;
 pub mod signal;

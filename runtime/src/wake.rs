@@ -5,14 +5,15 @@
 //! wait set allocates and installs signal handlers.
 
 use std::any::Any;
+use std::os::fd::BorrowedFd;
 
 use iceoryx2::node::Node;
 use iceoryx2::port::notifier::NotifierNotifyError;
 use iceoryx2::prelude::{FileDescriptorBased, ipc};
 
 use crate::channel::ChannelError;
-use crate::clock;
 use crate::domain::{Domain, DomainGuard};
+use crate::ready::wait_readable;
 use crate::room::need;
 use messages::Nanoseconds;
 
@@ -115,18 +116,10 @@ impl Listener {
         let lost = || ChannelError::Lost { channel: self.wake.service() };
         // SAFETY: the number is only used while `self.port`, which owns the descriptor, is alive.
         #[allow(unsafe_code)]
-        let descriptor = unsafe { self.port.file_descriptor().native_handle() };
-        let mut entry = libc::pollfd { fd: descriptor, events: libc::POLLIN, revents: 0 };
-        let left = clock::timespec(Nanoseconds((deadline - clock::now()).0.max(0)));
-        // SAFETY: one valid pollfd, a valid timespec, and no signal mask.
-        #[allow(unsafe_code)]
-        let ready = unsafe { libc::ppoll(&mut entry, 1, &left, std::ptr::null()) };
-        if ready <= 0 {
-            return match ready {
-                0 => Ok(false),
-                _ if interrupted() => Ok(false),
-                _ => Err(lost()),
-            };
+        let descriptor =
+            unsafe { BorrowedFd::borrow_raw(self.port.file_descriptor().native_handle()) };
+        if !wait_readable(descriptor, deadline).map_err(|_| lost())? {
+            return Ok(false);
         }
         let wakes = self.port.try_wait(|_| {}).map_err(|_| lost())?;
         Ok(wakes > 0)
@@ -136,8 +129,4 @@ impl Listener {
     pub fn drain(&self) -> Result<(), ChannelError> {
         self.wait_until(Nanoseconds(0)).map(|_| ())
     }
-}
-
-fn interrupted() -> bool {
-    std::io::Error::last_os_error().raw_os_error() == Some(libc::EINTR)
 }
