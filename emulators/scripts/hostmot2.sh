@@ -4,6 +4,9 @@
 #
 #   sudo emulators/scripts/hostmot2.sh [SECONDS [PERIOD_NS]]
 #
+# On a computer whose kernel lets go of a processor late, because it is busy or was not built to be preempted, stalls of
+# more than 5 ms bite: WATCHDOG_NS=20000000 gives it as much time.
+#
 # Needs root for a veth pair, a network namespace and real-time priorities, and Debian's packages mesaflash,
 # linuxcnc-uspace, iproute2, iptables and gcc. Takes back all that it changes.
 set -u
@@ -28,21 +31,40 @@ done
 verdict $found "mesaflash --readhmid lists the modules"
 [ $found = 0 ] || cat "$scratch/readhmid"
 
-bench_hal "$seconds" "$period" >"$scratch/hal.out" 2>"$scratch/hal.err"
-value() { sed -n "s/^$1=//p" "$scratch/hal.out" | tail -1; }
+# Its driver, as Debian has it, dies of a segmentation fault now and then while it starts.
+for attempt in 1 2 3; do
+    bench_hal "$seconds" "$period" >"$scratch/hal.err" 2>&1
+    grep -q "caught signal 11" "$scratch/hal.err" && [ ! -s "$scratch/values" ] || break
+    echo "hm2_eth fell with signal 11 while it started, attempt $attempt"
+done
+value() { sed -n "s/^$1=//p" "$scratch/values" 2>/dev/null | tail -1; }
 bitten=$(value has_bit) errors=$(value packet_errors) counts=$(value counts) mirror=$(value mirror)
 [ -n "$bitten" ]
 verdict $? "hm2_eth registers the board"
 [ "$bitten" = FALSE ]
-verdict $? "no bite of the watchdog in $seconds s at $period ns (has_bit=$bitten, packet errors $errors)"
+verdict $? "no bite of the watchdog in $seconds s at $period ns, watchdog ${WATCHDOG_NS:-5000000} ns (has_bit=$bitten, packet errors $errors)"
 [ "${counts:-0}" -ge 2498 ] && [ "${counts:-0}" -le 2501 ]
 verdict $? "stepgen 0 went to 2,500 steps (counts=$counts)"
 awk -v at="${mirror:-9}" 'BEGIN { exit !(at > 0.2499 && at < 0.2501) }'
 verdict $? "the mirror stands at 0.25 (posx-fb=$mirror)"
-[ $failed = 0 ] || tail -30 "$scratch/hal.err"
+[ $failed = 0 ] || grep -v "IO Pin\|fallback_uid" "$scratch/hal.err" | tail -20
 
 bench_close
+# The driver bites of its own will as it is unloaded; after an error it looks at neither bites nor counts.
+awk -v RS='[],[ \n]+' -v least="$((seconds * 1900000000 / period / 1000 * 1000))" '
+    /"time":/ { field = "time"; next }
+    /"to_board":/ { board = 1; next }
+    /"sent":/ { field = board ? "frames" : ""; board = 0; next }
+    /"bites":/ { list = 1; next }
+    /"[a-z_]+":/ { list = 0; field = ""; next }
+    field != "" { value[field] = $0; field = "" }
+    list && /^[0-9.]+$/ { bites[++count] = $0 }
+    END {
+        for (index_ = 1; index_ <= count; index_++) if (bites[index_] < value["time"] - 1.5) early++
+        printf "      by the board: %d bites while it ran, %d frames\n", early, value["frames"]
+        exit !(early == 0 && value["frames"] >= least) }' "$scratch/report.json"
+verdict $? "the board saw the same: no bite, and a read and a write in each cycle"
 [ -s "$scratch/report.json" ]
-verdict $? "the emulator's own account:"
-sed -n '/"to_board"/,/}/p; /"bites"/,/]/p; /"steps"/,/]/p' "$scratch/report.json" | tr -d '\n '; echo
+verdict $? "the emulator's own account, in seconds:"
+grep -v '^[{}]' "$scratch/report.json" | tr -d ' \n'; echo
 exit $failed

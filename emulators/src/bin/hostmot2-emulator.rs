@@ -117,7 +117,8 @@ fn run(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
     service.run(|| {
         runtime::signal::termination().is_some() || end.is_some_and(|end| Instant::now() >= end)
     })?;
-    let report = Report::of(service.emulator());
+    let own_stall = service.longest_stall().seconds();
+    let report = Report { own_stall, ..Report::of(service.emulator()) };
     Ok(report.write(&options.report)?)
 }
 

@@ -130,7 +130,8 @@ impl Board {
     /// Takes a datagram at `now`; the reply, where it reads anything.
     pub fn handle(&mut self, now: Nanoseconds, datagram: &[u8]) -> Option<&[u8]> {
         self.advance(now);
-        if let Some(rig) = &self.rig {
+        if let Some(rig) = &mut self.rig {
+            rig.align(self.now);
             rig.count(&mut self.modules, self.now);
         }
         self.reply.clear();

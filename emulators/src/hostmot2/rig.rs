@@ -2,7 +2,8 @@
 //!
 //! The plant moves in cycles of its own. At the start of each it is told what the board puts out then: where
 //! the steps will be at its end if their rate stays, the angle of the mirrors, the voltage. So it is up to
-//! one cycle late in what changes inside it. An encoder stands where its motor is, carried on from the start
+//! one cycle late in what changes inside it. Until a motor has power its cycles are put so that each starts
+//! just after a datagram has arrived, which leaves little of such changes. An encoder stands where its motor is, carried on from the start
 //! of the cycle by the speed there.
 //!
 //! A stepper driver has power once its steps are connected, and keeps it. An amplifier has it while its
@@ -20,6 +21,9 @@ use messages::time::CYCLE_PERIOD;
 
 /// Below this a motor counts as standing [rad/s].
 const STANDING: f64 = 0.1;
+
+/// From the arrival of a datagram to the start of a cycle of the plant: more than arrivals vary by.
+const MARGIN: Nanoseconds = Nanoseconds(100_000);
 
 /// The plant, its mechanism forgotten.
 trait Motors: Send {
@@ -148,6 +152,13 @@ impl Rig {
     /// When its next cycle starts.
     pub fn next(&self) -> Nanoseconds {
         self.started + CYCLE_PERIOD
+    }
+
+    /// A datagram has arrived at `now`. Until a motor has power, the next cycle starts a little after it.
+    pub fn align(&mut self, now: Nanoseconds) {
+        if !self.axes.iter().any(|axis| axis.powered) {
+            self.started = now + MARGIN - CYCLE_PERIOD;
+        }
     }
 
     /// Moves to the start of the next cycle, and takes what the board puts out there.

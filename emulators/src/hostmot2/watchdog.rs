@@ -15,11 +15,12 @@ pub struct Watchdog {
     timer: u32,
     bitten: bool,
     fed: Nanoseconds,
+    longest: Nanoseconds,
 }
 
 impl Default for Watchdog {
     fn default() -> Self {
-        Self { timer: OFF, bitten: false, fed: Nanoseconds(0) }
+        Self { timer: OFF, bitten: false, fed: Nanoseconds(0), longest: Nanoseconds(0) }
     }
 }
 
@@ -38,7 +39,12 @@ impl Watchdog {
         match index {
             0 => (self.timer, self.fed) = (value, now),
             1 => (self.bitten, self.fed) = (value & 1 != 0, now),
-            2 if value & 0xff00_0000 == FEED => self.fed = now,
+            2 if value & 0xff00_0000 == FEED => {
+                if self.expiry().is_some() {
+                    self.longest = self.longest.max(now - self.fed);
+                }
+                self.fed = now;
+            }
             _ => {}
         }
     }
@@ -57,6 +63,11 @@ impl Watchdog {
         let over = self.expiry().is_some_and(|expiry| now >= expiry);
         self.bitten |= over;
         over
+    }
+
+    /// The longest that it waited to be fed without biting.
+    pub fn longest(&self) -> Nanoseconds {
+        self.longest
     }
 
     /// Whether it has bitten.
