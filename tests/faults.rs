@@ -137,7 +137,7 @@ fn without_a_planner_the_controller_brings_the_axes_to_rest_in_the_dark() {
 /// Asserts that steppers came to rest where the controller had them: each axis within a few of its
 /// pulses of the reference for as long as it was followed. A feedback of a slow axis would not tell.
 fn assert_rest_on_the_path(records: &[CycleRecord], axes: usize, what: &str) {
-    let followed = |record: &&CycleRecord| record.command.mode() == CommandMode::Position;
+    let followed = |record: &&CycleRecord| record.command.mode() == CommandMode::Driven;
     let last: Vec<_> = records.iter().filter(followed).collect();
     assert!(last.len() > 100, "{what}: {} cycles", last.len());
     for record in &last[last.len() - 100..] {

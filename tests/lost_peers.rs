@@ -44,8 +44,7 @@ fn play(machine: &Machine, plan: &Plan, death: u64, late: u64, lost: (Peers, Fau
             let speeds = actuators().map(|(index, it)| (feedback.velocity[index] * it.ratio).abs());
             rest.speed = speeds.fold(0.0, f64::max);
         }
-        let follows =
-            matches!(outputs.command.mode(), CommandMode::Voltage | CommandMode::Position);
+        let follows = outputs.command.mode() == CommandMode::Driven;
         if step > death && follows {
             let errors = &outputs.command.following_error;
             let off = actuators().map(|(index, it)| (errors[index] * it.ratio).abs());

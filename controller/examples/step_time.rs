@@ -68,7 +68,7 @@ fn main() {
                 ..OperatorRequest::default()
             });
             feedback.cycle = Cycle(u64::from(cycle));
-            if outputs.command.mode() == CommandMode::Voltage {
+            if outputs.command.mode() == CommandMode::Driven {
                 feedback.position = outputs.command.reference;
             }
             let end = sent + controller.room().min(2) as u64;

@@ -13,14 +13,15 @@
 //! | state | drives | references | laser |
 //! |---|---|---|---|
 //! | `Disabled`, `Faulted` | off | follow the feedback | off |
-//! | `Enabling` | voltage, against the weight | follow the feedback until the power is on, then stand | off |
-//! | `Squaring` | voltage | to where the actuators of each axis are together | off |
-//! | `Idle` | voltage | stand | off |
-//! | `Running` | voltage | the stream, at a rate | as the stream says |
-//! | `Holding`, `Stopping` | voltage | along the stream to rest | off |
-//! | `Stopping` after a fault | voltage while the axes follow, else quick stop | the same | off |
+//! | `Enabling` | driven, against the weight | follow the feedback until the power is on, then stand | off |
+//! | `Squaring` | driven | to where the actuators of each axis are together | off |
+//! | `Idle` | driven | stand | off |
+//! | `Running` | driven | the stream, at a rate | as the stream says |
+//! | `Holding`, `Stopping` | driven | along the stream to rest | off |
+//! | `Stopping` after a fault | driven while the axes follow, else quick stop | the same | off |
 //!
-//! Where the table says voltage, steppers get positions instead: their drivers close the current
+//! Where the table says driven, each actuator follows the target of its own mode
+//! ([`machine::ActuatorMode`]). Steppers get positions: their drivers close the current
 //! loops, and what they are counted by are the pulses that they were sent. There is no loop to close.
 //!
 //! A hold that nobody asked for ends by itself, and the mark is taken up where it was left:
@@ -55,11 +56,11 @@ use crate::statistics::Statistics;
 use crate::stream_time::{ONE, StreamTime};
 use crate::supervision::{Elapsed, Finding, Supervision, Tracking};
 use answer::PROGRESS_INTERVAL;
-use machine::{Actuator, Machine, Motor};
+use machine::{Actuator, ActuatorMode, Machine};
 use messages::feedback::status;
 use messages::{
-    ActuatorArray, CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity, Feedback,
-    LaserCycle, MAX_ACTUATORS, Nanoseconds, RealtimeFacts,
+    ActuatorArray, Command, CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity,
+    Feedback, LaserCycle, MAX_ACTUATORS, Nanoseconds, RealtimeFacts,
 };
 
 /// Cycles between two reports.
@@ -85,8 +86,8 @@ pub struct Controller {
     feedforward: Feedforward,
     /// None for steppers.
     cascades: [Option<Cascade>; MAX_ACTUATORS],
-    /// The mode in which the motors follow the plan.
-    drive: CommandMode,
+    /// Whether drives follow positions, which know no step.
+    follows_positions: bool,
     supervision: Supervision,
     standing: Standing,
     squaring: Squaring,
@@ -123,10 +124,8 @@ impl Controller {
             catch_up: CatchUp::default(),
             feedforward: Feedforward::new(machine),
             cascades: core::array::from_fn(|index| machine.actuators.get(index).and_then(cascade)),
-            drive: match machine.actuators[0].motor {
-                Motor::Dc(_) => CommandMode::Voltage,
-                Motor::Stepper(_) => CommandMode::Position,
-            },
+            follows_positions: (machine.actuators.iter())
+                .any(|actuator| actuator.mode == ActuatorMode::Position),
             supervision: Supervision::new(machine),
             standing: Standing::new(machine),
             squaring: Squaring::default(),
@@ -179,13 +178,9 @@ impl Controller {
             self.fail(finding, now);
         }
         self.command(now, inputs, &mut outputs.command);
-        let targets = match self.drive {
-            CommandMode::Position => &outputs.command.position,
-            _ => &outputs.command.voltage,
-        };
-        if let Some(index) = targets.iter().position(|target| !target.is_finite()) {
+        if let Some((index, target)) = not_finite(&outputs.command) {
             let fault = Fault::new(FaultCode::NotFinite).on_actuator(index);
-            self.fail(Finding::lost(fault.with(FaultQuantity::Number, targets[index])), now);
+            self.fail(Finding::lost(fault.with(FaultQuantity::Number, target)), now);
             self.command(now, inputs, &mut outputs.command);
         }
         if self.playing != 0 {
@@ -311,7 +306,7 @@ impl Controller {
         }
         let catch_up = self.feedforward.coasted(&last, elapsed.missed);
         // Squaring is so slow that what it goes on by matters nothing.
-        if self.drive == CommandMode::Position && self.playing != 0 {
+        if self.follows_positions && self.playing != 0 {
             self.feedforward.put_coasted(&last, elapsed.missed);
             self.catch_up = catch_up;
         }
@@ -388,4 +383,13 @@ impl Controller {
     fn tool_measured(&self, feedback: &Feedback) -> [f64; 3] {
         if feedback.has(status::TOOL_KNOWN) { feedback.tool } else { self.feedforward.now().tool }
     }
+}
+
+/// The first target that is not finite, with the index of its actuator.
+fn not_finite(command: &Command) -> Option<(usize, f64)> {
+    let targets = [&command.voltage, &command.effort, &command.velocity, &command.position];
+    targets.into_iter().find_map(|targets| {
+        let mut each = targets.iter().copied().enumerate();
+        each.find(|(_, target)| !target.is_finite())
+    })
 }

@@ -60,7 +60,7 @@ impl State {
         match self {
             Self::Disabled | Self::Faulted => CommandMode::Disabled,
             Self::Failing { tracking: Tracking::Lost, .. } => CommandMode::QuickStop,
-            _ => CommandMode::Voltage,
+            _ => CommandMode::Driven,
         }
     }
 
@@ -68,7 +68,7 @@ impl State {
     pub(crate) fn follows(self) -> bool {
         match self {
             Self::Enabling { held, .. } => held > 0,
-            state => state.mode() == CommandMode::Voltage,
+            state => state.mode() == CommandMode::Driven,
         }
     }
 }

@@ -64,7 +64,7 @@ fn assert_no_step_allocates(machine: &Machine, speed: f64) {
         rewound += u32::from(command.rate < 0.0);
         dry += u32::from(command.state() == ControllerState::Holding && cycle > 1000);
         // The motors follow exactly, until one is lost.
-        let follows = matches!(command.mode(), CommandMode::Position | CommandMode::Voltage);
+        let follows = command.mode() == CommandMode::Driven;
         if follows && cycle < LOST {
             feedback.position = command.reference;
             let coasted = feedback.position.iter_mut().zip(&command.velocity);

@@ -127,7 +127,7 @@ fn a_lost_peer_stops_the_axes_along_the_path() {
         assert!(!command.laser.is_lit(), "{code:?}");
         assert_eq!(command.fault.code(), code);
         if lose < 2 {
-            assert_eq!(command.mode(), CommandMode::Voltage);
+            assert_eq!(command.mode(), CommandMode::Driven);
             bench.until(Some(&job), ControllerState::Faulted, 200);
             let worst = bench.played().map(|record| record.tracking).fold(0.0, f64::max);
             assert!(worst < 20e-6, "{worst} m off the path with {code:?}");
@@ -273,7 +273,7 @@ fn an_overload_hides_no_axis_that_is_lost() {
     let mut bench = Bench::enabled(&machine);
     assert!(bench.ask(Some(&job), OperatorVerb::Start, 1.0));
     bench.until(Some(&job), ControllerState::Stopping, 700);
-    assert_eq!(bench.last().command.mode(), CommandMode::Voltage);
+    assert_eq!(bench.last().command.mode(), CommandMode::Driven);
     bench.cycle(Some(&job), None, |feedback| feedback.position[1] += 0.81);
     let command = bench.last().command;
     assert_eq!(command.mode(), CommandMode::QuickStop);
@@ -287,7 +287,7 @@ fn a_planner_that_is_lost_hides_nothing_that_drives_says() {
     let mut bench = marking(&machine, &job);
     bench.peers.planner = Presence::Lost;
     bench.run(Some(&job), 2);
-    assert_eq!(bench.last().command.mode(), CommandMode::Voltage);
+    assert_eq!(bench.last().command.mode(), CommandMode::Driven);
     // Two feedbacks lost on the way to rest: the plan goes on by three cycles, not by one.
     let before = bench.last().command.stream_time;
     bench.skip(2);

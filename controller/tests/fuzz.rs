@@ -70,8 +70,7 @@ fn play(machine: &Machine, job: &Job, doubts: u64, random: &mut SplitMix64) -> (
         feedback.cycle.0 += 1 + skipped;
         feedback.missed += skipped + u64::from(skipped > 0 || doubtful(random));
         feedback.skipped = skipped as u16;
-        let follows =
-            matches!(outputs.command.mode(), CommandMode::Voltage | CommandMode::Position);
+        let follows = outputs.command.mode() == CommandMode::Driven;
         if follows {
             feedback.position = outputs.command.reference;
         }
@@ -124,11 +123,8 @@ fn play(machine: &Machine, job: &Job, doubts: u64, random: &mut SplitMix64) -> (
 
         let command = &outputs.command;
         seen[command.state as usize] += 1;
-        let targets = match command.mode() {
-            CommandMode::Position => &command.position,
-            _ => &command.voltage,
-        };
-        assert!(targets.iter().all(|target| target.is_finite()), "{targets:?}");
+        let targets = [command.position, command.velocity, command.effort, command.voltage];
+        assert!(targets.iter().flatten().all(|target| target.is_finite()), "{targets:?}");
         assert!(command.laser.is_valid(), "{:?}", command.laser);
         if !command.laser.is_lit() {
             continue;

@@ -159,7 +159,7 @@ impl Drivers {
             return;
         }
         self.feedback.status = status::POWERED;
-        assert_eq!(command.mode(), CommandMode::Position);
+        assert_eq!(command.mode(), CommandMode::Driven);
         let before = self.feedback.position;
         (self.position_before, self.velocity_before) = (self.newest.0, self.newest.1);
         self.newest = (command.position, command.velocity);

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use drives::{Actuation, Freshness, Measurement, PlantOptions, SimulatedPlant};
-use machine::{Machine, Motor};
+use machine::Machine;
 use messages::{CommandMode, MAX_AXES, axis::actuator_array};
 
 fn machine_files() -> Vec<PathBuf> {
@@ -29,7 +29,6 @@ fn cycles(criterion: &mut Criterion) {
     for file in machine_files() {
         let name = file.file_stem().unwrap().to_string_lossy().into_owned();
         let machine = Machine::load(&file, &[]).unwrap();
-        let stepping = matches!(machine.actuators[0].motor, Motor::Stepper(_));
         let mut measurement = Measurement::default();
         group.bench_function(name, |bencher| {
             bencher.iter_custom(|cycles| {
@@ -45,11 +44,7 @@ fn cycles(criterion: &mut Criterion) {
                         let side = if cycle % 20 < 10 { 1.0 } else { -1.0 };
                         let actuation = Actuation {
                             freshness: Freshness::Fresh,
-                            mode: if stepping {
-                                CommandMode::Position
-                            } else {
-                                CommandMode::Voltage
-                            },
+                            mode: CommandMode::Driven,
                             voltage: actuator_array(&[0.5 * side; MAX_AXES]),
                             position: home.map(|angle| angle + 0.02 * side),
                             ..Actuation::DISABLED

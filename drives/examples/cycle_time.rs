@@ -20,7 +20,7 @@ fn main() -> Result<(), PlantError> {
             let volts = if index % 100 < 50 { 5.0 } else { -5.0 };
             let actuation = Actuation {
                 freshness: Freshness::Fresh,
-                mode: CommandMode::Voltage,
+                mode: CommandMode::Driven,
                 voltage: actuator_array(&[volts, 0.5 * volts]),
                 ..Actuation::DISABLED
             };

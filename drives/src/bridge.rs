@@ -20,14 +20,14 @@
 //!   time: the deadline of cycle `n` stays `start + n × period`.
 //! - *Stall*: a time in which the cycle stood still; see [`messages::Stalls`].
 
-use machine::StallTolerance;
+use machine::{Machine, StallTolerance};
 use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
 use messages::{
     ActuatorArray, Command, CommandMode, Cycle, DrivesReport, Fault, FaultCode, Feedback,
     MAX_ACTUATORS, Nanoseconds, RealtimeFacts, StallCause, feedback::status,
 };
 
-use crate::port::{Actuation, Freshness, Measurement, Port, Power};
+use crate::port::{self, Actuation, Freshness, Measurement, Port, PortError, Power};
 use crate::stalls::{Stall, StallAccount};
 pub use crate::watchdog::GatePermission;
 use crate::watchdog::{Watch, Watchdog};
@@ -91,7 +91,7 @@ const LATE_ANSWER: u32 = StallCause::LateAnswer.bit();
 
 /// The bridge between samples and a port.
 pub struct Bridge {
-    port: Box<dyn Port + Send>,
+    port: Box<dyn Port>,
     options: BridgeOptions,
     watchdog: Watchdog,
     permission: GatePermission,
@@ -120,8 +120,8 @@ impl core::fmt::Debug for Bridge {
 
 impl Bridge {
     /// A bridge to `port`, unpowered, dark, before its first cycle, which is number 0.
-    pub fn new(port: Box<dyn Port + Send>, options: BridgeOptions) -> Self {
-        let actuators = port.actuators();
+    pub fn new(port: Box<dyn Port>, options: BridgeOptions) -> Self {
+        let actuators = port.profile().actuators.len();
         Self {
             port,
             options,
@@ -150,11 +150,24 @@ impl Bridge {
         self.watchdog.stop(Fault::new(cause).at(now));
     }
 
-    /// Leaves the port dark and unpowered; the last thing that a service does.
-    pub fn release(&mut self) {
+    /// Opens the port and holds it to `machine`; the first thing that a service does, before its clock starts.
+    ///
+    /// # Errors
+    /// As [`Port::open`]; a drive without the mode of its actuator, or with another latency than declared.
+    pub fn open(&mut self, machine: &Machine) -> Result<(), PortError> {
+        self.port.open()?;
+        port::check(self.port.profile(), machine)
+    }
+
+    /// Leaves the port dark, unpowered and closed; the last thing that a service does.
+    ///
+    /// # Errors
+    /// As [`Port::close`].
+    pub fn close(&mut self) -> Result<(), PortError> {
         self.latched = None;
         self.in_force = Actuation::DISABLED;
         self.port.exchange(&self.in_force, &mut self.measurement);
+        self.port.close()
     }
 
     /// Starts the cycle of `deadline` at `now`, not before it: puts the latched command in force,
@@ -259,6 +272,7 @@ impl Bridge {
             lit: u32::from(lit),
             fault: self.feedback.fault,
             stalls: *self.stalls.stalls(),
+            link: self.port.link(),
             realtime,
         }
     }
@@ -379,7 +393,7 @@ impl Bridge {
     /// that lies `skipped` cycles further back than usual.
     fn describe(&mut self, first: bool, skipped: u64) {
         let measured = &self.measurement;
-        let actuators = self.port.actuators().min(MAX_ACTUATORS);
+        let actuators = self.port.profile().actuators.len().min(MAX_ACTUATORS);
         let mut velocity: ActuatorArray = [0.0; MAX_ACTUATORS];
         let moved = measured.counts != self.feedback.counts;
         if !first {

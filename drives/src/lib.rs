@@ -1,6 +1,7 @@
 //! The bridge between commands and what they drive, and the clock of the machine.
 //!
 //! - [`port`]: the seam; what hardware or a plant must do.
+//! - [`ports`]: the list of the ports that there are.
 //! - [`plant`]: the simulated plant, motors and laser included.
 //! - [`bridge`]: one cycle: apply the latched command, measure, tell.
 //! - [`watchdog`]: laser off without a fresh command, axes to rest when that lasts too long.
@@ -15,6 +16,7 @@ pub mod bridge;
 pub mod hostmot2;
 pub mod plant;
 pub mod port;
+pub mod ports;
 pub mod pulses;
 pub mod service;
 pub mod stalls;
@@ -22,6 +24,8 @@ pub mod watchdog;
 
 pub use bridge::{Bridge, BridgeOptions, Deadlines};
 pub use plant::{PlantOptions, SimulatedPlant};
-pub use port::{Actuation, Freshness, Measurement, Port, Power};
+pub use port::{
+    Actuation, ActuatorProfile, Freshness, Measurement, Port, PortClock, PortError, Power, Profile,
+};
 pub use stalls::Stall;
 pub use watchdog::GatePermission;

@@ -1,9 +1,8 @@
 //! The simulated plant: motors, transmission, load, encoders and laser source of a machine file.
 //!
 //! Modes: `Disabled` (phases open, motors coast) and `QuickStop` (the drive's own [`brake`], or a
-//! ramp of the pulses); DC motors take `Voltage` (held over the cycle), steppers `Position` (by
-//! pulses, see [`stepping`]). These drives have no other interface: other modes are refused with a
-//! fault, not imitated.
+//! ramp of the pulses); driven, DC motors follow their voltage (held over the cycle), steppers their
+//! position (by pulses, see [`stepping`]).
 //!
 //! What is and is not modelled:
 //!
@@ -42,7 +41,9 @@ pub mod winding;
 use machine::kinematics::{Joints, KinematicsError};
 use machine::motor::BeyondTorque;
 use machine::transmission::equilibrium;
-use machine::{Actuator, Axis, LaserSource, Machine, Mechanism, MechanismVisitor};
+use machine::{
+    Actuator, ActuatorMode, Axis, LaserSource, Machine, Mechanism, MechanismVisitor, Motor,
+};
 use messages::random::SplitMix64;
 use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
 use messages::{
@@ -51,7 +52,9 @@ use messages::{
 };
 use nalgebra::SVector;
 
-use crate::port::{Actuation, Freshness, Measurement, Port, Power};
+use crate::port::{
+    Actuation, ActuatorProfile, Freshness, Measurement, Port, PortClock, Power, Profile,
+};
 use crate::watchdog::impossible_light;
 use brake::Brake;
 use coupling::Unsolvable;
@@ -150,10 +153,7 @@ impl SimulatedPlant {
     /// # Errors
     /// If the machine cannot be simulated.
     #[allow(clippy::new_ret_no_self)]
-    pub fn new(
-        machine: &Machine,
-        options: PlantOptions,
-    ) -> Result<Box<dyn Port + Send>, PlantError> {
+    pub fn new(machine: &Machine, options: PlantOptions) -> Result<Box<dyn Port>, PlantError> {
         let plant = machine.mechanism.visit(Build { machine, options })?;
         Ok(switches::Switched::new(machine, plant))
     }
@@ -165,7 +165,7 @@ struct Build<'a> {
 }
 
 impl MechanismVisitor for Build<'_> {
-    type Output = Result<Box<dyn Port + Send>, PlantError>;
+    type Output = Result<Box<dyn Port>, PlantError>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
         let Build { machine, options } = self;
@@ -210,6 +210,9 @@ pub struct Plant<const N: usize, M: Mechanism<N>, const A: usize = N> {
     /// Cycles for which the motors have been powered before the one at hand; `None` if they are not.
     powered_cycles: Option<u32>,
     fault: Fault,
+    /// What was measured at the newest deadline.
+    measured: Measurement,
+    profile: Profile,
 }
 
 impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
@@ -290,6 +293,8 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             passed_cycles: 0,
             powered_cycles: None,
             fault: Fault::default(),
+            measured: Measurement::default(),
+            profile: profile(actuators),
         })
     }
 
@@ -330,13 +335,10 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             let phases = match actuation.mode {
                 CommandMode::Disabled => Phases::Open,
                 _ if self.stepping.is_some() => Phases::Open,
-                CommandMode::Voltage => Phases::Driven(SVector::from_fn(|row, _| {
+                CommandMode::Driven => Phases::Driven(SVector::from_fn(|row, _| {
                     saturate(actuation.voltage[row], motors.voltage[row])
                 })),
-                CommandMode::QuickStop
-                | CommandMode::Position
-                | CommandMode::Velocity
-                | CommandMode::Effort => {
+                CommandMode::QuickStop => {
                     let voltage = self.brake.voltage(&self.state, &motors, step);
                     Phases::Driven(SVector::from_fn(|row, _| {
                         saturate(voltage[row], motors.voltage[row])
@@ -386,7 +388,7 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
         if self.fault.is_some() {
             return self.stopped();
         }
-        let dark = actuation.freshness == Freshness::Stale || actuation.mode != self.following();
+        let dark = actuation.freshness == Freshness::Stale || actuation.mode != CommandMode::Driven;
         let laser = if dark { LaserCycle::OFF } else { actuation.laser };
         Actuation { laser, ..*actuation }
     }
@@ -399,8 +401,8 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
         }
     }
 
-    fn measure(&mut self, measurement: &mut Measurement) {
-        *measurement = Measurement::default();
+    fn measure(&mut self) -> Measurement {
+        let mut measurement = Measurement::default();
         let pulses = self.stepping.as_ref().map(Stepping::counts);
         for row in 0..self.motors {
             if let Some(pulses) = &pulses {
@@ -424,26 +426,17 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             Err(error) => self.fail(out_of_reach(&error)),
         }
         measurement.laser = self.light;
-    }
-
-    /// The mode in which the motors follow the controller.
-    fn following(&self) -> CommandMode {
-        match self.stepping {
-            None => CommandMode::Voltage,
-            Some(_) => CommandMode::Position,
-        }
+        measurement
     }
 
     /// Why this plant cannot carry `actuation` out, if it cannot.
     fn refusal(&self, actuation: &Actuation) -> Option<Fault> {
         let targets: &[&ActuatorArray] = match actuation.mode {
             CommandMode::Disabled | CommandMode::QuickStop => &[],
-            mode if mode != self.following() => {
-                let fault = Fault::new(FaultCode::DriveFault);
-                return Some(fault.with(FaultQuantity::Mode, f64::from(mode as u32)));
+            CommandMode::Driven if self.stepping.is_some() => {
+                &[&actuation.position, &actuation.velocity]
             }
-            CommandMode::Position => &[&actuation.position, &actuation.velocity],
-            _ => &[&actuation.voltage],
+            CommandMode::Driven => &[&actuation.voltage],
         };
         for values in targets {
             let mut values = values.iter().take(self.motors).enumerate();
@@ -484,22 +477,23 @@ fn substeps<const N: usize, M: Mechanism<N>, const A: usize>(
 }
 
 impl<const N: usize, M: Mechanism<N>, const A: usize> Port for Plant<N, M, A> {
-    fn actuators(&self) -> usize {
-        self.motors
+    fn profile(&self) -> &Profile {
+        &self.profile
     }
 
-    fn gate_resolution(&self) -> Nanoseconds {
-        Nanoseconds(1)
-    }
-
-    fn exchange(&mut self, actuation: &Actuation, measurement: &mut Measurement) {
+    fn send(&mut self, actuation: &Actuation) {
         self.cycle();
-        self.measure(measurement);
+        let mut measurement = self.measure();
         (self.light, self.passed_cycles) = (LaserCycle::OFF, 0);
         if self.engage(actuation) != CommandMode::Disabled {
             measurement.power = Power::On;
         }
         measurement.fault = self.fault;
+        self.measured = measurement;
+    }
+
+    fn receive(&mut self, measurement: &mut Measurement) {
+        *measurement = self.measured;
     }
 
     fn pass(&mut self, actuation: &Actuation) {
@@ -555,6 +549,22 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
         }
         self.in_force = Some(accepted);
         accepted.mode
+    }
+}
+
+/// What drives of `actuators` can do.
+fn profile(actuators: &[Actuator]) -> Profile {
+    let modes = |actuator: &Actuator| match actuator.motor {
+        Motor::Dc(_) => vec![ActuatorMode::Voltage],
+        Motor::Stepper(_) => vec![ActuatorMode::Position],
+    };
+    let each =
+        |actuator: &Actuator| ActuatorProfile { modes: modes(actuator), latency: actuator.latency };
+    Profile {
+        clock: PortClock::Ours,
+        gate_resolution: Nanoseconds(1),
+        gate_latency: Nanoseconds(0),
+        actuators: actuators.iter().map(each).collect(),
     }
 }
 

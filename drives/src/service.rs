@@ -13,8 +13,8 @@
 //! then brings the axes to rest; where it does not, drives stops them, and leaves when they rest.
 
 use crate::bridge::{Bridge, BridgeOptions, Deadlines, GatePermission};
-use crate::port::{Freshness, Port};
-use machine::StallTolerance;
+use crate::port::{Freshness, Port, PortError};
+use machine::{Machine, StallTolerance};
 use messages::feedback::status;
 use messages::report::refused;
 use messages::time::CYCLE_PERIOD;
@@ -50,36 +50,30 @@ const LAST_PATIENCE: Nanoseconds = Nanoseconds(3_000_000_000);
 pub struct ServiceOptions {
     /// Whether the clock may slip.
     pub deadlines: Deadlines,
-    /// How long the axes may go on without a fresh command.
-    pub stall: StallTolerance,
     /// Real-time set-up of the cycle's thread.
     pub realtime: RealtimeOptions,
 }
 
-/// Runs until it is told to end (SIGTERM) or the supervisor dies; the axes are at rest then.
+/// Drives `machine` by `port` until it is told to end (SIGTERM) or the supervisor dies; the axes are at rest then.
 ///
 /// # Errors
-/// When a channel fails, or another pipeline owns the real-time core. The port is unpowered and
-/// dark before this returns.
+/// When the port cannot be opened or closed, a channel fails, or another pipeline owns the real-time core. The
+/// port is unpowered, dark and closed before this returns.
 pub fn run(
     domain: &Domain,
-    port: Box<dyn Port + Send>,
+    machine: &Machine,
+    port: Box<dyn Port>,
     options: &ServiceOptions,
 ) -> Result<(), ServiceError> {
-    let mut cycle = ServiceCycle::open(domain, port, options)?;
-    // What was refused is in the facts, which travel with the reports to the summary.
-    let mut realtime = thread::enter_realtime(&options.realtime);
-    let core = realtime.claim_core()?;
-    if core.as_ref().is_some_and(|core| core.squatter().is_some()) {
-        // A person who starts drives by hand has no summary to look at.
-        let facts = RealtimeFacts { refused: refused::CLAIM, ..realtime.facts };
-        thread::missing(&[("drives", facts)])
-            .iter()
-            .for_each(|warning| message::tell(&format!("drives: {warning}")));
-    }
-    let result = cycle.keep_running(realtime.spin_margin(), realtime.facts);
-    cycle.bridge.release();
-    result
+    let mut cycle = ServiceCycle::open(domain, port, options, machine.stall)?;
+    let result = cycle.drive(machine, options);
+    let closed = cycle.bridge.close().map_err(work);
+    result.and(closed)
+}
+
+/// A failure of the port as one of the service.
+fn work(error: PortError) -> ServiceError {
+    ServiceError::Work(error.to_string())
 }
 
 /// Who is there, as one check of the peers tells.
@@ -116,13 +110,14 @@ struct ServiceCycle {
 impl ServiceCycle {
     fn open(
         domain: &Domain,
-        port: Box<dyn Port + Send>,
+        port: Box<dyn Port>,
         options: &ServiceOptions,
+        stall: StallTolerance,
     ) -> Result<Self, ServiceError> {
         let bridge_options = BridgeOptions {
             epoch: clock::now().0.unsigned_abs(),
             deadlines: options.deadlines,
-            stall: options.stall,
+            stall,
         };
         Ok(Self {
             bridge: Bridge::new(port, bridge_options),
@@ -137,6 +132,22 @@ impl ServiceCycle {
             reported: DrivesReport::default(),
             leaving: None,
         })
+    }
+
+    /// Opens the port, and drives what is behind it until the end.
+    fn drive(&mut self, machine: &Machine, options: &ServiceOptions) -> Result<(), ServiceError> {
+        self.bridge.open(machine).map_err(work)?;
+        // What was refused is in the facts, which travel with the reports to the summary.
+        let mut realtime = thread::enter_realtime(&options.realtime);
+        let core = realtime.claim_core()?;
+        if core.as_ref().is_some_and(|core| core.squatter().is_some()) {
+            // A person who starts drives by hand has no summary to look at.
+            let facts = RealtimeFacts { refused: refused::CLAIM, ..realtime.facts };
+            thread::missing(&[("drives", facts)])
+                .iter()
+                .for_each(|warning| message::tell(&format!("drives: {warning}")));
+        }
+        self.keep_running(realtime.spin_margin(), realtime.facts)
     }
 
     fn keep_running(

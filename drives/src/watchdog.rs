@@ -257,17 +257,15 @@ fn actuation(command: &Command, mode: CommandMode) -> Actuation {
     }
 }
 
-/// What makes `command` impossible to carry out, if anything: a target of its mode that is not
-/// finite, or a laser cycle that makes no sense.
+/// What makes `command` impossible to carry out, if anything: a target that is not finite, or a laser cycle that makes no sense.
 fn doubt(command: &Command, actuators: usize) -> Option<Fault> {
-    let targets: Option<&ActuatorArray> = match command.mode() {
-        CommandMode::Disabled | CommandMode::QuickStop => None,
-        CommandMode::Position => Some(&command.position),
-        CommandMode::Velocity => Some(&command.velocity),
-        CommandMode::Effort => Some(&command.effort),
-        CommandMode::Voltage => Some(&command.voltage),
+    let targets: &[&ActuatorArray] = match command.mode() {
+        CommandMode::Disabled | CommandMode::QuickStop => &[],
+        CommandMode::Driven => {
+            &[&command.position, &command.velocity, &command.effort, &command.voltage]
+        }
     };
-    let broken = targets.and_then(|targets| {
+    let broken = targets.iter().find_map(|targets| {
         targets.iter().take(actuators).enumerate().find(|(_, target)| !target.is_finite())
     });
     if let Some((index, target)) = broken {

@@ -27,7 +27,7 @@ fn braked(brake: HoldingBrake) -> (Plant<1, Shaft>, f64) {
 fn driven(volts: f64) -> Actuation {
     Actuation {
         freshness: Freshness::Fresh,
-        mode: CommandMode::Voltage,
+        mode: CommandMode::Driven,
         voltage: actuator_array(&[volts]),
         ..Actuation::DISABLED
     }

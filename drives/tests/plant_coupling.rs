@@ -103,7 +103,7 @@ fn where_the_chain_ends_the_plant_jams_with_a_fault() {
             .unwrap();
     let push = Actuation {
         freshness: Freshness::Fresh,
-        mode: CommandMode::Voltage,
+        mode: CommandMode::Driven,
         voltage: actuator_array(&[0.0, 6.0]),
         ..Actuation::DISABLED
     };

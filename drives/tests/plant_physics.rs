@@ -60,7 +60,7 @@ fn plant(mechanism: CoreXy, machine: &Machine) -> Plant<2, CoreXy> {
 fn voltage(voltage: &[f64]) -> Actuation {
     Actuation {
         freshness: Freshness::Fresh,
-        mode: CommandMode::Voltage,
+        mode: CommandMode::Driven,
         voltage: actuator_array(voltage),
         ..Actuation::DISABLED
     }

@@ -3,9 +3,10 @@
 #![allow(clippy::unwrap_used)]
 
 use drives::{
-    Actuation, Bridge, BridgeOptions, Deadlines, Measurement, PlantOptions, Port, SimulatedPlant,
+    Actuation, ActuatorProfile, Bridge, BridgeOptions, Deadlines, Measurement, PlantOptions, Port,
+    Profile, SimulatedPlant,
 };
-use machine::{LaserSource, Machine, StallTolerance};
+use machine::{ActuatorMode, LaserSource, Machine, StallTolerance};
 use messages::feedback::status;
 use messages::laser::{GateEdge, LaserCycle};
 use messages::random::SplitMix64;
@@ -30,7 +31,7 @@ impl Run {
         Self::over(port, tolerated, deadlines)
     }
 
-    fn over(port: Box<dyn Port + Send>, tolerated: i64, deadlines: Deadlines) -> Self {
+    fn over(port: Box<dyn Port>, tolerated: i64, deadlines: Deadlines) -> Self {
         let stall = StallTolerance::new(Nanoseconds(tolerated * PERIOD)).unwrap();
         let bridge = Bridge::new(port, BridgeOptions { epoch: EPOCH, deadlines, stall });
         Self { bridge, deadline: Nanoseconds(START) }
@@ -66,15 +67,15 @@ impl Run {
     }
 
     fn dark(&mut self) -> Feedback {
-        self.cycle(0, Some((CommandMode::Voltage, LaserCycle::OFF)))
+        self.cycle(0, Some((CommandMode::Driven, LaserCycle::OFF)))
     }
 
     fn lit(&mut self, laser: LaserCycle) -> Feedback {
-        self.cycle(0, Some((CommandMode::Voltage, laser)))
+        self.cycle(0, Some((CommandMode::Driven, laser)))
     }
 
     fn stall(&mut self, skipped: i64) -> Feedback {
-        self.cycle(skipped, Some((CommandMode::Voltage, LaserCycle::OFF)))
+        self.cycle(skipped, Some((CommandMode::Driven, LaserCycle::OFF)))
     }
 }
 
@@ -216,7 +217,7 @@ fn a_stall_is_a_fault_exactly_when_it_is_longer_than_tolerated() {
 }
 
 fn dark() -> (CommandMode, LaserCycle) {
-    (CommandMode::Voltage, LaserCycle::OFF)
+    (CommandMode::Driven, LaserCycle::OFF)
 }
 
 #[test]
@@ -300,25 +301,24 @@ fn a_hardware_port_is_told_of_passed_cycles_and_exchanges_only_once() {
     }
 
     /// Keeps what it is told.
-    struct Listening(Arc<Mutex<Told>>);
+    struct Listening(Arc<Mutex<Told>>, Profile);
 
     impl Port for Listening {
-        fn actuators(&self) -> usize {
-            2
+        fn profile(&self) -> &Profile {
+            &self.1
         }
-        fn gate_resolution(&self) -> Nanoseconds {
-            Nanoseconds(1)
-        }
-        fn exchange(&mut self, _: &Actuation, _: &mut Measurement) {
+        fn send(&mut self, _: &Actuation) {
             self.0.lock().unwrap().exchanged += 1;
         }
+        fn receive(&mut self, _: &mut Measurement) {}
         fn pass(&mut self, actuation: &Actuation) {
             self.0.lock().unwrap().passed.push(*actuation);
         }
     }
 
     let told = Arc::new(Mutex::new(Told::default()));
-    let mut run = Run::over(Box::new(Listening(told.clone())), 3, Deadlines::Strict);
+    let profile = Profile::of(vec![ActuatorProfile::immediate(ActuatorMode::Voltage); 2]);
+    let mut run = Run::over(Box::new(Listening(told.clone(), profile)), 3, Deadlines::Strict);
     run.cycle(0, Some((CommandMode::Disabled, LaserCycle::OFF)));
     run.lit(lit());
     run.lit(lit());
@@ -327,6 +327,6 @@ fn a_hardware_port_is_told_of_passed_cycles_and_exchanges_only_once() {
     assert_eq!((told.exchanged, told.passed.len()), (4, 5));
     assert!(told.passed.iter().all(|actuation| !actuation.laser.is_lit()));
     let modes: Vec<_> = told.passed.iter().map(|actuation| actuation.mode).collect();
-    let [held, braking] = [CommandMode::Voltage, CommandMode::QuickStop];
+    let [held, braking] = [CommandMode::Driven, CommandMode::QuickStop];
     assert_eq!(modes, [held, held, held, braking, braking]);
 }

@@ -61,7 +61,7 @@ fn plant_of(axis: &Axis, actuator: &Actuator, load: f64) -> Plant<1, Shaft> {
 fn to(position: f64, velocity: f64) -> Actuation {
     Actuation {
         freshness: Freshness::Fresh,
-        mode: CommandMode::Position,
+        mode: CommandMode::Driven,
         position: actuator_array(&[position]),
         velocity: actuator_array(&[velocity]),
         ..Actuation::DISABLED
@@ -220,7 +220,4 @@ fn a_quick_stop_ramps_the_pulses_down_and_holds() {
     let error = measurement.position[0] - (angle + 6.4);
     assert!(error.abs() < 1.0 / motor.pulses_per_radian(), "{error}");
     assert!((plant.state().angle[0] - measurement.position[0]).abs() < 1e-4);
-    // Voltage is no interface of a stepper's driver.
-    let volts = Actuation { mode: CommandMode::Voltage, ..to(0.0, 0.0) };
-    assert_eq!(exchange(&mut plant, &volts).fault.code, FaultCode::DriveFault as u32);
 }

@@ -2,15 +2,18 @@
 //! are cleared, stamps and counts.
 #![allow(clippy::unwrap_used)]
 
+use std::sync::{Arc, Mutex};
+
 use drives::{
-    Bridge, BridgeOptions, Deadlines, Freshness, GatePermission, PlantOptions, SimulatedPlant,
+    Actuation, ActuatorProfile, Bridge, BridgeOptions, Deadlines, Freshness, GatePermission,
+    Measurement, PlantOptions, Port, Profile, SimulatedPlant,
 };
-use machine::{Machine, StallTolerance};
+use machine::{ActuatorMode, Machine, StallTolerance};
 use messages::feedback::status;
 use messages::laser::{GateEdge, LaserCycle, MAX_EDGES};
 use messages::{
-    Command, CommandMode, Cycle, FaultCode, Feedback, Nanoseconds, RealtimeFacts,
-    axis::actuator_array,
+    Command, CommandMode, Cycle, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds,
+    RealtimeFacts, axis::actuator_array,
 };
 
 const EPOCH: u64 = 77;
@@ -70,7 +73,7 @@ impl Run {
         let mut run = Self::new(Deadlines::Strict);
         run.answered(CommandMode::Disabled, LaserCycle::OFF);
         for _ in 0..30 {
-            run.answered(CommandMode::Voltage, LaserCycle::OFF);
+            run.answered(CommandMode::Driven, LaserCycle::OFF);
         }
         run
     }
@@ -107,27 +110,27 @@ fn a_command_acts_one_cycle_after_the_feedback_it_answers() {
     let first = run.answered(CommandMode::Disabled, LaserCycle::OFF);
     assert_eq!((first.epoch, first.cycle, first.command_received.0), (EPOCH, Cycle(0), 0));
     assert_eq!(first.exchange, Nanoseconds(4_000));
-    let second = run.answered(CommandMode::Voltage, lit());
+    let second = run.answered(CommandMode::Driven, lit());
     assert_eq!(second.command_cycle, Cycle(0));
     assert!(!second.has(status::POWERED));
-    let third = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+    let third = run.answered(CommandMode::Driven, LaserCycle::OFF);
     // In force since the third deadline, so nothing has been fired yet.
     assert_eq!(third.command_cycle, Cycle(1));
     assert_eq!(third.command_received, second.deadline + Nanoseconds(20_000));
     assert_eq!(third.command_published, second.published + Nanoseconds(10_000));
     assert_eq!(third.command_applied, third.deadline + Nanoseconds(100));
     assert!(third.has(status::POWERED) && !third.laser.is_lit());
-    let fourth = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+    let fourth = run.answered(CommandMode::Driven, LaserCycle::OFF);
     assert_eq!(fourth.laser, lit());
-    assert!(!run.answered(CommandMode::Voltage, LaserCycle::OFF).laser.is_lit());
+    assert!(!run.answered(CommandMode::Driven, LaserCycle::OFF).laser.is_lit());
     assert_eq!(run.bridge.report(facts()).gate_trips, 0);
 }
 
 #[test]
 fn velocity_is_the_difference_of_positions_over_a_cycle() {
     let mut run = Run::moving();
-    let before = run.answered(CommandMode::Voltage, LaserCycle::OFF);
-    let after = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+    let before = run.answered(CommandMode::Driven, LaserCycle::OFF);
+    let after = run.answered(CommandMode::Driven, LaserCycle::OFF);
     for axis in 0..2 {
         assert_eq!(after.velocity[axis], (after.position[axis] - before.position[axis]) / 1e-3);
         assert!(after.velocity[axis].abs() > 1.0);
@@ -149,13 +152,13 @@ fn the_first_stale_cycle_is_dark_for_every_pattern_of_edges() {
                 assert!(laser.push(GateEdge { offset: slot * 120_000, gate, power: 1.0 }));
             }
         }
-        run.answered(CommandMode::Voltage, laser);
+        run.answered(CommandMode::Driven, laser);
         // In force from here; the answer is lost.
         run.missed();
-        let stale = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+        let stale = run.answered(CommandMode::Driven, LaserCycle::OFF);
         assert_eq!(stale.laser, laser, "{bits:#b}");
         assert!(stale.has(status::COMMAND_MISSED));
-        let after = run.answered(CommandMode::Voltage, LaserCycle::OFF);
+        let after = run.answered(CommandMode::Driven, LaserCycle::OFF);
         assert!(!after.laser.is_lit(), "{bits:#b}: {:?}", after.laser);
         assert!(!after.has(status::COMMAND_MISSED) && !after.has(status::WATCHDOG_TRIPPED));
         trips += u64::from(laser.last().0 != 0);
@@ -169,7 +172,7 @@ fn the_first_stale_cycle_is_dark_for_every_pattern_of_edges() {
 fn commands_of_another_cycle_or_epoch_are_stale() {
     let mut run = Run::moving();
     let feedback = *run.bridge.feedback();
-    let good = command(&feedback, CommandMode::Voltage, lit());
+    let good = command(&feedback, CommandMode::Driven, lit());
     for stale in [
         Command { cycle: Cycle(feedback.cycle.0 - 1), ..good },
         Command { cycle: feedback.cycle.next(), ..good },
@@ -204,7 +207,7 @@ fn more_misses_than_tolerated_stop_the_axes_until_a_reset_and_a_new_start() {
     assert_eq!((report.stops, report.at_rest, report.lit), (1, 1, 0));
 
     // Neither commands, nor disabling, nor a restarted controller that knows of no reset.
-    for mode in [CommandMode::Voltage, CommandMode::Disabled, CommandMode::Voltage] {
+    for mode in [CommandMode::Driven, CommandMode::Disabled, CommandMode::Driven] {
         let feedback = run.answered(mode, lit());
         assert!(feedback.has(status::WATCHDOG_TRIPPED) && !feedback.laser.is_lit());
     }
@@ -212,13 +215,13 @@ fn more_misses_than_tolerated_stop_the_axes_until_a_reset_and_a_new_start() {
         run.cycle(|feedback| Some(Command { reset, ..command(feedback, mode, lit()) }))
     };
     // A reset while it still asks for voltage does not start it.
-    reset(&mut run, CommandMode::Voltage, 9);
-    assert!(reset(&mut run, CommandMode::Voltage, 9).has(status::WATCHDOG_TRIPPED));
+    reset(&mut run, CommandMode::Driven, 9);
+    assert!(reset(&mut run, CommandMode::Driven, 9).has(status::WATCHDOG_TRIPPED));
     reset(&mut run, CommandMode::Disabled, 9);
-    let cleared = reset(&mut run, CommandMode::Voltage, 9);
+    let cleared = reset(&mut run, CommandMode::Driven, 9);
     assert!(!cleared.has(status::WATCHDOG_TRIPPED) && !cleared.fault.is_some());
-    assert!(reset(&mut run, CommandMode::Voltage, 9).has(status::POWERED));
-    assert!(reset(&mut run, CommandMode::Voltage, 9).laser.is_lit());
+    assert!(reset(&mut run, CommandMode::Driven, 9).has(status::POWERED));
+    assert!(reset(&mut run, CommandMode::Driven, 9).laser.is_lit());
 
     // The same ticket does not clear the next stop.
     for _ in 0..300 {
@@ -232,10 +235,10 @@ fn more_misses_than_tolerated_stop_the_axes_until_a_reset_and_a_new_start() {
 #[test]
 fn power_needs_a_command_that_starts_from_disabled() {
     let mut run = Run::new(Deadlines::Strict);
-    run.answered(CommandMode::Voltage, lit());
-    let refused = run.answered(CommandMode::Voltage, lit());
+    run.answered(CommandMode::Driven, lit());
+    let refused = run.answered(CommandMode::Driven, lit());
     assert!(refused.has(status::WATCHDOG_TRIPPED) && !refused.has(status::POWERED));
-    assert!(!run.answered(CommandMode::Voltage, lit()).laser.is_lit());
+    assert!(!run.answered(CommandMode::Driven, lit()).laser.is_lit());
 }
 
 #[test]
@@ -258,46 +261,78 @@ fn a_controller_that_leaves_unpowered_stops_nothing() {
 fn a_command_that_makes_no_sense_stops_at_once() {
     for number in [f64::NAN, f64::INFINITY] {
         let mut run = Run::moving();
-        run.answered(CommandMode::Voltage, lit());
+        run.answered(CommandMode::Driven, lit());
         run.cycle(|feedback| {
-            let good = command(feedback, CommandMode::Voltage, lit());
+            let good = command(feedback, CommandMode::Driven, lit());
             Some(Command { voltage: actuator_array(&[1.0, number]), ..good })
         });
-        let feedback = run.answered(CommandMode::Voltage, lit());
+        let feedback = run.answered(CommandMode::Driven, lit());
         assert_eq!((feedback.fault.code(), feedback.fault.actuator), (FaultCode::NotFinite, 2));
         assert!(feedback.has(status::WATCHDOG_TRIPPED));
-        assert!(!run.answered(CommandMode::Voltage, lit()).laser.is_lit());
+        assert!(!run.answered(CommandMode::Driven, lit()).laser.is_lit());
         assert_eq!(run.bridge.report(facts()).gate_trips, 1);
         for _ in 0..300 {
-            run.answered(CommandMode::Voltage, lit());
+            run.answered(CommandMode::Driven, lit());
         }
         assert!(!run.is_moving());
     }
 }
 
+/// Two motors that do nothing; keeps what it is told, and tells a fault word when it is lit.
+struct Stub {
+    profile: Profile,
+    told: Arc<Mutex<Vec<Actuation>>>,
+    word: u32,
+}
+
+impl Stub {
+    fn new(told: &Arc<Mutex<Vec<Actuation>>>, word: u32) -> Box<Self> {
+        let actuators = vec![ActuatorProfile::immediate(ActuatorMode::Voltage); 2];
+        Box::new(Self { profile: Profile::of(actuators), told: told.clone(), word })
+    }
+}
+
+impl Port for Stub {
+    fn profile(&self) -> &Profile {
+        &self.profile
+    }
+    fn send(&mut self, actuation: &Actuation) {
+        self.told.lock().unwrap().push(*actuation);
+    }
+    fn receive(&mut self, measurement: &mut Measurement) {
+        if self.word != 0 && self.told.lock().unwrap().last().unwrap().laser.is_lit() {
+            let fault = Fault::new(FaultCode::DriveFault).on_actuator(1);
+            measurement.fault = fault.with(FaultQuantity::DriveWord, f64::from(self.word));
+        }
+    }
+}
+
 #[test]
-fn a_mode_without_drive_stops_with_the_ports_fault() {
-    let mut run = Run::moving();
-    run.answered(CommandMode::Position, lit());
-    let feedback = run.answered(CommandMode::Voltage, lit());
-    assert_eq!(feedback.fault.code(), FaultCode::DriveFault);
-    assert_eq!(feedback.fault.value, f64::from(CommandMode::Position as u32));
-    assert_eq!(feedback.fault.at, feedback.measured);
-    assert!(!run.answered(CommandMode::Voltage, lit()).laser.is_lit());
-    assert!(run.bridge.feedback().has(status::WATCHDOG_TRIPPED));
+fn a_fault_word_of_a_drive_stops_the_axes_and_is_told() {
+    let port = Stub::new(&Arc::default(), 0x2310);
+    let bridge = Bridge::new(port, options(Deadlines::Strict));
+    let mut run = Run { bridge, deadline: Nanoseconds(5_000_000_000) };
+    run.answered(CommandMode::Disabled, LaserCycle::OFF);
+    run.answered(CommandMode::Driven, lit());
+    let feedback = run.answered(CommandMode::Driven, lit());
+    let fault = feedback.fault;
+    assert_eq!((fault.code(), fault.actuator), (FaultCode::DriveFault, 2));
+    assert_eq!((fault.quantity(), fault.value), (FaultQuantity::DriveWord, f64::from(0x2310)));
+    assert_eq!(fault.at, feedback.measured);
+    assert!(feedback.has(status::WATCHDOG_TRIPPED));
 }
 
 #[test]
 fn a_dead_peer_closes_the_gate_and_leaves_the_axes_to_the_controller() {
     let mut run = Run::moving();
-    run.answered(CommandMode::Voltage, lit());
-    run.answered(CommandMode::Voltage, lit());
+    run.answered(CommandMode::Driven, lit());
+    run.answered(CommandMode::Driven, lit());
     run.bridge.permit(GatePermission::Inhibited);
     // At this deadline the gate closes, though a fresh command asks for light.
-    let feedback = run.answered(CommandMode::Voltage, lit());
+    let feedback = run.answered(CommandMode::Driven, lit());
     assert!(feedback.laser.is_lit() && feedback.has(status::GATE_INHIBITED));
     for _ in 0..5 {
-        let feedback = run.answered(CommandMode::Voltage, lit());
+        let feedback = run.answered(CommandMode::Driven, lit());
         assert!(!feedback.laser.is_lit() && !feedback.has(status::WATCHDOG_TRIPPED));
     }
     assert_eq!(run.bridge.report(facts()).gate_trips, 1);
@@ -337,7 +372,7 @@ fn steppers_follow_the_controller_to_rest_in_the_dark_after_a_peer_has_died() {
             let before = told;
             told[0] += velocity[0] * 1e-3;
             let feedback = run.cycle(|feedback| {
-                let moving = command(feedback, CommandMode::Position, lit());
+                let moving = command(feedback, CommandMode::Driven, lit());
                 Some(Command { position: told, velocity, ..moving })
             });
             // What is told now acts from the next deadline to the one after.
@@ -349,7 +384,7 @@ fn steppers_follow_the_controller_to_rest_in_the_dark_after_a_peer_has_died() {
         }
         // It stands where it was told to, to the pulse.
         let stands = run.cycle(|feedback| {
-            let moving = command(feedback, CommandMode::Position, LaserCycle::OFF);
+            let moving = command(feedback, CommandMode::Driven, LaserCycle::OFF);
             Some(Command { position: told, velocity: [0.0; messages::MAX_ACTUATORS], ..moving })
         });
         assert!((stands.position[0] - told[0]).abs() <= pulse, "{stands:?}");
@@ -363,7 +398,7 @@ fn steppers_follow_the_controller_to_rest_in_the_dark_after_a_peer_has_died() {
 #[test]
 fn a_stop_from_outside_overrides_a_fresh_command() {
     let mut run = Run::moving();
-    run.answered(CommandMode::Voltage, lit());
+    run.answered(CommandMode::Driven, lit());
     let now = run.deadline;
     run.bridge.stop(FaultCode::ControllerLost, now);
     let feedback = run.missed();
@@ -403,32 +438,14 @@ fn overruns_and_slips_are_counted_once() {
 
 #[test]
 fn a_released_port_is_dark_and_unpowered() {
-    use drives::{Actuation, Measurement, Port};
-    use std::sync::{Arc, Mutex};
-
-    /// Keeps what it is told.
-    struct Listening(Arc<Mutex<Vec<Actuation>>>);
-
-    impl Port for Listening {
-        fn actuators(&self) -> usize {
-            2
-        }
-        fn gate_resolution(&self) -> Nanoseconds {
-            Nanoseconds(1)
-        }
-        fn exchange(&mut self, actuation: &Actuation, _: &mut Measurement) {
-            self.0.lock().unwrap().push(*actuation);
-        }
-    }
-
-    let told = Arc::new(Mutex::new(Vec::new()));
-    let bridge = Bridge::new(Box::new(Listening(told.clone())), options(Deadlines::Strict));
+    let told = Arc::default();
+    let bridge = Bridge::new(Stub::new(&told, 0), options(Deadlines::Strict));
     let mut run = Run { bridge, deadline: Nanoseconds(5_000_000_000) };
     run.answered(CommandMode::Disabled, LaserCycle::OFF);
-    run.answered(CommandMode::Voltage, lit());
-    run.answered(CommandMode::Voltage, lit());
+    run.answered(CommandMode::Driven, lit());
+    run.answered(CommandMode::Driven, lit());
     let last = *told.lock().unwrap().last().unwrap();
-    assert!(last.mode == CommandMode::Voltage && last.laser.is_lit());
-    run.bridge.release();
+    assert!(last.mode == CommandMode::Driven && last.laser.is_lit());
+    run.bridge.close().unwrap();
     assert_eq!(told.lock().unwrap().last(), Some(&Actuation::DISABLED));
 }

@@ -35,7 +35,7 @@ fn course(values: Values, substep: f64) -> Vec<[f64; 2]> {
     let mut measurement = Measurement::default();
     let driven = |volts: f64| Actuation {
         freshness: Freshness::Fresh,
-        mode: CommandMode::Voltage,
+        mode: CommandMode::Driven,
         voltage: actuator_array(&[volts]),
         ..Actuation::DISABLED
     };

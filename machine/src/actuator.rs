@@ -1,7 +1,9 @@
 //! What moves an axis: motor, encoder, transmission ratio, and the gains of its cascade.
 
+use crate::drives::ActuatorMode;
 use crate::motor::Motor;
 use crate::transmission::gear::Efficiency;
+use messages::Nanoseconds;
 
 /// Friction at the motor shaft.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,6 +94,10 @@ pub struct Actuator {
     pub encoder: Encoder,
     /// Gains of its cascade.
     pub gains: LoopGains,
+    /// Which target its drive follows.
+    pub mode: ActuatorMode,
+    /// From the deadline at which a target is sent until the motor follows it [ns].
+    pub latency: Nanoseconds,
     /// How far it stands beyond its place where its home reference is, in joint units [m or rad]: what
     /// enabling takes back. 0 where the reference is square.
     pub square: f64,

@@ -4,6 +4,7 @@
 
 mod axes;
 pub mod bounds;
+pub mod drives;
 pub mod frame;
 pub mod mechanism;
 pub mod motors;

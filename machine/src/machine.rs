@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::actuator::Actuator;
 use crate::axis::{Axis, JointUnit};
 use crate::document::{Concern, DocumentError, Override};
+use crate::drives::Drives;
 use crate::gcode_settings::GcodeSettings;
 use crate::laser::LaserSource;
 use crate::limits::{CornerMode, PathLimits, StallTolerance, WorkArea};
@@ -42,6 +43,8 @@ pub struct Machine {
     pub stall: StallTolerance,
     /// Its switches, how its axes are homed, and what is done for safety.
     pub operating: Operating,
+    /// What drives the motors.
+    pub drives: Drives,
     /// The laser source.
     pub laser: LaserSource,
     /// How it reads G-code.

@@ -2,21 +2,17 @@
 
 use crate::{ActuatorArray, Cycle, Fault, LaserCycle, Nanoseconds, sample};
 
-/// Which of a command's targets drives shall follow. Discriminants are the values in samples.
+/// What drives shall do with the motors. Discriminants are the values in samples; 1 to 3 were modes of
+/// the machine as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u32)]
 pub enum CommandMode {
     /// Power stage off; the motor coasts.
     #[default]
     Disabled = 0,
-    /// Cyclic synchronous position: the drive closes all loops on `position`.
-    Position = 1,
-    /// Cyclic synchronous velocity.
-    Velocity = 2,
-    /// Cyclic synchronous torque.
-    Effort = 3,
-    /// The controller closes the current loop too; the drive applies `voltage`.
-    Voltage = 4,
+    /// Each motor follows the target that the machine file has for its drive: voltage, torque, velocity or
+    /// position.
+    Driven = 4,
     /// The drive brakes to rest at its own limit of deceleration and holds.
     QuickStop = 5,
 }
@@ -26,10 +22,7 @@ impl CommandMode {
     pub fn from_wire(value: u32) -> Self {
         match value {
             0 => Self::Disabled,
-            1 => Self::Position,
-            2 => Self::Velocity,
-            3 => Self::Effort,
-            4 => Self::Voltage,
+            4 => Self::Driven,
             _ => Self::QuickStop,
         }
     }
@@ -37,7 +30,7 @@ impl CommandMode {
 
 sample! {
     /// The answer to one feedback. Drives latches it and applies it at the next deadline, always.
-    Command = "graver.Command.v3" {
+    Command = "graver.Command.v4" {
         /// The `Feedback::epoch` this answers: a command for another run of drives is not fresh.
         epoch: u64,
         /// The feedback this answers; it takes effect at the deadline of `cycle + 1`.
@@ -71,7 +64,8 @@ sample! {
         reference: ActuatorArray,
         /// Reference minus feedback [rad at the motor].
         following_error: ActuatorArray,
-        /// Target position at the end of the cycle in which this acts [rad at the motor].
+        /// Target position at the end of the cycle in which this acts [rad at the motor]. All targets are
+        /// given; a drive follows the one of its mode, and may take those after it as feedforward.
         position: ActuatorArray,
         /// Target velocity in the cycle in which this acts [rad/s at the motor].
         velocity: ActuatorArray,

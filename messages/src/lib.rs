@@ -40,7 +40,7 @@ pub use laser::{GateEdge, LaserCycle, MAX_EDGES};
 pub use operator::{OperatorReply, OperatorRequest, OperatorVerb};
 pub use progress::Progress;
 pub use refusal::Refusal;
-pub use report::{ControllerReport, DrivesReport, RealtimeFacts};
+pub use report::{ControllerReport, DrivesReport, LinkCounters, RealtimeFacts};
 pub use sample::Sample;
 pub use setpoint::Setpoint;
 pub use stall::{StallCause, Stalls};

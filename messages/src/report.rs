@@ -93,8 +93,28 @@ sample! {
 }
 
 sample! {
+    /// What a port counted on the link to its hardware since it was opened; all 0 where there is none.
+    LinkCounters = "graver.LinkCounters.v1" {
+        /// Frames or packets sent.
+        sent: u64,
+        /// Those that nothing came back of.
+        lost: u64,
+        /// Answers that came after their cycle.
+        late: u64,
+        /// Answers that came more than once, or out of order.
+        duplicated: u64,
+        /// Answers that could not be read, or were not what was asked.
+        corrupted: u64,
+        /// Cycles without a measurement of their own; the one before stood in.
+        bridged: u64,
+        /// Largest distance of the clock of the bus from ours while it was followed [ns].
+        clock_error_max: u64,
+    }
+}
+
+sample! {
     /// What drives counted since it started.
-    DrivesReport = "graver.DrivesReport.v3" {
+    DrivesReport = "graver.DrivesReport.v4" {
         /// The newest cycle.
         cycle: Cycle,
         /// Cycles whose work did not end before the next deadline, slips and skipped cycles included.
@@ -115,6 +135,8 @@ sample! {
         fault: Fault,
         /// Times in which the cycle stood still, since the newest stream began.
         stalls: Stalls,
+        /// What was counted on the link to the hardware.
+        link: LinkCounters,
         /// Real-time set-up of the drives' thread.
         realtime: RealtimeFacts,
     }

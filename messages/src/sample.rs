@@ -185,6 +185,7 @@ mod tests {
             crate::PlannerReport::LAYOUT,
             crate::ControllerReport::LAYOUT,
             crate::DrivesReport::LAYOUT,
+            crate::LinkCounters::LAYOUT,
             crate::RealtimeFacts::LAYOUT,
             crate::Stalls::LAYOUT,
             crate::OperatorRequest::LAYOUT,

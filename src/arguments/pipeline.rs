@@ -7,7 +7,9 @@ use std::path::PathBuf;
 /// What the drives are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum DrivesKind {
-    /// The simulated plant.
+    /// What the machine file says; the simulated plant where it says nothing.
+    Machine,
+    /// The simulated plant, whatever the machine file says.
     Sim,
 }
 
@@ -15,7 +17,7 @@ pub enum DrivesKind {
 #[derive(Debug, Clone, Args)]
 pub struct DrivesArguments {
     /// What to drive.
-    #[arg(long, value_enum, default_value = "sim")]
+    #[arg(long, value_enum, default_value = "machine")]
     pub drives: DrivesKind,
     /// Let no deadline slip, as on hardware: a command later than 0.3 ms closes the gate for that
     /// cycle. Without it the simulated plant waits for up to 100 ms.

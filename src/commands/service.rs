@@ -3,8 +3,7 @@
 
 use crate::arguments::ServiceArguments;
 use crate::exit::{Exit, Failure};
-use crate::pipeline::configuration::{Configuration, Driven};
-use drives::{PlantOptions, SimulatedPlant};
+use crate::pipeline::configuration::Configuration;
 use runtime::domain::Role;
 use runtime::thread::{CONTROLLER_PRIORITY, DRIVES_PRIORITY};
 use runtime::{Domain, Instance, signal};
@@ -19,23 +18,21 @@ pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
     let domain = Domain::join(&instance, role).map_err(Failure::service)?;
     let configuration = Configuration::read(&instance)?;
     match role {
-        Role::Planner => planner::service::run(&domain, &configuration.source.machine()?),
-        Role::Monitor => monitor::service::run(&domain, &configuration.source.machine()?),
+        Role::Planner => planner::service::run(&domain, &configuration.machine()?),
+        Role::Monitor => monitor::service::run(&domain, &configuration.machine()?),
         Role::Controller => {
             let realtime = configuration.realtime_options(CONTROLLER_PRIORITY);
-            controller::service::run(&domain, &configuration.source.machine()?, &realtime)
+            controller::service::run(&domain, &configuration.machine()?, &realtime)
         }
         Role::Drives => {
-            let Driven::Simulated = configuration.drives;
-            let machine = configuration.source.machine()?;
-            let port = SimulatedPlant::new(&configuration.source.plant()?, PlantOptions::default())
+            let machine = configuration.machine()?;
+            let port = drives::ports::build(&machine, &configuration.source.plant()?)
                 .map_err(Failure::bad_input)?;
             let options = drives::service::ServiceOptions {
-                deadlines: configuration.deadlines(),
-                stall: machine.stall,
+                deadlines: configuration.deadlines(&machine),
                 realtime: configuration.realtime_options(DRIVES_PRIORITY),
             };
-            drives::service::run(&domain, port, &options)
+            drives::service::run(&domain, &machine, port, &options)
         }
         Role::Domain | Role::Observer => Ok(()),
     }

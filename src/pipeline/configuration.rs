@@ -5,6 +5,7 @@ use crate::arguments::{DrivesArguments, DrivesKind};
 use crate::exit::Failure;
 use crate::inputs::MachineSource;
 use drives::Deadlines;
+use machine::{DrivesKind as MachineDrives, Machine};
 use runtime::thread::{Placement, RealtimeOptions, last_core};
 use runtime::{Instance, ServiceError};
 use serde::{Deserialize, Serialize};
@@ -33,6 +34,8 @@ pub struct Configuration {
 /// What is driven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Driven {
+    /// What the machine file says.
+    Machine,
     /// The simulated plant.
     Simulated,
 }
@@ -54,6 +57,7 @@ impl Configuration {
         Ok(Self {
             source,
             drives: match drives.drives {
+                DrivesKind::Machine => Driven::Machine,
                 DrivesKind::Sim => Driven::Simulated,
             },
             strict: drives.strict,
@@ -87,9 +91,22 @@ impl Configuration {
             .map_err(|source| Failure::service(ServiceError::io(path, source)))
     }
 
-    /// Whether the clock may slip.
-    pub fn deadlines(&self) -> Deadlines {
-        if self.strict { Deadlines::Strict } else { Deadlines::Slipping }
+    /// The machine that is controlled, with the drives that it is to have.
+    ///
+    /// # Errors
+    /// A machine that is not sound.
+    pub fn machine(&self) -> Result<Machine, Failure> {
+        let mut machine = self.source.machine()?;
+        if self.drives == Driven::Simulated {
+            machine.drives.kind = MachineDrives::Simulated;
+        }
+        Ok(machine)
+    }
+
+    /// Whether the clock may slip under the drives of `machine`.
+    pub fn deadlines(&self, machine: &Machine) -> Deadlines {
+        let simulated = machine.drives.kind == MachineDrives::Simulated;
+        if self.strict || !simulated { Deadlines::Strict } else { Deadlines::Slipping }
     }
 
     /// The real-time set-up of a cyclic thread.

@@ -6,8 +6,8 @@ use crate::exchange::Inputs;
 use crate::state::State;
 use crate::supervision::Finding;
 use messages::{
-    Command, CommandMode, Fault, FaultCode, FaultQuantity, Feedback, LaserCycle, MAX_AXES,
-    MAX_EDGES, Nanoseconds, Progress,
+    Command, Fault, FaultCode, FaultQuantity, Feedback, LaserCycle, MAX_AXES, MAX_EDGES,
+    Nanoseconds, Progress,
 };
 
 /// Cycles between two progress samples.
@@ -27,10 +27,7 @@ impl Controller {
             stroke: u64::from(stroke(&laser)),
             received: inputs.received,
             published: now,
-            mode: match self.state.mode() {
-                CommandMode::Voltage => self.drive,
-                mode => mode,
-            } as u32,
+            mode: self.state.mode() as u32,
             state: self.state.to_wire() as u32,
             stream_time: self.player.now().time.seconds(),
             rate: self.player.now().rate,

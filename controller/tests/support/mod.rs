@@ -448,7 +448,7 @@ impl Bench {
         for (index, motor) in self.motors.iter_mut().enumerate() {
             let voltage = match self.latched.mode() {
                 CommandMode::Disabled => None,
-                CommandMode::Voltage => Some(self.latched.voltage[index]),
+                CommandMode::Driven => Some(self.latched.voltage[index]),
                 _ => Some(0.0),
             };
             motor.run(voltage, self.step);

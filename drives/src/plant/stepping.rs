@@ -131,14 +131,14 @@ impl<const N: usize> Stepping<N> {
             let motor = &self.motors[row];
             *segment = match (actuation.mode, actuation.freshness) {
                 (CommandMode::Disabled, _) => Segment::rest(state.angle[row] - self.origin[row]),
-                (CommandMode::Position, Freshness::Fresh) => segment
+                (CommandMode::Driven, Freshness::Fresh) => segment
                     .then(actuation.position[row] - self.origin[row], actuation.velocity[row]),
                 // Nobody said where to: on as before, for the few cycles that the bridge allows.
-                (CommandMode::Position, Freshness::Stale) => segment.coast(),
+                (CommandMode::Driven, Freshness::Stale) => segment.coast(),
                 _ => segment.brake(self.deceleration[row]),
             };
             let rate = segment.fastest() * motor.pulses_per_radian();
-            let follows = actuation.mode == CommandMode::Position;
+            let follows = actuation.mode == CommandMode::Driven;
             if follows && (rate > motor.pulse_rate * EXCESS || rate.is_nan()) {
                 let fault = Fault::new(FaultCode::DriveFault).on_actuator(row);
                 return Err(fault.beyond(FaultQuantity::PulseRate, rate, motor.pulse_rate));

@@ -11,13 +11,13 @@ use core::f64::consts::TAU;
 
 use machine::operating::{HomingMethod, InputFunction, SimulatedSwitch};
 use machine::{Actuator, Machine};
-use messages::{ActuatorArray, MAX_ACTUATORS, Nanoseconds};
+use messages::{ActuatorArray, MAX_ACTUATORS};
 
-use crate::port::{Actuation, Measurement, Port};
+use crate::port::{Actuation, Measurement, Port, Profile};
 
 /// A simulated machine with its switches.
 pub struct Switched {
-    port: Box<dyn Port + Send>,
+    port: Box<dyn Port>,
     actuators: Vec<Actuator>,
     switches: Vec<Switch>,
     /// Which actuators count from where they stood at first.
@@ -50,7 +50,7 @@ impl core::fmt::Debug for Switched {
 impl Switched {
     /// The plant in `port`, which is one of `machine`; itself where that has neither inputs nor homing.
     #[allow(clippy::new_ret_no_self)]
-    pub fn new(machine: &Machine, port: Box<dyn Port + Send>) -> Box<dyn Port + Send> {
+    pub fn new(machine: &Machine, port: Box<dyn Port>) -> Box<dyn Port> {
         let operating = &machine.operating;
         if operating.inputs.is_empty() && operating.homing.iter().all(Option::is_none) {
             return port;
@@ -118,17 +118,17 @@ impl Switched {
 }
 
 impl Port for Switched {
-    fn actuators(&self) -> usize {
-        self.port.actuators()
+    fn profile(&self) -> &Profile {
+        self.port.profile()
     }
 
-    fn gate_resolution(&self) -> Nanoseconds {
-        self.port.gate_resolution()
-    }
-
-    fn exchange(&mut self, actuation: &Actuation, measurement: &mut Measurement) {
+    fn send(&mut self, actuation: &Actuation) {
         self.shift(actuation);
-        self.port.exchange(&self.shifted, measurement);
+        self.port.send(&self.shifted);
+    }
+
+    fn receive(&mut self, measurement: &mut Measurement) {
+        self.port.receive(measurement);
         let angle = measurement.position;
         measurement.inputs = self.inputs(&angle);
         self.before = Some(angle);

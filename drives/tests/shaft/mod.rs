@@ -135,6 +135,8 @@ pub(crate) fn actuator(inertia: f64, friction: Friction) -> machine::Actuator {
         brake: HoldingBrake { torque: 0.0, release: 0.0 },
         encoder: Encoder { counts: 4096.0 },
         gains: LoopGains { position: 40.0, velocity: 160.0, current: 349.0, inertia },
+        mode: machine::ActuatorMode::Voltage,
+        latency: messages::Nanoseconds(0),
         square: 0.0,
     }
 }

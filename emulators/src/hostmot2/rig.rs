@@ -199,7 +199,6 @@ impl Rig {
         let mut actuation = Actuation { freshness: Freshness::Fresh, ..Actuation::DISABLED };
         let duration = CYCLE_PERIOD.seconds();
         let (mut powered, mut released) = (false, false);
-        let mut mode = CommandMode::Position;
         for (row, axis) in self.axes.iter_mut().enumerate() {
             match axis.connection.drive {
                 Drive::Stepgen { stepgen } => {
@@ -223,7 +222,6 @@ impl Rig {
                     }
                 }
                 Drive::Pwm { pwm } => {
-                    mode = CommandMode::Voltage;
                     let enable = pin_of(Function::PwmEnable(pwm))
                         .is_some_and(|pin| !modules.pins.level(pin, !modules.pwmgens.enabled(pwm)));
                     let driven = pin_connected(modules, Function::Pwmgen(1, pwm)) && enable;
@@ -240,7 +238,7 @@ impl Rig {
         actuation.mode = match (powered, released) {
             (false, _) => CommandMode::Disabled,
             (true, true) => CommandMode::QuickStop,
-            (true, false) => mode,
+            (true, false) => CommandMode::Driven,
         };
         actuation
     }

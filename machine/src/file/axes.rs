@@ -1,7 +1,7 @@
 //! From the axes' tables to [`Axis`] and [`Actuator`]: ratios, what the loops move, and the motors' own
 //! limits.
 
-use super::motors::{counts, motor};
+use super::motors::{counts, mode, motor};
 use super::tables::{AxisActuatorTable, AxisTable, LimitsTable, LoopsTable};
 use crate::actuator::{Actuator, Friction, HoldingBrake, LoopGains};
 use crate::axis::Axis;
@@ -10,6 +10,7 @@ use crate::limits::AxisLimits;
 use crate::motor::Motor;
 use crate::quantity::Kind;
 use crate::transmission::gear::Efficiency;
+use messages::Nanoseconds;
 
 pub(super) use crate::axis::JointUnit;
 
@@ -134,13 +135,14 @@ pub(super) fn drives(
 impl AxisTable {
     /// This as the actuator with the table `own` has it.
     pub fn with_own(&self, own: &AxisActuatorTable) -> Self {
-        let AxisActuatorTable { gear, motor, friction, encoder, loops, .. } = own.clone();
+        let AxisActuatorTable { gear, motor, friction, encoder, mode, loops, .. } = own.clone();
         let axis = self.clone();
         Self {
             gear: gear.unwrap_or(axis.gear),
             motor: motor.unwrap_or(axis.motor),
             friction: friction.unwrap_or(axis.friction),
             encoder: encoder.or(axis.encoder),
+            mode: mode.or(axis.mode),
             loops: loops.or(axis.loops),
             ..axis
         }
@@ -208,6 +210,8 @@ pub(super) fn axis(
                     LoopGains { position: 0.0, velocity: 0.0, current: 0.0, inertia }
                 }
             },
+            mode: mode(table, &motor, diagnostics),
+            latency: Nanoseconds(0),
             square: drive.square,
         };
         actuators.push((drive, actuator));

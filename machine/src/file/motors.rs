@@ -6,6 +6,7 @@ use super::axes::{Drive, Joint};
 use super::tables::{AxisTable, DcMotorTable, StepperMotorTable};
 use crate::actuator::{Actuator, Encoder};
 use crate::document::{Diagnostics, Number, Positive, ProblemKind};
+use crate::drives::ActuatorMode;
 use crate::motor::{DcMotor, Motor, StepperMotor};
 
 /// Rounding of a whole number that was computed from other units.
@@ -160,6 +161,27 @@ pub(super) fn counts(
         );
     }
     Some(Encoder { counts })
+}
+
+/// Which target the drive of `motor` follows; notes one that the motor cannot follow.
+pub(super) fn mode(
+    table: &AxisTable,
+    motor: &Motor,
+    diagnostics: &mut Diagnostics,
+) -> ActuatorMode {
+    let usual = match motor {
+        Motor::Dc(_) => ActuatorMode::Voltage,
+        Motor::Stepper(_) => ActuatorMode::Position,
+    };
+    let Some(mode) = table.mode else { return usual };
+    if usual == ActuatorMode::Position && mode.value != usual {
+        diagnostics.contradict(
+            mode.span,
+            format!("a stepper does not follow a {}", mode.value.name()),
+            "leave `mode` out: a stepper follows a position, by its pulses",
+        );
+    }
+    mode.value
 }
 
 /// Refuses axes whose motors are not all of one kind: one command drives them all, by voltage or by

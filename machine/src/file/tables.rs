@@ -5,10 +5,12 @@
 //!
 //! Their documentation becomes the schema's, so it speaks to whoever writes a machine file.
 
+use super::drives::DrivesTable;
 use super::frame::MachineFrameTable;
 use super::mechanism::MechanismTable;
 use super::operating::{HomingTable, InputTable, OutputTable, SafetyTable};
 use crate::document::{Either, Fraction, Named, NonNegative, Number, Point, Positive, Spanned};
+use crate::drives::ActuatorMode;
 use crate::gcode_settings::ZMeaning;
 use crate::limits::CornerMode;
 use crate::quantity as unit;
@@ -52,6 +54,8 @@ table! {
         pub safety: SafetyTable,
         /// What the machine bears of a computer that is late.
         pub realtime: RealtimeTable,
+        /// What drives the motors: one table, named by its kind.
+        pub drives: DrivesTable,
         /// The laser source.
         pub laser: LaserTable,
         /// How the machine reads G-code.
@@ -147,6 +151,10 @@ table! {
         pub friction: FrictionTable,
         /// The encoder on the motor shaft; a stepper has none.
         pub encoder: Option<EncoderTable>,
+        /// Which target the motor's drive follows, and so which loops it closes itself: `voltage` (none),
+        /// `torque` (current), `velocity` (current and velocity) or `position` (all). When left out,
+        /// `voltage` for a DC motor and `position` for a stepper.
+        pub mode: Option<Spanned<ActuatorMode>>,
         /// Limits beyond those of the path.
         pub limits: LimitsTable,
         /// Bandwidths of the control loops; a stepper has none.
@@ -177,6 +185,8 @@ table! {
         pub friction: Option<FrictionTable>,
         /// The encoder on the motor shaft.
         pub encoder: Option<EncoderTable>,
+        /// Which target the motor's drive follows.
+        pub mode: Option<Spanned<ActuatorMode>>,
         /// Bandwidths of the control loops.
         pub loops: Option<LoopsTable>,
     }
@@ -495,6 +505,14 @@ crate::keyword! {
     ZMeaning, "a meaning of Z",
     "ignored" => Self::Ignored,
     "focus" => Self::Focus,
+}
+
+crate::keyword! {
+    ActuatorMode, "a mode of an actuator",
+    "voltage" => Self::Voltage,
+    "torque" => Self::Torque,
+    "velocity" => Self::Velocity,
+    "position" => Self::Position,
 }
 
 crate::keyword! {

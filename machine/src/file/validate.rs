@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::axes::{Drive, Joint, axis};
 use super::bounds::BOUNDS;
+use super::drives;
 use super::mechanism::{self, Built};
 use super::motors;
 use super::operating::{self, operating};
@@ -48,7 +49,8 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     check_z(&table, &mechanism, &mut diagnostics);
     let laser = laser(&table.laser, &mut diagnostics);
     let stall = stall(&table.realtime, &mut diagnostics);
-    let actuators: Vec<Actuator> = driven.into_iter().map(|(_, actuator)| actuator).collect();
+    let mut actuators: Vec<Actuator> = driven.into_iter().map(|(_, actuator)| actuator).collect();
+    let drives = drives::build(&table.drives, &mut actuators, &mut diagnostics);
     let operating = if axes.len() == joints.len() {
         let (inputs, outputs) = (table.inputs.as_ref(), table.outputs.as_ref());
         let safety = &table.safety;
@@ -77,6 +79,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         corners: corners.value,
         stall,
         operating,
+        drives,
         laser,
         gcode: GcodeSettings {
             words: gcode.over(Dialect::Standard.meanings()),

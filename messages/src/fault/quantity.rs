@@ -61,6 +61,10 @@ pub enum FaultQuantity {
     Racking = 26,
     /// Way that an axis went without finding its reference [joint unit].
     SearchDistance = 27,
+    /// The fault word of a drive, as it gives it.
+    DriveWord = 28,
+    /// Cycles in a row without an answer from the hardware.
+    LostCycles = 29,
 }
 
 /// The unit of a quantity.
@@ -73,7 +77,7 @@ pub enum FaultUnit {
 }
 
 impl FaultQuantity {
-    const ALL: [Self; 28] = [
+    const ALL: [Self; 30] = [
         Self::None,
         Self::FollowingError,
         Self::Position,
@@ -102,6 +106,8 @@ impl FaultQuantity {
         Self::HoldDistance,
         Self::Racking,
         Self::SearchDistance,
+        Self::DriveWord,
+        Self::LostCycles,
     ];
 
     /// The quantity with this number in a sample; an unknown number reads as [`Self::None`].
@@ -141,6 +147,8 @@ impl FaultQuantity {
             Self::HoldDistance => ("distance from where it is to be held", Joint("")),
             Self::Racking => ("distance of the actuators of the axis", Joint("")),
             Self::SearchDistance => ("way without finding the reference", Joint("")),
+            Self::DriveWord => ("fault word of the drive", Plain("")),
+            Self::LostCycles => ("cycles without an answer of the hardware", Plain("")),
         }
     }
 }

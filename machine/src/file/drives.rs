@@ -1,0 +1,172 @@
+//! From the table of the drives to [`Drives`], and what each actuator's drive is.
+
+pub mod ethercat;
+pub mod hostmot2;
+pub mod simulated;
+
+use messages::Nanoseconds;
+
+use crate::actuator::Actuator;
+use crate::document::{
+    Diagnostics, Named, NonNegative, Number, ProblemKind, Quantity, Span, Spanned, nearest,
+};
+use crate::drives::{Drives, DrivesKind};
+use crate::quantity::Duration;
+use crate::table;
+
+/// How long an actuation takes to act.
+pub type Latency = Quantity<Duration, NonNegative>;
+
+/// What the table of a kind of drives becomes.
+pub(super) struct Built {
+    pub(super) kind: DrivesKind,
+    pub(super) gate_latency: Nanoseconds,
+    /// Of each actuator.
+    pub(super) latency: Vec<Nanoseconds>,
+}
+
+/// The one list of the drives that a machine file can have: key, table, and what builds them.
+macro_rules! drives_tables {
+    ($( $(#[doc = $about:expr])* $key:ident: $table:ty, $build:path; )*) => {
+        table! {
+            /// What drives the motors: at most one of these; the simulated plant when none is given.
+            pub struct DrivesTable {
+                $( $(#[doc = $about])* pub $key: Option<$table>, )*
+            }
+        }
+
+        impl DrivesTable {
+            /// Every kind that the file declares, and where its table stands.
+            fn declared(&self) -> Vec<(&'static str, Span)> {
+                let all = [$( (stringify!($key), self.$key.as_ref().map(|table| table.span)) ),*];
+                all.into_iter().filter_map(|(name, span)| Some((name, span?))).collect()
+            }
+
+            /// The drives of the first table that there is.
+            fn build(&self, actuators: &[Actuator], diagnostics: &mut Diagnostics) -> Option<Built> {
+                $( if let Some(table) = &self.$key {
+                    return $build(table, actuators, diagnostics);
+                } )*
+                Some(Built {
+                    kind: DrivesKind::Simulated,
+                    gate_latency: Nanoseconds(0),
+                    latency: vec![Nanoseconds(0); actuators.len()],
+                })
+            }
+        }
+    };
+}
+
+drives_tables! {
+    /// The simulated plant.
+    simulated: simulated::SimulatedTable, simulated::build;
+    /// An FPGA card with HostMot2 firmware, over UDP.
+    hostmot2: hostmot2::Hostmot2Table, hostmot2::build;
+    /// Drives on an EtherCAT bus.
+    ethercat: ethercat::EthercatTable, ethercat::build;
+}
+
+/// The drives of `table`; puts the latency of each actuator into `actuators`.
+pub(super) fn build(
+    table: &DrivesTable,
+    actuators: &mut [Actuator],
+    diagnostics: &mut Diagnostics,
+) -> Drives {
+    if let [(first, first_place), (second, second_place), ..] = table.declared().as_slice() {
+        diagnostics.contradict(
+            *first_place.max(second_place),
+            "the machine has two kinds of drives".to_owned(),
+            &format!("keep either [drives.{first}] or [drives.{second}]"),
+        );
+    }
+    let Some(Built { kind, gate_latency, latency }) = table.build(actuators, diagnostics) else {
+        return Drives::default();
+    };
+    for (actuator, latency) in actuators.iter_mut().zip(latency) {
+        actuator.latency = latency;
+    }
+    Drives { kind, gate_latency }
+}
+
+/// The latency of each of `actuators`: its own where its table has one, else that of all.
+fn latencies<T>(
+    all: &Latency,
+    tables: Option<&Named<T>>,
+    own: impl Fn(&T) -> Option<Latency>,
+    actuators: &[Actuator],
+) -> Vec<Nanoseconds> {
+    let of = |actuator: &Actuator| find(tables, &actuator.name).and_then(&own).unwrap_or(*all);
+    actuators.iter().map(|actuator| Nanoseconds::from_seconds(of(actuator).value)).collect()
+}
+
+/// The table called `name`.
+fn find<'a, T>(tables: Option<&'a Named<T>>, name: &str) -> Option<&'a T> {
+    let mut entries = tables?.entries.iter();
+    entries.find(|(found, _)| found.value == name).map(|(_, table)| table)
+}
+
+/// Refuses tables whose names are of no actuator.
+fn refuse_unknown<T>(
+    tables: Option<&Named<T>>,
+    actuators: &[Actuator],
+    diagnostics: &mut Diagnostics,
+) {
+    let names = || actuators.iter().map(|actuator| actuator.name.as_str());
+    for (Spanned { value: name, span }, _) in tables.into_iter().flat_map(|tables| &tables.entries)
+    {
+        if names().any(|known| known == name) {
+            continue;
+        }
+        let help = match nearest(name, names()) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => {
+                let list: Vec<String> = names().map(|name| format!("`{name}`")).collect();
+                format!("the machine's actuators are {}", list.join(", "))
+            }
+        };
+        let message = format!("the machine has no actuator `{name}`");
+        diagnostics.refuse(ProblemKind::UnknownKey, *span, message, Some(help));
+    }
+}
+
+/// The table of each of `actuators`, in their order; notes those that have none, and those of none.
+fn each<'a, T>(
+    tables: &'a Named<T>,
+    kind: &str,
+    actuators: &[Actuator],
+    diagnostics: &mut Diagnostics,
+) -> Option<Vec<&'a T>> {
+    refuse_unknown(Some(tables), actuators, diagnostics);
+    let mut all = Some(Vec::with_capacity(actuators.len()));
+    for Actuator { name, .. } in actuators {
+        match find(Some(tables), name) {
+            Some(table) => all.iter_mut().for_each(|all| all.push(table)),
+            None => {
+                let key = if name.contains('.') { format!("\"{name}\"") } else { name.clone() };
+                diagnostics.refuse(
+                    ProblemKind::MissingKey,
+                    tables.span,
+                    format!("nothing is said of what drives the actuator `{name}`"),
+                    Some(format!("add [drives.{kind}.actuators.{key}]")),
+                );
+                all = None;
+            }
+        }
+    }
+    all
+}
+
+/// The whole number that `number` is; notes one that is not.
+fn whole(number: &Number<NonNegative>, most: u32, diagnostics: &mut Diagnostics) -> u32 {
+    let rounded = number.value.round();
+    if rounded != number.value || rounded > f64::from(most) {
+        diagnostics.refuse(
+            ProblemKind::OutOfRange,
+            number.span,
+            format!("{} is not possible here", number.value),
+            Some(format!("write a whole number from 0 to {most}")),
+        );
+        return 0;
+    }
+    rounded as u32
+}

@@ -1,0 +1,104 @@
+//! Drives on an EtherCAT bus.
+
+use super::{Built, Latency, each, latencies, whole};
+use crate::actuator::Actuator;
+use crate::document::{Diagnostics, Named, NonNegative, Number, Positive, Quantity, Spanned};
+use crate::drives::{DrivesKind, Ethercat, EthercatGate, EthercatLink};
+use crate::quantity::Duration;
+use crate::table;
+use messages::Nanoseconds;
+
+/// A whole number.
+type Whole = Number<NonNegative>;
+
+/// The last position on a bus.
+const LAST_SLAVE: u32 = 65_534;
+
+/// The last channel of a terminal.
+const LAST_CHANNEL: u32 = 63;
+
+/// The most samples in a cycle.
+const MOST_SAMPLES: u32 = 1000;
+
+table! {
+    /// Drives on an EtherCAT bus.
+    pub struct EthercatTable {
+        /// The network interface of the bus, for raw frames. Instead of `udp`.
+        pub interface: Option<Spanned<String>>,
+        /// The address that takes the frames in UDP packets, such as `127.0.0.1:34980`. Instead of
+        /// `interface`.
+        pub udp: Option<Spanned<String>>,
+        /// How long a drive goes on without process data before it stops by itself.
+        pub watchdog: Quantity<Duration, Positive> = "20 ms",
+        /// From the deadline at which a command is sent until a motor follows it.
+        pub latency: Latency = "2 ms",
+        /// The same of the laser's gate.
+        pub gate_latency: Latency = "2 ms",
+        /// What opens the laser's gate.
+        pub gate: Option<EthercatGateTable>,
+        /// The drive of each actuator, by the actuators' names.
+        pub actuators: Named<EthercatActuatorTable>,
+    }
+}
+
+table! {
+    /// An oversampling output that opens the laser's gate.
+    pub struct EthercatGateTable {
+        /// Its position on the bus, from 0.
+        pub slave: Whole,
+        /// Its channel, from 0.
+        pub channel: Whole = 0.0,
+        /// Samples in a cycle.
+        pub oversampling: Whole = 100.0,
+    }
+}
+
+table! {
+    /// The drive of an actuator.
+    pub struct EthercatActuatorTable {
+        /// Its position on the bus, from 0.
+        pub slave: Whole,
+        /// From the deadline at which a command is sent until this motor follows it.
+        pub latency: Option<Latency>,
+    }
+}
+
+/// The drives of `table`.
+pub(super) fn build(
+    table: &EthercatTable,
+    actuators: &[Actuator],
+    diagnostics: &mut Diagnostics,
+) -> Option<Built> {
+    let link = match (&table.interface, &table.udp) {
+        (Some(interface), None) => Some(EthercatLink::Interface(interface.value.clone())),
+        (None, Some(address)) => Some(EthercatLink::Udp(address.value.clone())),
+        _ => {
+            diagnostics.contradict(
+                table.span,
+                "how the bus is reached is not clear".to_owned(),
+                "give either its `interface`, such as \"enp3s0\", or its `udp` address",
+            );
+            None
+        }
+    };
+    let mut number = |number: &Whole, most| whole(number, most, diagnostics) as u16;
+    let gate = table.gate.as_ref().map(|gate| EthercatGate {
+        slave: number(&gate.slave, LAST_SLAVE),
+        channel: number(&gate.channel, LAST_CHANNEL),
+        oversampling: number(&gate.oversampling, MOST_SAMPLES),
+    });
+    let tables = each(&table.actuators, "ethercat", actuators, diagnostics)?;
+    let slave = |own: &EthercatActuatorTable| whole(&own.slave, LAST_SLAVE, diagnostics) as u16;
+    let slaves = tables.into_iter().map(slave).collect();
+    let own = |own: &EthercatActuatorTable| own.latency;
+    Some(Built {
+        gate_latency: Nanoseconds::from_seconds(table.gate_latency.value),
+        latency: latencies(&table.latency, Some(&table.actuators), own, actuators),
+        kind: DrivesKind::Ethercat(Ethercat {
+            link: link?,
+            watchdog: Nanoseconds::from_seconds(table.watchdog.value),
+            actuators: slaves,
+            gate,
+        }),
+    })
+}

@@ -1,0 +1,43 @@
+//! The simulated plant as drives.
+
+use super::{Built, Latency, latencies, refuse_unknown};
+use crate::actuator::Actuator;
+use crate::document::{Diagnostics, Named};
+use crate::drives::DrivesKind;
+use crate::table;
+use messages::Nanoseconds;
+
+table! {
+    /// The simulated plant. Its drives have every mode that the motors can follow.
+    pub struct SimulatedTable {
+        /// From the deadline at which a command is sent until a motor follows it.
+        pub latency: Latency = "0 s",
+        /// The same of the laser's gate.
+        pub gate_latency: Latency = "0 s",
+        /// What is different of single actuators, by their names.
+        pub actuators: Option<Named<SimulatedActuatorTable>>,
+    }
+}
+
+table! {
+    /// What is different of one simulated actuator.
+    pub struct SimulatedActuatorTable {
+        /// From the deadline at which a command is sent until this motor follows it.
+        pub latency: Option<Latency>,
+    }
+}
+
+/// The drives of `table`.
+pub(super) fn build(
+    table: &SimulatedTable,
+    actuators: &[Actuator],
+    diagnostics: &mut Diagnostics,
+) -> Option<Built> {
+    let SimulatedTable { latency, gate_latency, actuators: tables, span: _ } = table;
+    refuse_unknown(tables.as_ref(), actuators, diagnostics);
+    Some(Built {
+        kind: DrivesKind::Simulated,
+        gate_latency: Nanoseconds::from_seconds(gate_latency.value),
+        latency: latencies(latency, tables.as_ref(), |own| own.latency, actuators),
+    })
+}
