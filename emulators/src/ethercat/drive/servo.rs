@@ -1,0 +1,141 @@
+//! A drive's own loops: position P, velocity PI, current P with the motor's data, all at one rate.
+
+use machine::{Actuator, DcMotor};
+
+/// Bandwidth of the current loop as a share of the loops' rate: it acts one period late.
+const CURRENT_SHARE: f64 = 0.15;
+
+/// Each loop outside another is as many times slower, unless the machine file asks for a faster one.
+const RATIO: f64 = 4.0;
+
+/// Corner of the velocity PI as a share of its bandwidth.
+const INTEGRAL_CORNER: f64 = 0.25;
+
+/// Bandwidth of the estimate of the speed as a multiple of the velocity loop's.
+const ESTIMATE_RATIO: f64 = 4.0;
+
+/// What the loops follow, in units of the motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Target {
+    /// A position [rad] at a speed [rad/s], with a torque [N·m] ahead of the loops.
+    Position([f64; 3]),
+    /// A speed [rad/s], with a torque [N·m] ahead of the loops.
+    Velocity([f64; 2]),
+    /// A torque [N·m].
+    Torque(f64),
+}
+
+/// The loops of one motor.
+#[derive(Debug, Clone)]
+pub struct Servo {
+    motor: DcMotor,
+    inertia: f64,
+    /// Bandwidths of the position, the velocity and the current loop [1/s].
+    bandwidths: [f64; 3],
+    viscous: f64,
+    resolution: f64,
+    step: f64,
+    angle: f64,
+    speed: f64,
+    integral: f64,
+    limited: bool,
+}
+
+impl Servo {
+    /// The loops of `actuator`, run every `step` [s]; `None` if it has no servo motor.
+    pub fn new(actuator: &Actuator, step: f64) -> Option<Self> {
+        let gains = &actuator.gains;
+        let current = (CURRENT_SHARE / step).max(gains.current);
+        let velocity = (current / RATIO).max(gains.velocity);
+        let position = (velocity / RATIO).max(gains.position);
+        Some(Self {
+            motor: *actuator.motor.dc()?,
+            inertia: gains.inertia,
+            bandwidths: [position, velocity, current],
+            viscous: actuator.friction.viscous,
+            resolution: actuator.encoder.resolution(),
+            step,
+            angle: 0.0,
+            speed: 0.0,
+            integral: 0.0,
+            limited: false,
+        })
+    }
+
+    /// Angle of a count [rad].
+    pub fn resolution(&self) -> f64 {
+        self.resolution
+    }
+
+    /// The motor's largest torque [N·m].
+    pub fn largest_torque(&self) -> f64 {
+        self.motor.largest_torque()
+    }
+
+    /// Torque of a current [N·m].
+    pub fn torque(&self, current: f64) -> f64 {
+        self.motor.torque_constant * current
+    }
+
+    /// Estimated speed [rad/s].
+    pub fn speed(&self) -> f64 {
+        self.speed
+    }
+
+    /// Whether torque or voltage is at its limit.
+    pub fn is_limited(&self) -> bool {
+        self.limited
+    }
+
+    /// Takes the measured `angle` [rad], `step` after the one before.
+    pub fn observe(&mut self, angle: f64) {
+        // A second-order tracking loop: without a lag at an even acceleration.
+        let [_, velocity, _] = self.bandwidths;
+        let gain = (ESTIMATE_RATIO * velocity * self.step).min(0.5);
+        let predicted = self.angle + self.speed * self.step;
+        let error = angle - predicted;
+        self.angle = predicted + (1.0 - (1.0 - gain) * (1.0 - gain)) * error;
+        self.speed += gain * gain * error / self.step;
+    }
+
+    /// Forgets what the loops have summed up, the motor standing at `angle` [rad].
+    pub fn reset(&mut self, angle: f64) {
+        (self.angle, self.speed) = (angle, 0.0);
+        self.release();
+    }
+
+    /// Forgets what the velocity loop has summed up.
+    pub fn release(&mut self) {
+        (self.integral, self.limited) = (0.0, false);
+    }
+
+    /// The voltage with which the motor at `angle` [rad] with `current` [A] follows `target`, with no more torque
+    /// than `bound` [N·m], in V.
+    pub fn follow(&mut self, target: Target, bound: f64, angle: f64, current: f64) -> f64 {
+        let [stiffness, _, quickness] = self.bandwidths;
+        let torque = match target {
+            Target::Torque(torque) => torque,
+            Target::Velocity([speed, torque]) => self.velocity(speed, torque),
+            Target::Position([position, speed, torque]) => {
+                self.velocity(speed + stiffness * (position - angle), torque)
+            }
+        };
+        let limit = self.motor.current.min((bound / self.motor.torque_constant).max(0.0));
+        let wanted = torque / self.motor.torque_constant;
+        let bounded = wanted.clamp(-limit, limit);
+        let rate = quickness * (bounded - current);
+        let voltage = self.motor.voltage(bounded, rate, self.speed);
+        let supplied = voltage.clamp(-self.motor.voltage, self.motor.voltage);
+        self.limited = wanted != bounded || voltage != supplied;
+        if supplied.is_finite() { supplied } else { 0.0 }
+    }
+
+    fn velocity(&mut self, wanted: f64, torque: f64) -> f64 {
+        let [_, bandwidth, _] = self.bandwidths;
+        let error = wanted - self.speed;
+        if !self.limited {
+            self.integral += INTEGRAL_CORNER * bandwidth * error * self.step;
+        }
+        self.inertia * bandwidth * (error + self.integral) + self.viscous * wanted + torque
+    }
+}

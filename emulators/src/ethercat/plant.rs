@@ -1,0 +1,102 @@
+//! The simulated plant behind the drives: the one place that knows how the plant is moved.
+
+use drives::{Actuation, Freshness, Measurement, PlantOptions, Port, SimulatedPlant};
+use machine::{ActuatorMode, Machine, Motor};
+use messages::{CommandMode, MAX_ACTUATORS, Nanoseconds, time::CYCLE_PERIOD};
+
+use super::wires::{Bundle, Phases};
+
+/// Why a machine cannot stand behind the drives.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// The plant itself cannot be simulated.
+    #[error("{0}")]
+    Plant(drives::plant::PlantError),
+    /// These drives are servo drives.
+    #[error("the emulated drives are for servo motors, and this machine has steppers")]
+    Steppers,
+}
+
+/// The machine that the drives move.
+pub struct Plant {
+    port: Box<dyn Port + Send>,
+    measurement: Measurement,
+    period: Nanoseconds,
+    /// What a motor gives by turning, for each count in a step [V].
+    back_emf: Vec<f64>,
+    /// Counts a step ago.
+    before: [i64; MAX_ACTUATORS],
+}
+
+impl core::fmt::Debug for Plant {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter
+            .debug_struct("Plant")
+            .field("measurement", &self.measurement)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Plant {
+    /// The plant of `machine`.
+    ///
+    /// # Errors
+    /// If it cannot be simulated, or has no servo motors.
+    pub fn new(machine: &Machine, options: PlantOptions) -> Result<Self, PlantError> {
+        if machine.actuators.iter().any(|actuator| matches!(actuator.motor, Motor::Stepper(_))) {
+            return Err(PlantError::Steppers);
+        }
+        // The machine file says what the drives follow, and how late. The motors behind them follow voltages at once.
+        let mut motors = machine.clone();
+        for actuator in &mut motors.actuators {
+            (actuator.mode, actuator.latency) = (ActuatorMode::Voltage, Nanoseconds(0));
+        }
+        let port = SimulatedPlant::new(&motors, options).map_err(PlantError::Plant)?;
+        let period = CYCLE_PERIOD;
+        let back_emf = machine.actuators.iter().map(|actuator| {
+            let constant = actuator.motor.dc().map_or(0.0, |motor| motor.torque_constant);
+            constant * actuator.encoder.resolution() / period.seconds()
+        });
+        let back_emf = back_emf.collect();
+        let measurement = Measurement::default();
+        Ok(Self { port, measurement, period, back_emf, before: [0; MAX_ACTUATORS] })
+    }
+
+    /// From one step to the next.
+    pub fn period(&self) -> Nanoseconds {
+        self.period
+    }
+
+    /// Measures at the end of a step, and lets the power stages do in the next one what `wires` says.
+    pub fn step(&mut self, wires: &mut Bundle) {
+        let mut actuation = Actuation { freshness: Freshness::Fresh, ..Actuation::DISABLED };
+        let turning = self.measurement.counts.iter().zip(&self.before).zip(&self.back_emf);
+        let voltages = actuation.voltage.iter_mut().zip(turning);
+        for (motor, (voltage, ((now, before), back_emf))) in wires.motors.iter().zip(voltages) {
+            *voltage = match motor.phases {
+                Phases::Driven(driven) => {
+                    actuation.mode = CommandMode::Driven;
+                    driven
+                }
+                // The plant's power stages are on or off together: this one lets its motor run free.
+                Phases::Open => (now - before) as f64 * back_emf,
+            };
+        }
+        self.before = self.measurement.counts;
+        self.port.exchange(&actuation, &mut self.measurement);
+        let measured = self.measurement.counts.iter().zip(&self.measurement.current);
+        for (motor, (counts, current)) in wires.motors.iter_mut().zip(measured) {
+            (motor.counts, motor.current) = (*counts, *current);
+        }
+    }
+
+    /// Tool centre point in the machine frame [m], where the plant knows it.
+    pub fn tool(&self) -> Option<[f64; 3]> {
+        self.measurement.tool
+    }
+
+    /// Motor positions [rad].
+    pub fn positions(&self) -> &[f64] {
+        &self.measurement.position
+    }
+}
