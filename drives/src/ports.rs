@@ -2,6 +2,7 @@
 
 use machine::{DrivesKind, Machine};
 
+use crate::hostmot2::Hostmot2Port;
 use crate::plant::{PlantOptions, SimulatedPlant};
 use crate::port::{Port, PortError};
 
@@ -22,7 +23,7 @@ macro_rules! ports {
 
 ports! {
     Simulated => simulated;
-    Hostmot2 => absent;
+    Hostmot2 => hostmot2;
     Ethercat => absent;
 }
 
@@ -36,6 +37,14 @@ pub fn simulated(_machine: &Machine, plant: &Machine) -> Result<Box<dyn Port>, P
         what: format!("the machine cannot be simulated: {error}"),
         instead: "change the machine file, or drive the machine itself".to_owned(),
     })
+}
+
+/// The board that `machine` names.
+///
+/// # Errors
+/// A machine file that no board can serve.
+pub fn hostmot2(machine: &Machine, _plant: &Machine) -> Result<Box<dyn Port>, PortError> {
+    Ok(Box::new(Hostmot2Port::of(machine)?))
 }
 
 /// The error of a port that is not part of this build.

@@ -47,11 +47,27 @@ impl<'a> Asking<'a> {
         let mut done = 0;
         while done < count {
             let part = (count - done).min(MOST_ITEMS);
-            let reply = self.ask(|request| request.read(from.wrapping_add(4 * done), part))?;
+            let reply = self.settled(|request| request.read(from.wrapping_add(4 * done), part))?;
             words.extend(reply.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)));
             done += part;
         }
         Ok(words)
+    }
+
+    /// What `what` reads, once it reads the same twice: what stands still, and is not damaged on the way.
+    ///
+    /// # Errors
+    /// Nobody there, or nothing that stands still.
+    pub fn settled(&mut self, what: impl Fn(&mut Request)) -> Result<Vec<u8>, BoardError> {
+        let mut before = self.ask(&what)?;
+        for _ in 0..ATTEMPTS {
+            let now = self.ask(&what)?;
+            if now == before {
+                return Ok(now);
+            }
+            before = now;
+        }
+        Err(BoardError::Silent)
     }
 
     /// Has the board do `what`, until it has answered; the bytes that `what` reads.

@@ -129,13 +129,11 @@ impl Gate {
             |time: f64| (time * f64::from(self.module.clock) * 1e-9).round().max(1.0) as u32;
         for (index, shot) in shots.iter().enumerate() {
             let control = self.module.address(register::CONTROL, *shot);
-            let Some(pulse) = light.get(index) else {
-                request.write(control, 0);
-                continue;
-            };
+            // A request that comes after newer ones ends their pulse, and does not change it.
+            request.write(control, DARK);
+            let Some(pulse) = light.get(index) else { continue };
             let lasts = if pulse.to >= self.period { OVERLAP } else { 0.0 };
             let (from, to) = (ticks(pulse.from + early), ticks(pulse.to + lasts + early));
-            request.write(control, 0);
             request.write(self.module.address(register::DELAY, *shot), from);
             request
                 .write(self.module.address(register::WIDTH, *shot), to.saturating_sub(from).max(1));

@@ -11,6 +11,8 @@ const WINDOW: u32 = 64;
 const SLEW: f64 = 50e-9;
 /// A correction beyond this is a step, not a drift [s]: the first ones are.
 const STEP: f64 = 20e-6;
+/// By how much a request may be earlier than all before it [s].
+const EARLIEST: f64 = 100e-6;
 /// What of a window's error is taken for the clocks' difference of rate.
 const RATE_GAIN: f64 = 0.25;
 /// The most by which the two clocks may differ.
@@ -29,15 +31,26 @@ pub struct Grid {
     due: Option<f64>,
     /// What the corrections still have to move [s].
     pending: f64,
-    earliest: f64,
+    /// The earliest arrivals of the window: the second one counts, since a reply may have been damaged.
+    earliest: [f64; 2],
     arrivals: u32,
+    settled: bool,
 }
 
 impl Grid {
     /// A grid of cycles of `period` [s], on a clock whose turn takes `turn` [s].
     pub fn new(turn: f64, period: f64) -> Self {
         let nominal = period / turn;
-        Self { turn, nominal, rate: 0.0, due: None, pending: 0.0, earliest: f64::MAX, arrivals: 0 }
+        Self {
+            turn,
+            nominal,
+            rate: 0.0,
+            due: None,
+            pending: 0.0,
+            earliest: [f64::MAX; 2],
+            arrivals: 0,
+            settled: false,
+        }
     }
 
     /// A cycle begins.
@@ -56,7 +69,8 @@ impl Grid {
             return 0.0;
         };
         let late = between(due, phase) * self.turn;
-        self.earliest = self.earliest.min(late);
+        let [first, second] = self.earliest;
+        self.earliest = [first.min(late), first.max(late).min(second)];
         self.arrivals += 1;
         if self.arrivals == WINDOW {
             self.correct();
@@ -70,14 +84,33 @@ impl Grid {
         Some(fraction(self.due? + time / self.turn))
     }
 
+    /// Whether the first window is over, so that instants can be told.
+    pub fn is_settled(&self) -> bool {
+        self.settled
+    }
+
+    /// Whether a request can have arrived where the board's clock stood at `phase`, 0..1: not much earlier than
+    /// any before, and not after its cycle.
+    pub fn believes(&self, phase: f64) -> bool {
+        let Some(due) = self.due.filter(|_| self.settled) else { return true };
+        let late = between(due, phase) * self.turn;
+        (-EARLIEST..self.nominal * self.turn).contains(&late)
+    }
+
+    /// Forgets all arrivals.
+    pub fn restart(&mut self) {
+        *self = Self::new(self.turn, self.nominal * self.turn);
+    }
+
     /// Time of a turn [s].
     pub fn turn(&self) -> f64 {
         self.turn
     }
 
     fn correct(&mut self) {
-        let error = self.earliest;
-        (self.earliest, self.arrivals) = (f64::MAX, 0);
+        let [_, error] = self.earliest;
+        (self.earliest, self.arrivals) = ([f64::MAX; 2], 0);
+        self.settled = true;
         if error.abs() > STEP {
             if let Some(due) = &mut self.due {
                 *due = fraction(*due + error / self.turn);

@@ -171,7 +171,7 @@ impl Board {
         if !(2..=3).contains(&at(0)) {
             return Err(wrong(format!("an IDROM of the unknown type {}", at(0))));
         }
-        let (count, port_width) = (at(7), at(9));
+        let (count, port_width) = (at(8), at(9));
         if count > PINS || !(1..=32).contains(&port_width) || count % port_width != 0 {
             return Err(wrong(format!("{count} pins on connectors of {port_width}")));
         }

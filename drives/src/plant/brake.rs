@@ -31,7 +31,7 @@ const INTEGRAL_CORNER: f64 = 0.25;
 const CURRENT_SHARE: f64 = 0.1;
 
 /// What the ramp of `actuator`, which drives `axis`, takes from its motor's speed [rad/s²].
-pub(super) fn deceleration(axis: &Axis, actuator: &Actuator) -> f64 {
+pub(crate) fn deceleration(axis: &Axis, actuator: &Actuator) -> f64 {
     let ratio = actuator.ratio.abs();
     let fastest = axis.velocity_limit().plan / ratio;
     let torque = RAMP_SHARE * actuator.motor.largest_torque(fastest);

@@ -1,0 +1,363 @@
+//! The HostMot2 port against the emulated board, in virtual time: motion, the gate's edges, and what happens
+//! when frames are lost, late, doubled or damaged, when the cable is cut and when a side dies.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use drives::hostmot2::link::Link;
+use drives::hostmot2::session::{Counters, Trouble};
+use drives::hostmot2::{Config, Connection, Hostmot2Port};
+use drives::{Actuation, Freshness, Measurement, Port};
+use emulators::hostmot2::record::Record;
+use emulators::hostmot2::rig::Rig;
+use emulators::hostmot2::spaces::Identity;
+use emulators::hostmot2::wiring::Wiring;
+use emulators::hostmot2::{Board, Emulator, Faults};
+use machine::Machine;
+use messages::{CommandMode, GateEdge, LaserCycle, Nanoseconds};
+
+const PERIOD: i64 = 1_000_000;
+const LATENCY: i64 = 400_000;
+const FLIGHT: i64 = 30_000;
+
+struct World {
+    emulator: Emulator,
+    now: Nanoseconds,
+}
+
+/// The cable between port and board, whose time is that of the test.
+#[derive(Clone)]
+struct Cable(Arc<Mutex<World>>);
+
+impl Cable {
+    fn with<T>(&self, look: impl FnOnce(&mut World) -> T) -> T {
+        look(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn until(&self, at: Nanoseconds) {
+        self.with(|world| {
+            world.now = world.now.max(at);
+            world.emulator.advance(world.now);
+        });
+    }
+
+    fn lit(&self) -> Vec<[i64; 2]> {
+        self.with(|world| {
+            let record = world.emulator.board().record();
+            record.lit(world.now).into_iter().map(|span| span.map(|at| at.0)).collect()
+        })
+    }
+
+    fn delivered(&self) -> f64 {
+        self.with(|world| world.emulator.board().modules().stepgens.delivered(0))
+    }
+
+    fn bites(&self) -> Vec<Nanoseconds> {
+        self.with(|world| world.emulator.board().record().bites.clone())
+    }
+}
+
+impl Link for Cable {
+    fn send(&mut self, datagram: &[u8]) {
+        self.with(|world| world.emulator.send(world.now, datagram));
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], until: Nanoseconds) -> Option<usize> {
+        self.with(|world| {
+            loop {
+                if let Some(frame) = world.emulator.receive(world.now) {
+                    let length = frame.len().min(buffer.len());
+                    buffer[..length].copy_from_slice(&frame[..length]);
+                    return Some(length);
+                }
+                let next = world.emulator.next().filter(|next| *next <= until);
+                world.now = world.now.max(next.unwrap_or(until));
+                next?;
+            }
+        })
+    }
+
+    fn now(&self) -> Nanoseconds {
+        self.with(|world| world.now)
+    }
+}
+
+fn machine() -> Machine {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../machines/cartesian_steppers.toml");
+    Machine::load(path.as_ref(), &[]).expect("the machine")
+}
+
+fn config(machine: &Machine) -> Config {
+    let stepgen =
+        |index| (Connection::Stepgen { stepgen: index, encoder: Some(index) }, Nanoseconds(0));
+    Config {
+        address: "emulated".to_owned(),
+        watchdog: Nanoseconds(5_000_000),
+        gate: vec![0, 1, 2, 3],
+        gate_latency: Nanoseconds(LATENCY),
+        power: Some(0),
+        actuators: (0..machine.actuators.len() as u32).map(stepgen).collect(),
+        inputs: Vec::new(),
+    }
+}
+
+/// A port at deadlines on a board with faults from one second on, so that it can be opened.
+struct Bench {
+    machine: Machine,
+    cable: Cable,
+    port: Hostmot2Port,
+    deadline: Nanoseconds,
+    measurement: Measurement,
+    home: f64,
+}
+
+impl Bench {
+    fn new(faults: &Faults) -> Self {
+        let machine = machine();
+        let wiring = Wiring::usual(&machine);
+        let rig = Rig::new(&machine, &wiring).expect("a rig");
+        let board = Board::new(Identity::default()).with_machine(rig, &wiring, Record::with_way());
+        let emulator = Emulator::new(board, faults, Nanoseconds(FLIGHT));
+        let cable = Cable(Arc::new(Mutex::new(World { emulator, now: Nanoseconds(0) })));
+        let port = Hostmot2Port::new(&machine, config(&machine)).expect("a port");
+        let mut port = port.with_link(Box::new(cable.clone()));
+        port.open().expect("an open port");
+        let start = cable.now().0 / PERIOD + 2;
+        let home = machine.home_joints[0] / machine.actuators[0].ratio;
+        let deadline = Nanoseconds(start * PERIOD);
+        Self { machine, cable, port, deadline, measurement: Measurement::default(), home }
+    }
+
+    /// One cycle; the deadline that it began at.
+    fn cycle(&mut self, actuation: &Actuation) -> i64 {
+        let at = self.deadline;
+        self.cable.until(at);
+        self.port.send(actuation);
+        self.port.receive(&mut self.measurement);
+        self.deadline = Nanoseconds(at.0 + PERIOD);
+        at.0
+    }
+
+    /// What the motors shall do: all stand but the first, which turns from home by `angle` [rad] at `speed`.
+    fn driven(&self, angle: f64, speed: f64, laser: LaserCycle) -> Actuation {
+        let mut actuation = Actuation {
+            freshness: Freshness::Fresh,
+            mode: CommandMode::Driven,
+            laser,
+            ..Actuation::DISABLED
+        };
+        for (row, actuator) in self.machine.actuators.iter().enumerate() {
+            let home = self.machine.home_joints[actuator.axis] / actuator.ratio;
+            actuation.position[row] = home + if row == 0 { angle } else { 0.0 };
+        }
+        actuation.velocity[0] = speed;
+        actuation
+    }
+
+    /// The angle from home [rad] and speed [rad/s] at the end of the cycle `index`: a slow swing.
+    fn swing(&self, index: u32) -> [f64; 2] {
+        let (turn, rate) = (2.0, core::f64::consts::TAU * 2.0);
+        let at = rate * 1e-3 * f64::from(index + 1);
+        [turn * (1.0 - messages::math::cos(at)), turn * rate * messages::math::sin(at)]
+    }
+
+    /// `cycles` at home in the dark: the port learns when its requests arrive.
+    fn idle(&mut self, cycles: u32) {
+        for _ in 0..cycles {
+            self.cycle(&self.driven(0.0, 0.0, LaserCycle::OFF));
+        }
+    }
+
+    /// `cycles` of the swing, with the light that `laser` has in each; what was asked to be lit.
+    fn run(&mut self, cycles: u32, laser: impl Fn(u32) -> LaserCycle) -> Vec<[i64; 2]> {
+        let mut asked = Vec::new();
+        for index in 0..cycles {
+            let [angle, speed] = self.swing(index);
+            let laser = laser(index);
+            let at = self.cycle(&self.driven(angle, speed, laser));
+            let (mut since, mut gate) = (0, laser.gate);
+            let end = GateEdge { offset: PERIOD as u32, gate: 0, power: 0.0 };
+            for edge in laser.edges().iter().chain([&end]) {
+                let offset = i64::from(edge.offset);
+                if gate != 0 && offset > since {
+                    asked.push([since, offset].map(|time| at + FLIGHT + LATENCY + time));
+                }
+                (since, gate) = (offset, edge.gate);
+            }
+        }
+        merged(asked)
+    }
+}
+
+/// Spans that meet are one.
+fn merged(spans: Vec<[i64; 2]>) -> Vec<[i64; 2]> {
+    let mut merged: Vec<[i64; 2]> = Vec::new();
+    for span in spans {
+        match merged.last_mut() {
+            Some(last) if last[1] == span[0] => last[1] = span[1],
+            _ => merged.push(span),
+        }
+    }
+    merged
+}
+
+/// Two pulses in two of three cycles, the second of them into the third cycle.
+fn strokes(index: u32) -> LaserCycle {
+    let mut laser = LaserCycle::OFF;
+    let edges: &[(u32, u32)] = match index % 3 {
+        0 => &[(1230, 1), (345_670, 0)],
+        1 => &[(20, 2), (100_000, 0), (777_770, 3)],
+        _ => {
+            laser.gate = 3;
+            laser.power = 0.5;
+            &[(654_320, 0)]
+        }
+    };
+    for &(offset, gate) in edges {
+        assert!(laser.push(GateEdge { offset, gate, power: if gate == 0 { 0.0 } else { 0.5 } }));
+    }
+    laser
+}
+
+#[test]
+fn the_steps_are_where_they_are_asked_to_be() {
+    let mut bench = Bench::new(&Faults::default());
+    let per_radian = bench.machine.actuators[0].encoder.counts / core::f64::consts::TAU;
+    let (mut worst, mut measured) = (0.0_f64, 0.0_f64);
+    for index in 0..600 {
+        let [angle, speed] = bench.swing(index);
+        let before = if index == 0 { 0.0 } else { bench.swing(index - 1)[0] };
+        bench.cycle(&bench.driven(angle, speed, LaserCycle::OFF));
+        // The request arrived a flight after the deadline, where the path was.
+        let position = bench.measurement.position[0] - bench.home;
+        measured = measured.max((position - before).abs());
+        bench.cable.until(Nanoseconds(bench.deadline.0 + FLIGHT - 1));
+        worst = worst.max((bench.cable.delivered() / per_radian - angle).abs());
+    }
+    let step = 1.0 / per_radian;
+    assert!(worst < 0.5 * step, "{} steps off at an arrival", worst / step);
+    // By encoder: the rotor is on its spring behind the steps.
+    assert!(measured < 0.05, "{measured} rad measured");
+    assert_eq!(bench.port.counters(), Counters { sent: 600, ..Counters::default() });
+}
+
+#[test]
+fn edges_fall_within_the_resolution_and_light_goes_on_through_cycles() {
+    let mut bench = Bench::new(&Faults::default());
+    bench.idle(70);
+    let asked = bench.run(300, strokes);
+    bench.idle(70);
+    let lit = bench.cable.lit();
+    assert_eq!(lit.len(), asked.len());
+    let most = bench.port.profile().gate_resolution.0 / 2;
+    for (lit, asked) in lit.iter().zip(&asked) {
+        for (lit, asked) in lit.iter().zip(asked) {
+            assert!((lit - asked).abs() <= most, "{lit} ns instead of {asked}");
+        }
+    }
+}
+
+#[test]
+fn what_is_measured_of_the_light_is_what_was_lit() {
+    let mut bench = Bench::new(&Faults::default());
+    bench.idle(70);
+    let mut laser = LaserCycle::OFF;
+    assert!(laser.push(GateEdge { offset: 100_000, gate: 7, power: 0.5 }));
+    assert!(laser.push(GateEdge { offset: 900_000, gate: 0, power: 0.0 }));
+    bench.cycle(&bench.driven(0.0, 0.0, laser));
+    bench.cycle(&bench.driven(0.0, 0.0, LaserCycle::OFF));
+    let edges = bench.measurement.laser.edges().to_vec();
+    assert_eq!(edges, [GateEdge { offset: 500_000, gate: 7, power: 0.5 }]);
+    bench.cycle(&bench.driven(0.0, 0.0, LaserCycle::OFF));
+    assert_eq!(bench.measurement.laser.gate, 7);
+    let edges = bench.measurement.laser.edges().to_vec();
+    assert_eq!(edges, [GateEdge { offset: 300_000, gate: 0, power: 0.0 }]);
+}
+
+#[test]
+fn lost_late_doubled_and_damaged_frames_give_no_wrong_light() {
+    for seed in 1..=5 {
+        let faults = Faults {
+            loss: 0.01,
+            late: 0.01,
+            duplicate: 0.01,
+            corrupt: 0.01,
+            seed,
+            ..Faults::default()
+        };
+        let mut bench = Bench::new(&faults);
+        bench.idle(70);
+        let asked = bench.run(3000, strokes);
+        let [angle, _] = bench.swing(2999);
+        for _ in 0..50 {
+            bench.cycle(&bench.driven(angle, 0.0, LaserCycle::OFF));
+        }
+        for [from, to] in bench.cable.lit() {
+            let inside = asked.iter().any(|asked| from + 600 >= asked[0] && to <= asked[1] + 600);
+            assert!(inside, "seed {seed}: light from {from} to {to} ns was not asked for");
+        }
+        let lit: i64 = bench.cable.lit().iter().map(|[from, to]| to - from).sum();
+        let wanted: i64 = asked.iter().map(|[from, to]| to - from).sum();
+        assert!(lit * 10 > wanted * 9, "seed {seed}: {lit} of {wanted} ns were lit");
+        let Counters { sent, lost, late, duplicated, .. } = bench.port.counters();
+        assert_eq!(sent, 3120);
+        assert!(lost > 60 && late > 20 && duplicated > 10, "seed {seed}");
+        assert!(!bench.measurement.fault.is_some(), "seed {seed}: {:?}", bench.measurement.fault);
+        let position = bench.measurement.position[0] - bench.home;
+        assert!((position - angle).abs() < 0.02, "seed {seed}: {position} instead of {angle} rad");
+        assert!(bench.cable.bites().is_empty());
+    }
+}
+
+#[test]
+fn a_bridge_that_dies_leaves_it_dark_and_the_watchdog_lets_the_axes_go() {
+    let mut bench = Bench::new(&Faults::default());
+    bench.idle(70);
+    bench.run(50, |_| LaserCycle { gate: 1, power: 1.0, ..LaserCycle::OFF });
+    let last = bench.deadline.0;
+    bench.cable.until(Nanoseconds(last + 100 * PERIOD));
+    let end = bench.cable.lit().last().map_or(0, |span| span[1]);
+    assert!((end - (last + FLIGHT + LATENCY)).abs() <= 1000, "{end} ns, {last} ns");
+    let bites = bench.cable.bites();
+    assert_eq!(bites.len(), 1);
+    assert!((bites[0].0 - (last - PERIOD + FLIGHT + 5_000_000)).abs() < 1000, "{bites:?}");
+    let stopped = bench.cable.delivered();
+    bench.cable.until(Nanoseconds(last + 200 * PERIOD));
+    assert_eq!(bench.cable.delivered(), stopped);
+}
+
+#[test]
+fn a_cut_cable_and_a_silent_board_are_a_fault_and_dark() {
+    let at = Nanoseconds(2_000_000_000);
+    let cut = Faults { cut: Some([at, Nanoseconds(at.0 + 50 * PERIOD)]), ..Faults::default() };
+    let silent = Faults { silent_from: Some(at), ..Faults::default() };
+    for (faults, returns) in [(cut, true), (silent, false)] {
+        let mut bench = Bench::new(&faults);
+        let cycles = (at.0 - bench.deadline.0) / PERIOD + 20;
+        bench.run(cycles as u32, strokes);
+        assert_eq!(bench.port.trouble(), Some(Trouble::Silent));
+        assert!(bench.measurement.fault.is_some());
+        let end = bench.cable.lit().last().map_or(0, |span| span[1]);
+        assert!(end <= at.0 + PERIOD + LATENCY + FLIGHT, "{end}: light after the cut");
+        assert_eq!(bench.cable.bites().len(), 1);
+        bench.run(100, |_| LaserCycle::OFF);
+        // The same fault until a person resets it, and then the board's own where it answers again.
+        assert!(bench.measurement.fault.is_some());
+        for _ in 0..5 {
+            bench.cycle(&Actuation::DISABLED);
+        }
+        bench.run(20, |_| LaserCycle::OFF);
+        assert_eq!(bench.measurement.fault.is_some(), !returns);
+    }
+}
+
+#[test]
+fn a_module_that_the_board_lacks_is_named() {
+    let mut bench = Bench::new(&Faults::default());
+    let mut wrong = config(&bench.machine);
+    wrong.actuators[0].0 = Connection::Stepgen { stepgen: 9, encoder: None };
+    let port = Hostmot2Port::new(&bench.machine, wrong).expect("a port");
+    let error = port.with_link(Box::new(bench.cable.clone())).open();
+    let text = error.map_or_else(|error| error.to_string(), |()| String::new());
+    assert!(text.contains("stepgen 0 to 5") && text.contains("stepgen 9"), "{text}");
+    bench.port.close().expect("closed");
+}
