@@ -130,10 +130,8 @@ impl Cascade {
         measured: &Measurement,
         integrating: bool,
     ) -> Drive {
-        let position_error = reference.position - measured.position;
-        let speed = (reference.velocity + self.position * position_error)
-            .clamp(-self.speed_limit, self.speed_limit);
-        let velocity_error = speed - measured.velocity;
+        let velocity_error =
+            self.speed(reference.velocity, reference, measured) - measured.velocity;
         let (current, current_excess) = self.velocity.output(velocity_error, reference.current);
         let current_error = current - measured.current;
         let (voltage, voltage_excess) = self.current.output(current_error, reference.voltage);
@@ -145,6 +143,30 @@ impl Cascade {
         }
         self.current.integrate(current_error, reference.voltage, CYCLE_TIME);
         Drive { current, voltage }
+    }
+
+    /// One cycle of the outer two loops, for a drive that closes the current loop: the current that it shall
+    /// drive [A]; `reference.current` is that of the plan in the cycle in which it acts.
+    pub fn outer(
+        &mut self,
+        reference: &Reference,
+        measured: &Measurement,
+        integrating: bool,
+    ) -> f64 {
+        let velocity_error =
+            self.speed(reference.velocity, reference, measured) - measured.velocity;
+        let (current, excess) = self.velocity.output(velocity_error, reference.current);
+        if integrating && excess * velocity_error <= 0.0 {
+            self.velocity.integrate(velocity_error, reference.current, CYCLE_TIME);
+        }
+        current
+    }
+
+    /// The speed that brings a motor from where it was measured to its reference, beside that of the plan
+    /// [rad/s].
+    pub fn speed(&self, planned: f64, reference: &Reference, measured: &Measurement) -> f64 {
+        let wanted = planned + self.position * (reference.position - measured.position);
+        wanted.clamp(-self.speed_limit, self.speed_limit)
     }
 
     /// Empties the integrals: with references taken from the measurement the first voltage is the

@@ -84,7 +84,7 @@ pub struct Controller {
     alignment: Alignment,
     catch_up: CatchUp,
     feedforward: Feedforward,
-    /// None for steppers.
+    /// None for steppers. A drive closes those loops that its mode leaves to it.
     cascades: [Option<Cascade>; MAX_ACTUATORS],
     /// Whether drives follow positions, which know no step.
     follows_positions: bool,

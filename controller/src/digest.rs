@@ -3,7 +3,7 @@
 //! It covers mode, targets, gate, power and outputs of every command given while a stream is
 //! played. It leaves out stamps, cycle and stream numbers, and idle cycles, which differ between
 //! runs of one job without any difference on the workpiece; and the voltage, which answers what
-//! was measured and not only what was planned.
+//! was measured and not only what was planned. So do the torque and the velocity of a drive that follows them.
 
 use messages::Command;
 

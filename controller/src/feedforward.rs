@@ -15,7 +15,7 @@ use crate::catch_up::CatchUp;
 use crate::lookahead::Lookahead;
 use crate::player::Instant;
 use crate::winding::Winding;
-use machine::{Actuator, Machine, Motor};
+use machine::{Actuator, ActuatorMode, Machine};
 use messages::time::CYCLE_TIME;
 use messages::{ActuatorArray, MAX_ACTUATORS};
 
@@ -41,8 +41,8 @@ pub struct Planned {
 pub struct Target {
     /// Motor angle at its end [rad].
     pub position: f64,
-    /// Mean motor speed; a stepper's at the end of the cycle, so that the pulses inside it can be
-    /// placed along a curve [rad/s].
+    /// Mean motor speed; that at the end of the cycle for a drive that follows the position, so that it can
+    /// follow a curve inside the cycle [rad/s].
     pub velocity: f64,
     /// Mean motor torque, friction included [N·m].
     pub effort: f64,
@@ -244,9 +244,9 @@ impl Feedforward {
         let torque = (self.next.torque[index] + self.after.torque[index]) / 2.0;
         Target {
             position: self.after.angle[index],
-            velocity: match actuator.motor {
-                Motor::Dc(_) => (self.after.angle[index] - self.next.angle[index]) / CYCLE_TIME,
-                Motor::Stepper(_) => self.after.speed[index],
+            velocity: match actuator.mode {
+                ActuatorMode::Position => self.after.speed[index],
+                _ => (self.after.angle[index] - self.next.angle[index]) / CYCLE_TIME,
             },
             effort: torque + actuator.friction.coulomb * mean,
         }

@@ -1,8 +1,8 @@
 //! The simulated plant: motors, transmission, load, encoders and laser source of a machine file.
 //!
 //! Modes: `Disabled` (phases open, motors coast) and `QuickStop` (the drive's own [`brake`], or a
-//! ramp of the pulses); driven, DC motors follow their voltage (held over the cycle), steppers their
-//! position (by pulses, see [`stepping`]).
+//! ramp of the pulses); driven, DC motors follow their voltage (held over the cycle), or by loops of the drive's own
+//! (`servo`) their torque, velocity or position; steppers their position (by pulses, see [`stepping`]).
 //!
 //! What is and is not modelled:
 //!
@@ -32,6 +32,7 @@ pub mod coupling;
 pub mod dynamics;
 pub mod friction;
 pub mod motors;
+mod servo;
 pub mod source;
 pub mod state;
 pub mod stepping;
@@ -60,6 +61,7 @@ use brake::Brake;
 use coupling::Unsolvable;
 use dynamics::Dynamics;
 use motors::Motors;
+use servo::{MotorState, Servo};
 use source::Source;
 use state::{Phases, State};
 use stepping::Stepping;
@@ -189,6 +191,8 @@ pub struct Plant<const N: usize, M: Mechanism<N>, const A: usize = N> {
     brake: Brake<A>,
     /// How many motors there are.
     motors: usize,
+    /// The drives of DC motors.
+    servos: [Option<Servo>; A],
     /// The drivers of steppers.
     stepping: Option<Stepping<A>>,
     source: Source,
@@ -274,6 +278,7 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
         };
         Ok(Self {
             brake: Brake::of(axes, actuators),
+            servos: core::array::from_fn(|row| actuators.get(row).and_then(Servo::of)),
             motors: actuators.len(),
             source: Source::new(laser),
             weights: motors.windings.weights(CYCLE_TIME / f64::from(substeps)),
@@ -335,9 +340,16 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             let phases = match actuation.mode {
                 CommandMode::Disabled => Phases::Open,
                 _ if self.stepping.is_some() => Phases::Open,
-                CommandMode::Driven => Phases::Driven(SVector::from_fn(|row, _| {
-                    saturate(actuation.voltage[row], motors.voltage[row])
-                })),
+                CommandMode::Driven => {
+                    let at = [f64::from(index) / f64::from(self.substeps), step];
+                    let state = &self.state;
+                    let servos = &mut self.servos;
+                    Phases::Driven(SVector::from_fn(|row, _| {
+                        let Some(Some(servo)) = servos.get_mut(row) else { return 0.0 };
+                        let voltage = servo.voltage(actuation, row, at, motor_state(state, row));
+                        saturate(voltage, motors.voltage[row])
+                    }))
+                }
                 CommandMode::QuickStop => {
                     let voltage = self.brake.voltage(&self.state, &motors, step);
                     Phases::Driven(SVector::from_fn(|row, _| {
@@ -433,10 +445,9 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
     fn refusal(&self, actuation: &Actuation) -> Option<Fault> {
         let targets: &[&ActuatorArray] = match actuation.mode {
             CommandMode::Disabled | CommandMode::QuickStop => &[],
-            CommandMode::Driven if self.stepping.is_some() => {
-                &[&actuation.position, &actuation.velocity]
+            CommandMode::Driven => {
+                &[&actuation.voltage, &actuation.effort, &actuation.velocity, &actuation.position]
             }
-            CommandMode::Driven => &[&actuation.voltage],
         };
         for values in targets {
             let mut values = values.iter().take(self.motors).enumerate();
@@ -547,15 +558,25 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
         if braking(Some(accepted.mode)) && !braking(self.in_force.map(|before| before.mode)) {
             self.brake.engage(&self.state);
         }
+        for (row, servo) in self.servos.iter_mut().enumerate() {
+            if let Some(servo) = servo {
+                servo.engage(&accepted, row, motor_state(&self.state, row));
+            }
+        }
         self.in_force = Some(accepted);
         accepted.mode
     }
 }
 
+/// The motor `row` of `state`.
+fn motor_state<const N: usize, const A: usize>(state: &State<N, A>, row: usize) -> MotorState {
+    MotorState { angle: state.angle[row], speed: state.speed[row], current: state.current[row] }
+}
+
 /// What drives of `actuators` can do.
 fn profile(actuators: &[Actuator]) -> Profile {
     let modes = |actuator: &Actuator| match actuator.motor {
-        Motor::Dc(_) => vec![ActuatorMode::Voltage],
+        Motor::Dc(_) => ActuatorMode::ALL.to_vec(),
         Motor::Stepper(_) => vec![ActuatorMode::Position],
     };
     let each =

@@ -1,10 +1,11 @@
 //! What the controller says: the command that answers a feedback, and the progress.
 
 use super::Controller;
-use crate::cascade::Measurement;
+use crate::cascade::{Drive, Measurement, Reference};
 use crate::exchange::Inputs;
 use crate::state::State;
 use crate::supervision::Finding;
+use machine::ActuatorMode;
 use messages::{
     Command, Fault, FaultCode, FaultQuantity, Feedback, LaserCycle, MAX_AXES, MAX_EDGES,
     Nanoseconds, Progress,
@@ -101,7 +102,21 @@ impl Controller {
             let band = if slips { 2.0 * count } else { count };
             let creeps = fastest <= count * actuator.gains.position;
             let held_by_friction = creeps && error.abs() <= band;
-            let drive = cascade.step(&reference, &measured, !held_by_friction);
+            let constant = actuator.motor.dc().map_or(1.0, |motor| motor.torque_constant);
+            let planned = Reference { current: target.effort / constant, ..reference };
+            let drive = match actuator.mode {
+                ActuatorMode::Voltage => cascade.step(&reference, &measured, !held_by_friction),
+                ActuatorMode::Torque => {
+                    let current = cascade.outer(&planned, &measured, !held_by_friction);
+                    command.effort[index] = current * constant;
+                    Drive { current, voltage: 0.0 }
+                }
+                ActuatorMode::Velocity => {
+                    command.velocity[index] = cascade.speed(target.velocity, &reference, &measured);
+                    Drive { current: planned.current, voltage: 0.0 }
+                }
+                ActuatorMode::Position => Drive { current: planned.current, voltage: 0.0 },
+            };
             command.voltage[index] = drive.voltage;
             if self.playing != 0 {
                 self.statistics.drive(index, &drive);
