@@ -8,6 +8,7 @@
 # [drives.hostmot2] at this board; without one only hm2_eth is measured. Needs what hostmot2.sh needs.
 set -u
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+PATIENT=1
 . "$here/hostmot2_bench.sh"
 
 seconds=${1:-20} period=${2:-1000000} own=${3:-}
@@ -32,7 +33,6 @@ addf sampler.0 servo
 net read-time $name.read.time sampler.0.pin.0
 net write-time $name.write.time sampler.0.pin.1"
 BENCH_SAMPLES=$((seconds * (1000000000 / period)))
-export WATCHDOG_NS=${WATCHDOG_NS:-20000000}
 bench_hal "$seconds" "$period" >"$scratch/hal.err" 2>&1
 bench_close
 echo "hm2_eth at $period ns, $seconds s:"

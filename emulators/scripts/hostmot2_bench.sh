@@ -2,6 +2,9 @@
 # on the near one.
 
 near=hm2near far=hm2far space=hm2board board=10.99.0.2 host=10.99.0.1
+# LinuxCNC's own values; both are passed by a computer that stands still for more than 5 ms.
+watchdog=5000000 limit=10
+[ -z "${PATIENT:-}" ] || watchdog=50000000 limit=200
 scratch=$(mktemp -d) emulator_pid= softirqs=
 
 bench_need() {
@@ -112,7 +115,8 @@ setp $name.stepgen.00.enable 1
 setp $name.xy2mod.00.enable 1
 setp $name.xy2mod.00.posx-cmd 0.25
 setp $name.packet-read-timeout 80
-setp $name.watchdog.timeout_ns ${WATCHDOG_NS:-5000000}
+setp $name.watchdog.timeout_ns $watchdog
+setp $name.packet-error-limit $limit
 ${BENCH_EXTRA:-}
 start
 ${BENCH_SAMPLES:+loadusr halsampler -n $BENCH_SAMPLES $scratch/samples}

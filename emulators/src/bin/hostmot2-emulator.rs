@@ -88,7 +88,7 @@ fn run(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
     let mut board = Board::new(identity);
     if let Some(path) = &options.machine {
         let machine = Machine::load(path, &[])?;
-        let mut wiring = Wiring::usual(&machine);
+        let mut wiring = Wiring::of(&machine);
         if let Some(degrees) = options.scan_head {
             wiring = wiring.with_scan_head(degrees.to_radians());
         }
@@ -117,8 +117,7 @@ fn run(options: &Options) -> Result<(), Box<dyn std::error::Error>> {
     service.run(|| {
         runtime::signal::termination().is_some() || end.is_some_and(|end| Instant::now() >= end)
     })?;
-    let own_stall = service.longest_stall().seconds();
-    let report = Report { own_stall, ..Report::of(service.emulator()) };
+    let report = Report::of(service.emulator());
     Ok(report.write(&options.report)?)
 }
 

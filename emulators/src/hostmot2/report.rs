@@ -22,9 +22,6 @@ pub struct Report {
     pub bites: Vec<f64>,
     /// The longest that the watchdog waited to be fed without biting [s].
     pub longest_wait: f64,
-    /// The longest that the emulator itself came too late to serve [s]; 0 in virtual time. Where this is long,
-    /// the computer stood still, and not the master.
-    pub own_stall: f64,
     /// When it was lit, from and to [s].
     pub lit: Vec<[f64; 2]>,
     /// Steps that left the board, by step generator.
@@ -72,7 +69,6 @@ impl Report {
             to_master,
             bites: record.bites.iter().map(|at| at.seconds()).collect(),
             longest_wait: board.modules().watchdog.longest().seconds(),
-            own_stall: 0.0,
             lit: record.lit(board.now()).iter().map(|span| span.map(|at| at.seconds())).collect(),
             steps: core::array::from_fn(|index| stepgens.delivered(index)),
             too_fast: stepgens.too_fast(),

@@ -19,9 +19,6 @@ pub struct Service {
     start: Instant,
     master: Option<SocketAddr>,
     buffer: [u8; 2048],
-    /// When its last turn ended, and the longest that a turn came after it and its nap.
-    ended: Nanoseconds,
-    stall: Nanoseconds,
 }
 
 impl Service {
@@ -31,15 +28,7 @@ impl Service {
     /// If the socket takes no time-out.
     pub fn new(emulator: Emulator, socket: UdpSocket) -> io::Result<Self> {
         socket.set_read_timeout(Some(NAP))?;
-        Ok(Self {
-            emulator,
-            socket,
-            start: Instant::now(),
-            master: None,
-            buffer: [0; 2048],
-            ended: Nanoseconds(0),
-            stall: Nanoseconds(0),
-        })
+        Ok(Self { emulator, socket, start: Instant::now(), master: None, buffer: [0; 2048] })
     }
 
     /// Serves until `stop` says so, which is asked at least every 2 ms or so.
@@ -56,11 +45,6 @@ impl Service {
     /// The emulator.
     pub fn emulator(&self) -> &Emulator {
         &self.emulator
-    }
-
-    /// The longest that it came too late to serve, by the computer's doing.
-    pub fn longest_stall(&self) -> Nanoseconds {
-        self.stall
     }
 
     /// What has passed since it was powered.
@@ -83,8 +67,6 @@ impl Service {
             self.socket.set_read_timeout(Some(NAP))?;
         }
         let now = self.now();
-        let nap = Nanoseconds(i64::try_from(nap.as_nanos()).unwrap_or(0));
-        self.stall = self.stall.max(now - self.ended - nap);
         match received {
             Ok((length, from)) => {
                 self.master = Some(from);
@@ -101,7 +83,6 @@ impl Service {
                 }
             }
         }
-        self.ended = self.now();
         Ok(())
     }
 }

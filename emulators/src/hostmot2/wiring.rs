@@ -1,6 +1,7 @@
 //! What of the machine is connected to which module of the board.
 
-use machine::Machine;
+use machine::drives::{DrivesKind, Hostmot2Actuator};
+use machine::{Actuator, Axis, Machine};
 
 use super::layout::{ENCODERS, Function, PWMGENS, STEPGENS, pin_of};
 
@@ -51,6 +52,20 @@ pub struct Wiring {
 }
 
 impl Wiring {
+    /// What `[drives.hostmot2]` of the machine file says, else the usual. The gate's line is that of all
+    /// one-shots, whichever of them the file names.
+    pub fn of(machine: &Machine) -> Self {
+        let DrivesKind::Hostmot2(hostmot2) = &machine.drives.kind else {
+            return Self::usual(machine);
+        };
+        let actuators = hostmot2.actuators.iter().zip(machine.drives());
+        Self {
+            actuators: actuators.map(|(own, driven)| connection(own, driven)).collect(),
+            gate: gate_pins(),
+            power: hostmot2.power.map(|power| power as usize),
+        }
+    }
+
     /// What an actuator without a word in the machine file is connected to: the nth stepper to the nth step
     /// generator, the nth motor to the PWM generator after it, both to the nth encoder; the gate to the
     /// second timers of all one-shots, the power to the first PWM generator.
@@ -97,6 +112,24 @@ impl Wiring {
             }
         })
     }
+}
+
+/// What `own` says of an actuator and its axis.
+fn connection(own: &Hostmot2Actuator, (actuator, axis): (&Actuator, &Axis)) -> Connection {
+    let index = |number: u32| number as usize;
+    let (drive, encoder) = match *own {
+        Hostmot2Actuator::Stepgen { stepgen, encoder } => {
+            (Drive::Stepgen { stepgen: index(stepgen) }, encoder)
+        }
+        Hostmot2Actuator::Pwm { pwm, encoder } => (Drive::Pwm { pwm: index(pwm) }, Some(encoder)),
+        Hostmot2Actuator::Xy2mod { xy2mod, axis: side, .. } => {
+            // The whole range of the axis is that of the head.
+            let [lower, upper] = axis.limits.position;
+            let full_scale = lower.abs().max(upper.abs()) / actuator.ratio.abs();
+            (Drive::Mirror { xy2mod: index(xy2mod), axis: index(side), full_scale }, None)
+        }
+    };
+    Connection { drive, encoder: encoder.map(index), counts: actuator.encoder.counts }
 }
 
 /// The pins of the second timers of all one-shots.
