@@ -48,7 +48,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Calibrate(arguments) => calibrate::run(arguments),
         Command::Figures(arguments) => figures::run(arguments),
         Command::Machine(MachineCommand::New(arguments)) => machine::new(arguments),
-        Command::Bench(BenchCommand::Latency(arguments)) => bench::latency(arguments),
+        Command::Bench(BenchCommand::Latency(arguments)) => bench::latency::run(arguments),
         Command::Bench(BenchCommand::Plan(arguments)) => bench::planning::run(arguments),
         Command::Bench(BenchCommand::Simulate(arguments)) => bench::simulate(arguments),
         Command::Submit(arguments) => operator::submit(arguments),

@@ -17,7 +17,7 @@ use crate::exit::Failure;
 use configuration::Configuration;
 use control::JobControl;
 use machine::Machine;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use messages::{
     ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorReply, OperatorVerb,
     PlannerReport, Progress,
@@ -80,13 +80,13 @@ impl Latest {
 
     /// How long the job under way still takes at the rate asked for [s].
     pub fn time_left(&self) -> Option<f64> {
-        let played = self.progress.played as f64 * CYCLE_TIME;
+        let played = self.progress.played as f64 * SETPOINT_TIME;
         self.end().map(|end| (end - played).max(0.0) / self.rate())
     }
 
     /// How much of the job under way has been played, 0 to 1.
     pub fn share(&self) -> f64 {
-        let played = self.progress.played as f64 * CYCLE_TIME;
+        let played = self.progress.played as f64 * SETPOINT_TIME;
         self.end().filter(|end| *end > 0.0).map_or(0.0, |end| (played / end).min(1.0))
     }
 

@@ -11,6 +11,7 @@ use machine::Machine;
 use messages::ControllerReport;
 use messages::artwork::{Artwork, distance};
 use messages::random::SplitMix64;
+use messages::time::Period;
 use monitor::marks::tool_path::LitSpans;
 use monitor::marks::{MarkEvaluation, MarkEvaluator, StreamEnd};
 use monitor::recording::CycleRecord;
@@ -42,7 +43,8 @@ impl Recorded {
     }
 
     fn evaluate(&self, kept: impl Fn(usize) -> bool) -> MarkEvaluation {
-        let mut evaluator = MarkEvaluator::new(&self.artwork).with_fastest(self.speed);
+        let mut evaluator =
+            MarkEvaluator::new(&self.artwork, Period::OF_SETPOINTS).with_fastest(self.speed);
         for (index, record) in self.records.iter().enumerate() {
             if kept(index) {
                 evaluator.push(record);
@@ -58,7 +60,7 @@ impl Recorded {
         unseen
             .map(|(_, pair)| {
                 let way = distance(&pair[0].feedback.tool, &pair[1].feedback.tool);
-                way * LitSpans::of(&pair[1].feedback.laser, 1).share()
+                way * LitSpans::of(&pair[1].feedback.laser, Period::OF_SETPOINTS.time()).share()
             })
             .sum()
     }

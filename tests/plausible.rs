@@ -118,7 +118,7 @@ fn judge(file: &File, text: &str, job: &Path, known: usize) -> Verdict {
     if plan.facts.duration > LONGEST {
         return Verdict::NoJob;
     }
-    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual);
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, machine.realtime.period);
     let simulated = simulate(&machine, &machine, &plan, options, |records| {
         records.iter().for_each(|record| analysis.push(record));
     });

@@ -7,8 +7,9 @@
 
 mod support;
 
+use graver::commands::bench::SpeedReport;
+use graver::commands::bench::latency::{LatencyReport, RatesReport};
 use graver::commands::bench::planning::PlanBenchReport;
-use graver::commands::bench::{LatencyReport, SpeedReport};
 use graver::commands::check::CheckReport;
 use graver::commands::figures::FiguresReport;
 use graver::commands::kinematics::lines::Reply;
@@ -33,6 +34,7 @@ fn schemas() -> Vec<(&'static str, Schema)> {
         ("figures", schema_for!(FiguresReport)),
         ("kinematics", schema_for!(Reply)),
         ("latency", schema_for!(LatencyReport)),
+        ("latency_rates", schema_for!(RatesReport)),
         ("machine_new", schema_for!(NewReport)),
         ("plan", schema_for!(PlanReport)),
         ("reply", schema_for!(VerbReply)),

@@ -10,7 +10,7 @@ use std::sync::Mutex;
 use drives::PlantOptions;
 use machine::{Machine, Override};
 use messages::ControllerReport;
-use messages::time::CYCLE_TIME;
+use messages::time::{Period, SETPOINT_TIME};
 use monitor::marks::{Marks, StreamEnd};
 use monitor::run_analysis::{Clock, RunAnalysis};
 use planner::Job;
@@ -54,7 +54,7 @@ impl Outcome {
 fn run(machine: &Machine, plant: &Machine, job: &Path, changes: &[String], seed: u64) -> Outcome {
     let job = Job::read(job, &overrides(changes), machine).unwrap();
     let plan = planner::plan(machine, &job).unwrap();
-    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual);
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, machine.realtime.period);
     let options = PlantOptions { seed, ..PlantOptions::default() };
     let simulated = simulate(machine, plant, &plan, options, |records| {
         records.iter().for_each(|record| analysis.push(record));
@@ -64,8 +64,10 @@ fn run(machine: &Machine, plant: &Machine, job: &Path, changes: &[String], seed:
     assert_eq!((report.completed, report.fault.code), (1, 0), "{report:?}");
     // The stream rests before and after the motion, and one cycle sets it off; the time of a job
     // is that of the motion.
-    assert_eq!(report.cycles, plan.facts.samples + 1);
-    assert!(plan.facts.duration <= plan.facts.samples as f64 * CYCLE_TIME);
+    let period = machine.realtime.period;
+    let last = Period::OF_SETPOINTS.of(plan.facts.samples - 1);
+    assert_eq!(report.cycles, period.cycles_for(last) + 2);
+    assert!(plan.facts.duration <= plan.facts.samples as f64 * SETPOINT_TIME);
     Outcome {
         marks: analysis.finish(StreamEnd::Reported(&report)).marks.unwrap().marks,
         report,
@@ -188,6 +190,52 @@ fn two_runs_have_one_digest_and_the_seed_changes_no_mark_by_more_than_its_noise(
             let seeded = simulated(seed);
             assert_accurate(&format!("{name}, seed {seed}"), &seeded);
         }
+    }
+}
+
+/// The loops that suit a cycle of 1 ms, as much slower as the cycle is longer.
+fn at_period(name: &str, milliseconds: f64) -> Machine {
+    let mut changes = vec![format!("realtime.period={milliseconds} ms")];
+    if milliseconds > 1.0 {
+        for axis in load(name, &[]).axes {
+            for (key, bandwidth) in [("position", 40.0), ("velocity", 160.0), ("current", 349.0)] {
+                let bandwidth = bandwidth / milliseconds;
+                changes.push(format!("axis.{}.loops.{key}={bandwidth} rad/s", axis.name));
+            }
+        }
+    }
+    load(name, &changes)
+}
+
+#[test]
+fn at_4_and_8_khz_the_letters_are_no_worse_than_at_1_khz() {
+    for name in MACHINES {
+        for style in ["curves", "h1"] {
+            let [slow, fast, fastest] = [1.0, 0.25, 0.125]
+                .map(|period| letter(&at_period(name, period), "NASO", 20, style, &[]).marks);
+            for (rate, marks) in [("4 kHz", fast), ("8 kHz", fastest)] {
+                for (figure, found, limit) in [
+                    ("error", marks.error_max, slow.error_max),
+                    ("rms error", marks.error_rms, slow.error_rms),
+                    ("tracking", marks.tracking_max, slow.tracking_max),
+                ] {
+                    let what = format!("{name} {style} at {rate}: {figure}");
+                    assert!(found <= limit, "{what} {found:e}, {limit:e} at 1 kHz");
+                }
+                assert_eq!((marks.strokes_lost, marks.stray), (0, 0.0), "{name} at {rate}");
+            }
+        }
+    }
+}
+
+#[test]
+fn at_250_hz_the_letters_are_marked_whole() {
+    for name in MACHINES {
+        let outcome = letter(&at_period(name, 4.0), "NASO", 20, "curves", &[]);
+        let marks = &outcome.marks;
+        assert_eq!((marks.strokes_lost, marks.stray), (0, 0.0), "{name}");
+        assert!(marks.error_max <= 100e-6, "{name}: {:e}", marks.error_max);
+        assert!(outcome.largest_limit_use() <= 1.01, "{name}: {}", outcome.largest_limit_use());
     }
 }
 

@@ -24,7 +24,7 @@ fn play(
     mut ask: impl FnMut(u64, bool) -> Option<(OperatorVerb, f64)>,
 ) -> Marks {
     let mut chain = Chain::new(machine, plan);
-    let mut evaluator = MarkEvaluator::new(&plan.artwork);
+    let mut evaluator = MarkEvaluator::new(&plan.artwork, machine.realtime.period);
     let mut ended = None;
     while chain.cycle < 60_000 {
         let feedback = chain.begin();

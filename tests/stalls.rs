@@ -13,8 +13,8 @@ use controller::Peers;
 use machine::Machine;
 use messages::feedback::status;
 use messages::random::SplitMix64;
-use messages::time::CYCLE_PERIOD;
-use messages::{ControllerReport, ControllerState, FaultCode, Nanoseconds, RealtimeFacts};
+use messages::time::Period;
+use messages::{ControllerReport, ControllerState, FaultCode, RealtimeFacts};
 use monitor::marks::{MarkEvaluator, Marks, StreamEnd};
 use monitor::recording::{CycleRecord, Recorder};
 use monitor::trace::lit_share;
@@ -36,17 +36,23 @@ fn planned(machine: &Machine) -> Plan {
     plan(machine, &Job::builtin(&[], machine).unwrap()).unwrap()
 }
 
+/// Cycles in a setpoint.
+fn per_setpoint(machine: &Machine) -> u64 {
+    machine.realtime.period.cycles_for(Period::OF_SETPOINTS.time())
+}
+
 /// Plays the sample job; `stall` says after each cycle, by its number, how many are skipped.
 fn play(machine: &Machine, plan: &Plan, mut stall: impl FnMut(u64) -> u64) -> Played {
     let mut chain = Chain::new(machine, plan);
-    let (mut evaluator, mut recorder) = (MarkEvaluator::new(&plan.artwork), Recorder::new());
+    let (mut evaluator, mut recorder) =
+        (MarkEvaluator::new(&plan.artwork, machine.realtime.period), Recorder::new());
     let mut skipped = 0;
     let mut report = ControllerReport::default();
     let mut left = u64::MAX;
-    while chain.cycle < 60_000 {
+    while chain.cycle < 60_000 * per_setpoint(machine) {
         let feedback = chain.begin();
         skipped += feedback.skipped;
-        assert_no_light_uncommanded(&feedback);
+        assert_no_light_uncommanded(&feedback, machine.realtime.period);
         chain.finish(&feedback, None, Peers::default());
         let outputs = &chain.outputs;
         recorder.feedback(&feedback);
@@ -70,11 +76,11 @@ fn play(machine: &Machine, plan: &Plan, mut stall: impl FnMut(u64) -> u64) -> Pl
 }
 
 /// Asserts that skipped cycles were dark; only the one before them may have been lit.
-fn assert_no_light_uncommanded(feedback: &messages::Feedback) {
-    let lit = lit_share(&feedback.laser, feedback.elapsed()) * feedback.elapsed() as f64;
+fn assert_no_light_uncommanded(feedback: &messages::Feedback, period: Period) {
+    let lit = lit_share(&feedback.laser, period.of(feedback.elapsed())) * feedback.elapsed() as f64;
     assert!(lit <= 1.0 + 1e-9, "{lit} cycles lit, {} skipped", feedback.skipped);
     let edges = feedback.laser.edges().iter();
-    let beyond = |edge: &&messages::GateEdge| i64::from(edge.offset) >= CYCLE_PERIOD.0;
+    let beyond = |edge: &&messages::GateEdge| i64::from(edge.offset) >= period.time().0;
     assert!(edges.filter(beyond).all(|edge| edge.gate == 0), "{:?}", feedback.laser);
 }
 
@@ -104,25 +110,38 @@ fn assert_whole(played: &Played, plain: &Played, case: &str) {
 #[test]
 fn tolerated_stalls_at_any_time_cost_no_mark_on_motors_and_steppers() {
     for name in ["corexy.toml", "cartesian_steppers.toml", "five_bar.toml"] {
-        let machine = load(name);
-        let plan = planned(&machine);
-        let plain = play(&machine, &plan, |_| 0);
-        assert_eq!((plain.stalls, plain.skipped), (0, 0));
-        for seed in 0..6 {
-            let mut random = SplitMix64::new(seed);
-            let mut next = START + random.bits() % 300;
-            let longest = machine.stall.cycles() - 1;
-            let played = play(&machine, &plan, |step| {
-                if step < next {
-                    return 0;
-                }
-                // So far apart that no place loses its light more often than is borne.
-                next = step + 450 + random.bits() % 500;
-                1 + random.bits() % longest
-            });
-            assert!(played.stalls >= 3 && played.skipped >= played.stalls, "{name}");
-            assert_whole(&played, &plain, &format!("{name}, seed {seed}"));
-        }
+        bear_stalls(name, &load(name), 0..6);
+    }
+}
+
+#[test]
+fn at_4_khz_tolerated_stalls_cost_no_mark_either() {
+    for name in ["corexy.toml", "cartesian_steppers.toml"] {
+        let mut machine = load(name);
+        machine.realtime.period = Period::new(messages::Nanoseconds(250_000)).unwrap();
+        bear_stalls(name, &machine, 0..3);
+    }
+}
+
+fn bear_stalls(name: &str, machine: &Machine, seeds: core::ops::Range<u64>) {
+    let scale = per_setpoint(machine);
+    let plan = planned(machine);
+    let plain = play(machine, &plan, |_| 0);
+    assert_eq!((plain.stalls, plain.skipped), (0, 0));
+    for seed in seeds {
+        let mut random = SplitMix64::new(seed);
+        let mut next = START + random.bits() % (300 * scale);
+        let longest = machine.realtime.stalled_cycles() - 1;
+        let played = play(machine, &plan, |step| {
+            if step < next {
+                return 0;
+            }
+            // So far apart that no place loses its light more often than is borne.
+            next = step + (450 + random.bits() % 500) * scale;
+            1 + random.bits() % longest
+        });
+        assert!(played.stalls >= 3 && played.skipped >= played.stalls, "{name}");
+        assert_whole(&played, &plain, &format!("{name}, seed {seed}"));
     }
 }
 
@@ -130,7 +149,9 @@ fn tolerated_stalls_at_any_time_cost_no_mark_on_motors_and_steppers() {
 fn a_stall_is_a_fault_exactly_when_it_is_longer_than_the_machine_file_says() {
     let mut machine = Machine::builtin();
     for tolerated in [1, 4, 10] {
-        machine.stall = machine::StallTolerance::new(Nanoseconds::of_cycles(tolerated)).unwrap();
+        let period = machine.realtime.period;
+        machine.realtime.stall =
+            machine::StallTolerance::new(period.of(tolerated), period).unwrap();
         let plan = planned(&machine);
         for moment in [START + 30, START + 200, START + 700] {
             // The cycle that drives is in time for lacks a fresh command too.

@@ -9,7 +9,7 @@ mod support;
 use std::time::{Duration, Instant};
 
 use messages::feedback::status;
-use messages::time::CYCLE_PERIOD;
+use messages::time::SETPOINT_PERIOD;
 use monitor::recording::CycleRecord;
 use runtime::peer::Peer;
 use serde_json::Value;
@@ -53,7 +53,7 @@ fn assert_no_light_uncommanded(records: &[CycleRecord]) {
         if before.has(status::COMMAND_MISSED) {
             assert!(!after.laser.is_lit(), "lit in cycle {cycle}, without a command");
         }
-        let beyond = |offset: u32| i64::from(offset) >= CYCLE_PERIOD.0;
+        let beyond = |offset: u32| i64::from(offset) >= SETPOINT_PERIOD.0;
         let late = after.laser.edges().iter().filter(|edge| beyond(edge.offset));
         assert!(late.clone().all(|edge| edge.gate == 0), "lit in a cycle skipped after {cycle}");
         let goes_out = after.skipped == 0 || after.laser.last().0 == 0;

@@ -9,7 +9,7 @@ use std::time::Instant;
 use controller::{Controller, Inputs, Outputs, Peers};
 use machine::Machine;
 use messages::feedback::status;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME as CYCLE_TIME;
 use messages::{
     CommandMode, ControllerState, Cycle, Feedback, Nanoseconds, OperatorRequest, OperatorVerb,
     Setpoint, math,

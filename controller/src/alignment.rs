@@ -6,22 +6,26 @@
 use crate::feedforward::Planned;
 use machine::Machine;
 use machine::motor::StepperMotor;
-use messages::time::CYCLE_TIME;
-use messages::{ActuatorArray, Fault, FaultCode, FaultQuantity, MAX_ACTUATORS};
+use messages::time::Period;
+use messages::{ActuatorArray, Fault, FaultCode, FaultQuantity, MAX_ACTUATORS, Nanoseconds};
 
 use crate::supervision::Finding;
 
 /// Encoder counts that a stream may start away from where an axis stands.
 const TOLERANCE: f64 = 16.0;
 
-/// Cycles to fade over: at most 0.7 rad/s for [`TOLERANCE`] of a 4096-count encoder.
-const CYCLES: u32 = 64;
+/// Time to fade over: at most 0.7 rad/s for [`TOLERANCE`] of a 4096-count encoder.
+const DURATION: Nanoseconds = Nanoseconds(64_000_000);
 
 /// What is left of the distance.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Alignment {
     offset: ActuatorArray,
-    left: u32,
+    /// Cycles that it takes, and how many of them are left.
+    cycles: u64,
+    left: u64,
+    /// Time that it takes [s].
+    duration: f64,
 }
 
 impl Alignment {
@@ -45,7 +49,10 @@ impl Alignment {
             }
         }
         let aligned = offset.iter().all(|offset| *offset == 0.0);
-        Ok(Self { offset, left: if aligned { 0 } else { CYCLES } })
+        let period: Period = machine.realtime.period;
+        let cycles = period.cycles_for(DURATION);
+        let duration = period.of(cycles).seconds();
+        Ok(Self { offset, cycles, left: if aligned { 0 } else { cycles }, duration })
     }
 
     /// Whether the axes are where the stream starts.
@@ -59,11 +66,11 @@ impl Alignment {
             return;
         }
         self.left -= 1;
-        let at = f64::from(self.left) / f64::from(CYCLES);
+        let at = self.left as f64 / self.cycles as f64;
         // The quintic from 0 to 1 with no speed and no acceleration at either end.
         let share = at * at * at * (10.0 + at * (6.0 * at - 15.0));
         let slope = 30.0 * at * at * (1.0 - at) * (1.0 - at);
-        let rate = -slope / (f64::from(CYCLES) * CYCLE_TIME);
+        let rate = -slope / self.duration;
         let planned = planned.angle.iter_mut().zip(&mut planned.speed);
         for ((angle, speed), offset) in planned.zip(&self.offset) {
             *angle += offset * share;

@@ -6,7 +6,7 @@
 //! output, already multiplied by their gain, so that changing a gain does not move the output.
 
 use machine::{DcMotor, LoopGains};
-use messages::time::CYCLE_TIME;
+use messages::time::Period;
 
 /// A proportional-integral controller with a limited output.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,6 +94,8 @@ pub struct Drive {
 /// The loops of one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cascade {
+    /// Time of a cycle [s].
+    cycle_time: f64,
     position: f64,
     speed_limit: f64,
     velocity: ProportionalIntegral,
@@ -101,11 +103,12 @@ pub struct Cascade {
 }
 
 impl Cascade {
-    /// Gains and limits from the data of motor and load.
-    pub fn new(motor: &DcMotor, gains: &LoopGains) -> Self {
+    /// Gains and limits from the data of motor and load, for cycles of this `period`.
+    pub fn new(motor: &DcMotor, gains: &LoopGains, period: Period) -> Self {
         // Source 003 ch. 3: Kp_v = J·ω_v/k, corner frequency ω_v/4.
         let velocity = gains.inertia * gains.velocity / motor.torque_constant;
         Self {
+            cycle_time: period.seconds(),
             position: gains.position,
             speed_limit: motor.no_load_speed(),
             velocity: ProportionalIntegral::new(
@@ -139,9 +142,9 @@ impl Cascade {
         // integrating on would only delay the way back.
         let excess = if current_excess != 0.0 { current_excess } else { voltage_excess };
         if integrating && excess * velocity_error <= 0.0 {
-            self.velocity.integrate(velocity_error, reference.current, CYCLE_TIME);
+            self.velocity.integrate(velocity_error, reference.current, self.cycle_time);
         }
-        self.current.integrate(current_error, reference.voltage, CYCLE_TIME);
+        self.current.integrate(current_error, reference.voltage, self.cycle_time);
         Drive { current, voltage }
     }
 
@@ -157,7 +160,7 @@ impl Cascade {
             self.speed(reference.velocity, reference, measured) - measured.velocity;
         let (current, excess) = self.velocity.output(velocity_error, reference.current);
         if integrating && excess * velocity_error <= 0.0 {
-            self.velocity.integrate(velocity_error, reference.current, CYCLE_TIME);
+            self.velocity.integrate(velocity_error, reference.current, self.cycle_time);
         }
         current
     }
@@ -185,7 +188,7 @@ mod tests {
     use messages::math;
 
     fn of(actuator: &Actuator) -> Cascade {
-        Cascade::new(actuator.motor.dc().unwrap(), &actuator.gains)
+        Cascade::new(actuator.motor.dc().unwrap(), &actuator.gains, Period::OF_SETPOINTS)
     }
 
     /// The current loop on a locked rotor, one cycle of delay, exact winding.

@@ -7,13 +7,13 @@
 
 use crate::feedforward::Planned;
 use machine::{Machine, Motor};
-use messages::ActuatorArray;
 use messages::math;
-use messages::time::CYCLE_TIME;
+use messages::time::Period;
+use messages::{ActuatorArray, Nanoseconds};
 
-/// Cycles to fade over. An axis that kept its speed for 10 ms, while the plan accelerated at 10 m/s²,
+/// Time to fade over. An axis that kept its speed for 10 ms, while the plan accelerated at 10 m/s²,
 /// takes as much acceleration again to come back; over half of this it would take twice that.
-const CYCLES: u32 = 48;
+const DURATION: Nanoseconds = Nanoseconds(48_000_000);
 
 /// Share of the largest following error within which an axis counts as on the plan: 5 µm of 1 mm.
 const ON_PLAN: f64 = 0.005;
@@ -24,8 +24,8 @@ const LARGE: f64 = 8.0;
 /// See [`LARGE`].
 const WOUND_UP: f64 = 5.0;
 
-/// Time for which a wrong speed lasts until the loops have it back [s]: about two cycles.
-const SPEED_LOSS: f64 = 2.0 * CYCLE_TIME;
+/// Cycles for which a wrong speed lasts until the loops have it back.
+const SPEED_LOSS: f64 = 2.0;
 
 /// What is left of the distance.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -34,34 +34,43 @@ pub struct CatchUp {
     offset: ActuatorArray,
     /// How fast it grew there [rad/s].
     slope: ActuatorArray,
-    left: u32,
+    /// Cycles that it takes, and how many of them are left.
+    cycles: u64,
+    left: u64,
+    /// Time that it takes [s].
+    duration: f64,
 }
 
 impl CatchUp {
-    /// From `coasted`, where the axes are at an instant, to `planned`, where the plan has them.
-    pub fn new(coasted: &Planned, planned: &Planned) -> Self {
+    /// From `coasted`, where the axes are at an instant, to `planned`, where the plan has them, in cycles of
+    /// this `period`.
+    pub fn new(coasted: &Planned, planned: &Planned, period: Period) -> Self {
         let difference = |from: &ActuatorArray, to: &ActuatorArray| -> ActuatorArray {
             core::array::from_fn(|index| from[index] - to[index])
         };
         let offset = difference(&coasted.angle, &planned.angle);
         let slope = difference(&coasted.speed, &planned.speed);
         let aligned = offset.iter().chain(&slope).all(|value| *value == 0.0);
-        Self { offset, slope, left: if aligned { 0 } else { CYCLES } }
+        let cycles = period.cycles_for(DURATION);
+        let duration = period.of(cycles).seconds();
+        Self { offset, slope, cycles, left: if aligned { 0 } else { cycles }, duration }
     }
 
     /// Cycles until the axes of `machine` are back on the plan but for micrometres; 0 where they are.
     pub fn settling(&self, machine: &Machine) -> u64 {
+        let cycle_time = machine.realtime.period.seconds();
         let drives = machine.drives().zip(self.offset.iter().zip(&self.slope));
         let settling = drives.map(|((actuator, axis), (offset, slope))| {
-            let off = (offset.abs() + slope.abs() * SPEED_LOSS) * actuator.ratio.abs();
+            let off =
+                (offset.abs() + slope.abs() * (SPEED_LOSS * cycle_time)) * actuator.ratio.abs();
             let left = off / (ON_PLAN * axis.limits.following_error);
             match actuator.motor {
                 _ if left <= 1.0 => 0.0,
-                Motor::Stepper(_) => f64::from(CYCLES),
+                Motor::Stepper(_) => self.cycles as f64,
                 // The position loop leaves e^(−ω·t) of it.
                 Motor::Dc(_) => {
                     let left = if left > LARGE { left * WOUND_UP } else { left };
-                    (math::ln(left) / (actuator.gains.position * CYCLE_TIME)).ceil()
+                    (math::ln(left) / (actuator.gains.position * cycle_time)).ceil()
                 }
             }
         });
@@ -79,8 +88,8 @@ impl CatchUp {
             return;
         }
         self.left -= 1;
-        let duration = f64::from(CYCLES) * CYCLE_TIME;
-        let at = 1.0 - f64::from(self.left) / f64::from(CYCLES);
+        let duration = self.duration;
+        let at = 1.0 - self.left as f64 / self.cycles as f64;
         let (square, cube) = (at * at, at * at * at);
         // The quintics that begin with a position, and with a speed, without acceleration, and end at
         // rest in 0; and their slopes.
@@ -101,14 +110,15 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use messages::MAX_ACTUATORS;
+    use messages::time::SETPOINT_TIME as CYCLE_TIME;
 
     #[test]
     fn it_begins_with_position_and_speed_and_ends_on_the_plan_without_a_step() {
         let mut coasted = Planned::default();
         (coasted.angle[0], coasted.speed[0], coasted.angle[1]) = (0.3, -8.0, 0.02);
-        let mut fading = CatchUp::new(&coasted, &Planned::default());
+        let mut fading = CatchUp::new(&coasted, &Planned::default(), Period::OF_SETPOINTS);
         let (mut before, mut speed_before) = (coasted.angle, coasted.speed);
-        for _ in 0..CYCLES {
+        for _ in 0..48 {
             let mut planned = Planned::default();
             fading.apply(&mut planned);
             for axis in 0..2 {
@@ -138,17 +148,17 @@ mod tests {
             let mut coasted = planned;
             coasted.angle[1] += offset;
             coasted.speed[1] -= slope;
-            CatchUp::new(&coasted, &planned).settling(machine)
+            CatchUp::new(&coasted, &planned, Period::OF_SETPOINTS).settling(machine)
         };
         assert_eq!(settling(&machine, 0.0, 0.0), 0);
         assert_eq!(settling(&machine, -0.99 * on_plan, 0.0), 0);
         let cycles = |times: f64| (math::ln(times) / bandwidth / CYCLE_TIME).ceil() as u64;
         assert_eq!(settling(&machine, -6.0 * on_plan, 0.0), cycles(6.0));
-        assert_eq!(settling(&machine, 0.0, 6.0 * on_plan / SPEED_LOSS), cycles(6.0));
+        assert_eq!(settling(&machine, 0.0, 6.0 * on_plan / (SPEED_LOSS * CYCLE_TIME)), cycles(6.0));
         assert_eq!(settling(&machine, -20.0 * on_plan, 0.0), cycles(20.0 * WOUND_UP));
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../machines");
         machine = Machine::load(&folder.join("cartesian_steppers.toml"), &[]).unwrap();
         let turned = 6e-6 / machine.actuators[1].ratio;
-        assert_eq!(settling(&machine, turned, 0.0), u64::from(CYCLES));
+        assert_eq!(settling(&machine, turned, 0.0), 48);
     }
 }

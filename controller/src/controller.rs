@@ -62,9 +62,10 @@ use messages::{
     ActuatorArray, Command, CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity,
     Feedback, LaserCycle, MAX_ACTUATORS, Nanoseconds, RealtimeFacts,
 };
+use transitions::Waits;
 
-/// Cycles between two reports.
-const REPORT_INTERVAL: u64 = 1000;
+/// Time between two reports.
+const REPORT_INTERVAL: Nanoseconds = Nanoseconds(1_000_000_000);
 
 /// Times in a row that light may be lost at one place before the machine is stopped.
 const MOST_LOSSES: u32 = 3;
@@ -77,6 +78,10 @@ const ONE_PLACE: StreamTime = StreamTime(128 * ONE);
 #[derive(Debug)]
 pub struct Controller {
     machine: Machine,
+    waits: Waits,
+    /// Cycles between two reports, and between two progress samples.
+    report_interval: u64,
+    progress_interval: u64,
     state: State,
     fault: Fault,
     intake: Intake,
@@ -112,10 +117,14 @@ impl Controller {
     /// # Panics
     /// If the machine has no actuator; machine files without are refused when read.
     pub fn new(machine: &Machine) -> Self {
+        let period = machine.realtime.period;
         let cascade = |actuator: &Actuator| {
-            actuator.motor.dc().map(|motor| Cascade::new(motor, &actuator.gains))
+            actuator.motor.dc().map(|motor| Cascade::new(motor, &actuator.gains, period))
         };
         Self {
+            waits: Waits::new(period),
+            report_interval: period.cycles_for(REPORT_INTERVAL),
+            progress_interval: period.cycles_for(PROGRESS_INTERVAL),
             state: State::Disabled,
             fault: Fault::default(),
             intake: Intake::new(),
@@ -188,12 +197,13 @@ impl Controller {
             self.statistics.cycle(&outputs.command, feedback, now);
         }
         outputs.report = self.ended.take();
-        if outputs.report.is_none() && self.cycles.is_multiple_of(REPORT_INTERVAL) {
+        if outputs.report.is_none() && self.cycles.is_multiple_of(self.report_interval) {
             // The final one too, again and again: who joins late must learn how the stream ended.
             outputs.report = Some(self.statistics.report()).filter(|report| report.stream != 0);
         }
         let changed = self.state.to_wire() != state_before;
-        if changed || outputs.report.is_some() || self.cycles.is_multiple_of(PROGRESS_INTERVAL) {
+        if changed || outputs.report.is_some() || self.cycles.is_multiple_of(self.progress_interval)
+        {
             outputs.progress = Some(self.progress(now, &outputs.command));
         }
     }
@@ -364,8 +374,11 @@ impl Controller {
         let lookahead = self.intake.lookahead_mut();
         lookahead.pass(self.player.now().time);
         let mut planned = self.feedforward.plan(lookahead, self.player.after());
-        let setpoint = lookahead.setpoint(self.player.after().time.sequence());
-        self.statistics.setpoint(setpoint, self.player.after());
+        // A cycle may pass several setpoints, or none.
+        let [from, to] = [self.player.next(), self.player.after()].map(|it| it.time.sequence());
+        for sequence in (from + 1).min(to)..=to {
+            self.statistics.setpoint(lookahead.setpoint(sequence), self.player.after());
+        }
         self.alignment.apply(&mut planned);
         self.catch_up.apply(&mut planned);
         self.feedforward.advance(planned);

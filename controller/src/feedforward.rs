@@ -16,8 +16,8 @@ use crate::lookahead::Lookahead;
 use crate::player::Instant;
 use crate::winding::Winding;
 use machine::{Actuator, ActuatorMode, Machine};
-use messages::time::CYCLE_TIME;
-use messages::{ActuatorArray, MAX_ACTUATORS};
+use messages::time::{Period, SETPOINT_TIME};
+use messages::{ActuatorArray, MAX_ACTUATORS, Nanoseconds};
 
 /// Planned speed below which a motor counts as standing [rad/s]: less than a count of any usual
 /// encoder in a minute. However slowly it creeps above that, friction is against it.
@@ -51,6 +51,9 @@ pub struct Target {
 /// Turns the stream into references and voltages, keeping the last four instants.
 #[derive(Debug, Clone)]
 pub struct Feedforward {
+    period: Period,
+    /// Its time [s].
+    cycle_time: f64,
     actuators: Vec<Actuator>,
     windings: Vec<Option<Winding>>,
     before: Planned,
@@ -63,10 +66,13 @@ impl Feedforward {
     /// For this machine, with the motors at zero.
     pub fn new(machine: &Machine) -> Self {
         let resting = Planned { tool: machine.home, ..Planned::default() };
+        let period = machine.realtime.period;
         Self {
+            period,
+            cycle_time: period.seconds(),
             actuators: machine.actuators.clone(),
             windings: (machine.actuators.iter())
-                .map(|actuator| actuator.motor.dc().map(Winding::new))
+                .map(|actuator| actuator.motor.dc().map(|motor| Winding::new(motor, period)))
                 .collect(),
             before: resting,
             now: resting,
@@ -93,7 +99,7 @@ impl Feedforward {
     /// The way back to the plan for axes that went on from `last` by themselves, for `cycles`, to the
     /// end of the newest command.
     pub fn coasted(&self, last: &Planned, cycles: u64) -> CatchUp {
-        CatchUp::new(&last.coasted(cycles), &self.after)
+        CatchUp::new(&last.coasted(self.period.of(cycles)), &self.after, self.period)
     }
 
     /// Has the axes where such a coasting left them, and where they were a cycle before.
@@ -101,8 +107,8 @@ impl Feedforward {
         let put = |planned: &mut Planned, coasted: &Planned| {
             (planned.angle, planned.speed) = (coasted.angle, coasted.speed);
         };
-        put(&mut self.next, &last.coasted(cycles.saturating_sub(1)));
-        put(&mut self.after, &last.coasted(cycles));
+        put(&mut self.next, &last.coasted(self.period.of(cycles.saturating_sub(1))));
+        put(&mut self.after, &last.coasted(self.period.of(cycles)));
     }
 
     /// Rests where `resting` is from now on, as if it always had. The voltage that this takes is given
@@ -127,7 +133,7 @@ impl Feedforward {
             let Some(winding) = &mut windings[index] else { continue };
             winding.advance(
                 voltage,
-                (after.angle[index] - next.angle[index]) / CYCLE_TIME,
+                (after.angle[index] - next.angle[index]) / self.cycle_time,
                 after.speed[index] - next.speed[index],
             );
         }
@@ -146,7 +152,7 @@ impl Feedforward {
         let mut planned = Planned { tool: from.tool, ..Planned::default() };
         if fraction == 0.0 {
             for (index, actuator) in self.actuators.iter().enumerate().take(MAX_ACTUATORS) {
-                let slope = |from: f64, to: f64| (to - from) / (2.0 * CYCLE_TIME);
+                let slope = |from: f64, to: f64| (to - from) / (2.0 * SETPOINT_TIME);
                 let lead_speed = slope(earlier.lead[index], to.lead[index]);
                 let static_speed = slope(earlier.static_lead[index], to.static_lead[index]);
                 let demand = Demand {
@@ -170,9 +176,9 @@ impl Feedforward {
         for (index, actuator) in self.actuators.iter().enumerate().take(MAX_ACTUATORS) {
             let (position, velocity) = hermite(
                 from.position[actuator.axis],
-                from.velocity[actuator.axis] * CYCLE_TIME,
+                from.velocity[actuator.axis] * SETPOINT_TIME,
                 to.position[actuator.axis],
-                to.velocity[actuator.axis] * CYCLE_TIME,
+                to.velocity[actuator.axis] * SETPOINT_TIME,
                 fraction,
             );
             let (lead, lead_speed) = hermite(
@@ -191,11 +197,11 @@ impl Feedforward {
             );
             let demand = Demand {
                 position,
-                velocity: velocity / CYCLE_TIME,
+                velocity: velocity / SETPOINT_TIME,
                 lead,
-                lead_speed: lead_speed / CYCLE_TIME,
+                lead_speed: lead_speed / SETPOINT_TIME,
                 static_lead,
-                static_speed: static_speed / CYCLE_TIME,
+                static_speed: static_speed / SETPOINT_TIME,
                 lead_momentum: linear(from.lead_momentum[index], to.lead_momentum[index]),
                 effort: linear(from.effort[index], to.effort[index]),
                 standing: linear(from.static_effort[index], to.static_effort[index]),
@@ -218,7 +224,7 @@ impl Feedforward {
     pub fn reference(&self, index: usize, actuator: &Actuator) -> Reference {
         Reference {
             position: self.now.angle[index],
-            velocity: (self.now.angle[index] - self.before.angle[index]) / CYCLE_TIME,
+            velocity: (self.now.angle[index] - self.before.angle[index]) / self.cycle_time,
             current: self.windings[index].as_ref().map_or(0.0, Winding::now),
             voltage: self.voltage(index, actuator),
         }
@@ -235,7 +241,11 @@ impl Feedforward {
         let mean_current = (first + last) / 2.0 + friction * mean;
         let current_change = last - first + friction * (to - from);
         let angle_change = self.after.angle[index] - self.next.angle[index];
-        motor.voltage(mean_current, current_change / CYCLE_TIME, angle_change / CYCLE_TIME)
+        motor.voltage(
+            mean_current,
+            current_change / self.cycle_time,
+            angle_change / self.cycle_time,
+        )
     }
 
     /// Targets for the actuator with this index.
@@ -246,7 +256,7 @@ impl Feedforward {
             position: self.after.angle[index],
             velocity: match actuator.mode {
                 ActuatorMode::Position => self.after.speed[index],
-                _ => (self.after.angle[index] - self.next.angle[index]) / CYCLE_TIME,
+                _ => (self.after.angle[index] - self.next.angle[index]) / self.cycle_time,
             },
             effort: torque + actuator.friction.coulomb * mean,
         }
@@ -287,9 +297,9 @@ struct Demand {
 }
 
 impl Planned {
-    /// This, so many cycles later at an even speed.
-    fn coasted(&self, cycles: u64) -> Self {
-        let time = cycles as f64 * CYCLE_TIME;
+    /// This, `time` later at an even speed.
+    fn coasted(&self, time: Nanoseconds) -> Self {
+        let time = time.seconds();
         Self {
             angle: core::array::from_fn(|index| self.angle[index] + self.speed[index] * time),
             ..*self

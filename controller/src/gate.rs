@@ -1,23 +1,25 @@
 //! The laser over one cycle of the machine, from the laser over the stretch of stream played in it.
 
 use crate::lookahead::Lookahead;
-use crate::stream_time::{ONE, StreamTime};
-use messages::time::CYCLE_PERIOD;
+use crate::stream_time::StreamTime;
+use messages::time::{Period, SETPOINT_PERIOD};
 use messages::{GateEdge, LaserCycle};
 
 /// A stretch of stream played in one cycle, at the rate it has on average.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stretch {
     /// Stream time at the start of the cycle.
     pub from: StreamTime,
     /// Stream time at its end; not before `from` when there is light to give.
     pub to: StreamTime,
+    /// Period of the cycle.
+    pub period: Period,
 }
 
 impl Stretch {
     /// Mean rate over the cycle.
     pub fn rate(self) -> f64 {
-        (self.to - self.from).setpoints()
+        (self.to - self.from).0 as f64 / StreamTime::in_cycles(1, self.period).0 as f64
     }
 }
 
@@ -45,13 +47,21 @@ pub fn laser(
     let start = stretch.from.max(dark_until);
     let first = start.sequence();
     let last = StreamTime(stretch.to.0 - 1).sequence();
-    let period = CYCLE_PERIOD.0 as f64;
+    let period = stretch.period.time().0 as f64;
     let planned = &lookahead.setpoint(first).laser;
-    if stretch.from.fraction() == 0.0 && stretch.from == start && stretch.to.0 - start.0 == ONE {
+    let whole = StreamTime::of(first + 1);
+    if stretch.from == StreamTime::of(first)
+        && stretch.from == start
+        && stretch.to == whole
+        && stretch.period == Period::OF_SETPOINTS
+    {
         return Ok(*planned);
     }
+    let setpoint = SETPOINT_PERIOD.0 as f64;
+    // From stream time since the start of the stretch [setpoints] to time since the start of the cycle [ns].
+    let offset = |into: f64| into * setpoint / rate;
     // What is on where the light may begin: the last edge that has passed by then.
-    let passed = start.fraction() * period;
+    let passed = start.fraction() * setpoint;
     let (gate, power) = planned
         .edges()
         .iter()
@@ -62,30 +72,41 @@ pub fn laser(
     if start == stretch.from {
         (cycle.gate, cycle.power) = (gate, power_at_rate(power));
     } else if gate != 0 {
-        let offset = (start - stretch.from).setpoints() / rate * period;
-        push(&mut cycle, offset, gate, power_at_rate(power))?;
+        push(
+            &mut cycle,
+            period,
+            offset((start - stretch.from).setpoints()),
+            gate,
+            power_at_rate(power),
+        )?;
     }
     for sequence in first..=last {
         let laser = &lookahead.setpoint(sequence).laser;
         let into = (StreamTime::of(sequence) - stretch.from).setpoints();
         // A setpoint starts with what the one before ended with, unless the planner says otherwise.
         if sequence != first && (laser.gate, power_at_rate(laser.power)) != cycle.last() {
-            push(&mut cycle, into / rate * period, laser.gate, power_at_rate(laser.power))?;
+            push(&mut cycle, period, offset(into), laser.gate, power_at_rate(laser.power))?;
         }
         for edge in laser.edges() {
             let begun = sequence != first || f64::from(edge.offset) > passed;
-            let offset = (into + f64::from(edge.offset) / period) / rate * period;
-            if begun && offset < period {
-                push(&mut cycle, offset, edge.gate, power_at_rate(edge.power))?;
+            let at = offset(into + f64::from(edge.offset) / setpoint);
+            if begun && at < period {
+                push(&mut cycle, period, at, edge.gate, power_at_rate(edge.power))?;
             }
         }
     }
     Ok(cycle)
 }
 
-/// Adds an edge.
-fn push(cycle: &mut LaserCycle, offset: f64, gate: u32, power: f64) -> Result<(), TooManyEdges> {
-    let offset = (offset.round().max(0.0) as u32).min(CYCLE_PERIOD.0 as u32 - 1);
+/// Adds an edge, inside the cycle of this `period` [ns].
+fn push(
+    cycle: &mut LaserCycle,
+    period: f64,
+    offset: f64,
+    gate: u32,
+    power: f64,
+) -> Result<(), TooManyEdges> {
+    let offset = offset.round().clamp(0.0, period - 1.0) as u32;
     if cycle.push(GateEdge { offset, gate, power }) { Ok(()) } else { Err(TooManyEdges) }
 }
 
@@ -93,6 +114,7 @@ fn push(cycle: &mut LaserCycle, offset: f64, gate: u32, power: f64) -> Result<()
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::stream_time::ONE;
     use messages::Setpoint;
 
     /// Dark, then stroke 3 from 1.25 to 3.5 in stream time, at power 0.4.
@@ -125,9 +147,9 @@ mod tests {
         let ring = ring();
         let (mut lit, mut exposure, mut now) = (0.0, 0.0, at(from));
         while now < at(to) {
-            let stretch = Stretch { from: now, to: now + at(rate) };
+            let stretch = Stretch { from: now, to: now + at(rate), period: Period::OF_SETPOINTS };
             let cycle = laser(&ring, stretch, at(dark_until), 0.0).unwrap();
-            assert!(cycle.is_valid(), "{cycle:?}");
+            assert!(cycle.is_valid(SETPOINT_PERIOD), "{cycle:?}");
             let (mut since, mut gate, mut power) = (0.0, cycle.gate, cycle.power);
             let end = GateEdge { offset: 1_000_000, gate: 0, power: 0.0 };
             for edge in cycle.edges().iter().chain([&end]) {
@@ -172,7 +194,14 @@ mod tests {
         let ring = ring();
         let told = |min_power: f64, rate: f64| {
             let (from, to) = (at(2.1), at(2.1 + rate));
-            laser(&ring, Stretch { from, to }, StreamTime(0), min_power).unwrap().power
+            laser(
+                &ring,
+                Stretch { from, to, period: Period::OF_SETPOINTS },
+                StreamTime(0),
+                min_power,
+            )
+            .unwrap()
+            .power
         };
         let off = |min_power: f64, rate: f64, power: f64| (told(min_power, rate) - power).abs();
         for (min_power, rate, power) in
@@ -181,7 +210,7 @@ mod tests {
             assert!(off(min_power, rate, power) < 1e-9, "{min_power} at {rate}");
         }
         // Nothing is lit for that.
-        let dark = Stretch { from: at(4.0), to: at(4.3) };
+        let dark = Stretch { from: at(4.0), to: at(4.3), period: Period::OF_SETPOINTS };
         assert_eq!(laser(&ring, dark, StreamTime(0), 0.3), Ok(LaserCycle::OFF));
     }
 
@@ -189,8 +218,11 @@ mod tests {
     fn as_planned_is_the_planners_own_cycle() {
         let ring = ring();
         for sequence in 0..7 {
-            let stretch =
-                Stretch { from: StreamTime::of(sequence), to: StreamTime::of(sequence + 1) };
+            let stretch = Stretch {
+                from: StreamTime::of(sequence),
+                to: StreamTime::of(sequence + 1),
+                period: Period::OF_SETPOINTS,
+            };
             let cycle = laser(&ring, stretch, StreamTime(0), 0.3);
             assert_eq!(cycle, Ok(ring.setpoint(sequence).laser));
         }
@@ -200,7 +232,7 @@ mod tests {
     fn backwards_and_at_rest_it_is_dark() {
         let ring = ring();
         for (from, to) in [(3.0, 2.0), (2.0, 2.0)] {
-            let stretch = Stretch { from: at(from), to: at(to) };
+            let stretch = Stretch { from: at(from), to: at(to), period: Period::OF_SETPOINTS };
             assert_eq!(laser(&ring, stretch, StreamTime(0), 0.3), Ok(LaserCycle::OFF));
         }
     }
@@ -217,7 +249,8 @@ mod tests {
             }
             ring.accept(&setpoint).unwrap();
         }
-        let stretch = |from, to| Stretch { from: at(from), to: at(to) };
+        let stretch =
+            |from, to| Stretch { from: at(from), to: at(to), period: Period::OF_SETPOINTS };
         let play = |from, to| laser(&ring, stretch(from, to), StreamTime(0), 0.0);
         assert_eq!(play(0.0, 1.0).unwrap().edges().len(), 10);
         assert_eq!(play(0.0, 2.0), Err(TooManyEdges));

@@ -13,7 +13,7 @@
 use crate::lookahead::Lookahead;
 use crate::stream_time::{ONE, StreamTime};
 use machine::{Axis, Machine};
-use messages::time::CYCLE_TIME;
+use messages::time::{Period, SETPOINT_TIME};
 use messages::{MAX_AXES, Setpoint};
 
 /// What a change of the rate leaves of each limit: between setpoints, where a jump of the plan's jerk lies
@@ -47,9 +47,9 @@ impl Motion {
     }
 }
 
-/// From five places, a cycle apart.
+/// From five places, a setpoint apart.
 fn derivatives([a, b, c, d, e]: [f64; 5]) -> Derivatives {
-    let per = 1.0 / CYCLE_TIME;
+    let per = 1.0 / SETPOINT_TIME;
     [
         (8.0 * (d - b) - (e - a)) / 12.0 * per,
         ((d - c) - (c - b)) * per * per,
@@ -109,6 +109,8 @@ pub struct Course<'a> {
     pub lookahead: &'a Lookahead,
     /// The limits.
     pub limits: &'a MotionLimits,
+    /// The period of the cycles in which the rate changes.
+    pub period: Period,
 }
 
 /// A line in the coming bend of the rate: `constant + slope·bend`.
@@ -232,11 +234,13 @@ impl<'a> Course<'a> {
     /// `time`, and the middle of the cycle before it with the jerk on either side.
     fn instants(&self, time: StreamTime, going: Going) -> [Instant<'a>; 3] {
         let Going { rate, change, bend } = going;
-        let half_before = rate - change * CYCLE_TIME / 2.0;
-        let middle = time - StreamTime((half_before * (ONE / 2) as f64) as i64);
+        let cycle_time = self.period.seconds();
+        let half_before = rate - change * cycle_time / 2.0;
+        let half_a_cycle = StreamTime::in_cycles(1, self.period).0 / 2;
+        let middle = time - StreamTime((half_before * half_a_cycle as f64) as i64);
         // The change at an instant is the mean of those before and after, and in the middle of a cycle
         // that of its ends; so is the bend.
-        let quarter = CYCLE_TIME / 4.0;
+        let quarter = cycle_time / 4.0;
         let here = Instant {
             change: Growth { constant: change, slope: 2.0 * quarter },
             bend: Growth { constant: 0.0, slope: 1.0 },
@@ -345,7 +349,7 @@ mod tests {
     fn cubic(jerk: f64) -> Lookahead {
         let mut ring = Lookahead::new();
         for sequence in 0..200 {
-            let time = (sequence as f64 - 60.0) * CYCLE_TIME;
+            let time = (sequence as f64 - 60.0) * SETPOINT_TIME;
             let place = jerk * time * time * time / 6.0;
             let mut setpoint = Setpoint { stream: 1, sequence, ..Setpoint::default() };
             (setpoint.tool[0], setpoint.position[0], setpoint.position[1]) = (place, place, place);
@@ -367,12 +371,12 @@ mod tests {
     #[test]
     fn a_bend_uses_what_the_plan_leaves_of_the_jerk() {
         let (ring, limits) = (cubic(400.0), MotionLimits::new(&Machine::builtin()));
-        let course = Course { lookahead: &ring, limits: &limits };
+        let course = Course { lookahead: &ring, limits: &limits, period: Period::OF_SETPOINTS };
         let going = Going { rate: 1.0, ..Going::default() };
         let bends = course.bends(StreamTime::of(80), going);
         assert!(bends.is_allowed);
         // 0.08 m/s and 8 m/s², of which half a cycle of the bend comes to the change.
-        let slope = 0.08 + 1.5 * 8.0 * CYCLE_TIME;
+        let slope = 0.08 + 1.5 * 8.0 * SETPOINT_TIME;
         assert!((bends.most - (492.5 - 400.0) / slope).abs() < 1.0, "{bends:?}");
         assert!(course.allows(StreamTime::of(80), going, bends.most - 1.0));
         assert!(!course.allows(StreamTime::of(80), going, bends.most + 1.0));
@@ -382,7 +386,7 @@ mod tests {
     #[test]
     fn an_even_rate_is_always_allowed_where_the_plan_is() {
         let (ring, limits) = (cubic(500.0), MotionLimits::new(&Machine::builtin()));
-        let course = Course { lookahead: &ring, limits: &limits };
+        let course = Course { lookahead: &ring, limits: &limits, period: Period::OF_SETPOINTS };
         for rate in [1.0, 0.99, 0.5, 0.1, 0.0] {
             let going = Going { rate, ..Going::default() };
             assert!(course.allows(StreamTime::of(75), going, 0.0), "{rate}");

@@ -14,12 +14,11 @@
 use crate::gate::{self, Stretch, TooManyEdges};
 use crate::lookahead::Lookahead;
 use crate::motion_limits::{Course, MotionLimits};
-use crate::ramp::{Ramp, Rate, Slew};
+use crate::ramp::{Pace, Ramp, Rate, Slew};
 use crate::stream_time::{ONE, StreamTime};
 use machine::Machine;
-use messages::LaserCycle;
 use messages::setpoint::flags;
-use messages::time::CYCLE_TIME;
+use messages::{LaserCycle, Nanoseconds};
 
 /// The overrides that can be asked for.
 const OVERRIDES: core::ops::RangeInclusive<f64> = 0.1..=2.0;
@@ -32,8 +31,8 @@ const RESERVE: StreamTime = StreamTime(4 * ONE);
 /// them.
 const HINDRANCE: i64 = 2;
 
-/// Cycles after which a stop ignores the limits. Within the limits, planned motion stops in half of them.
-const PATIENCE: u32 = 400;
+/// Time after which a stop ignores the limits. Within the limits, planned motion stops in half of it.
+const PATIENCE: Nanoseconds = Nanoseconds(400_000_000);
 
 /// Setpoints in hand with which nothing can run dry: [`HINDRANCE`] times a stop from rate 1, and more.
 const PLENTY: StreamTime = StreamTime(512 * ONE);
@@ -73,7 +72,7 @@ enum Activity {
     /// Going forward; the slew is the one to and from rest until the rate is reached.
     Playing(Slew),
     /// Coming to rest, for so many cycles by now.
-    Braking(u32),
+    Braking(u64),
     /// Going back in the dark, to rest at about this time.
     Rewinding(StreamTime),
     /// Coming to rest before going forward again.
@@ -83,6 +82,9 @@ enum Activity {
 /// The player.
 #[derive(Debug, Clone)]
 pub struct Player {
+    pace: Pace,
+    /// Cycles after which a stop ignores the limits.
+    patience: u64,
     now: Instant,
     next: Instant,
     after: Instant,
@@ -107,7 +109,10 @@ pub struct Player {
 impl Player {
     /// For this machine, before the first setpoint of a stream, at the planned rate.
     pub fn new(machine: &Machine) -> Self {
+        let period = machine.realtime.period;
         Self {
+            pace: Pace::new(period),
+            patience: period.cycles_for(PATIENCE),
             now: Instant::default(),
             next: Instant::default(),
             after: Instant::default(),
@@ -212,7 +217,10 @@ impl Player {
     pub fn unsettle(&mut self, cycles: u64, lookahead: &Lookahead) -> Option<StreamTime> {
         let from = self.next.time.max(self.dark_until);
         let playing = matches!(self.activity, Activity::Playing(_));
-        if !playing || !lookahead.is_lit(from, self.after.time + StreamTime::of(cycles)) {
+        if !playing
+            || !lookahead
+                .is_lit(from, self.after.time + StreamTime::in_cycles(cycles, self.pace.period()))
+        {
             return None;
         }
         self.brake_in_the_dark(from);
@@ -238,7 +246,7 @@ impl Player {
         }
         let here = self.after.time;
         // Where the limits hinder it, light comes back before that, with its power in proportion.
-        let start = Ramp::starting_distance(self.wanted()) + STEADY;
+        let start = Ramp::starting_distance(self.wanted(), &self.pace) + STEADY;
         let resting = self.at_planned_rest || lookahead.is_resting(here);
         let light_ahead = !resting && lookahead.may_be_lit(here, here + start);
         let light_from = self.unlit_from.or(light_ahead.then_some(here));
@@ -253,13 +261,13 @@ impl Player {
     /// in hand.
     fn set_off(&mut self, resting: bool, lookahead: &Lookahead) {
         let even = Ramp::even(self.wanted());
-        let stop = StreamTime(HINDRANCE * even.stopping_distance().0);
+        let stop = StreamTime(HINDRANCE * even.stopping_distance(&self.pace).0);
         let enough = lookahead.is_complete() || self.after.time + stop <= lookahead.end() - RESERVE;
         self.activity = if resting && enough {
             self.ramp = even;
-            Activity::Playing(Slew::OVERRIDE)
+            Activity::Playing(self.pace.gentle)
         } else {
-            Activity::Playing(Slew::STOP)
+            Activity::Playing(self.pace.stop)
         };
     }
 
@@ -279,7 +287,7 @@ impl Player {
         let before = self.ramp;
         let mut event = self.change_rate(lookahead, from);
         // There always is enough in hand to stop: nothing is played beyond it, whatever happens.
-        let time = (from + self.ramp.advance(before)).min(lookahead.end().max(from));
+        let time = (from + self.ramp.advance(before, &self.pace)).min(lookahead.end().max(from));
         let reached = self.ramp.rate().value();
         self.after = Instant { time, rate: reached, rate_change: self.rate_change(reached) };
         if time < StreamTime::default() {
@@ -331,14 +339,15 @@ impl Player {
     /// One cycle of the rate, from `from` on, as the activity asks and the limits allow; and what comes
     /// of that.
     fn change_rate(&mut self, lookahead: &Lookahead, from: StreamTime) -> Event {
-        let before = self.ramp;
+        let (before, pace) = (self.ramp, self.pace);
         let toward = |target: Rate, slew: Slew| {
-            before.toward(target, slew, &Course { lookahead, limits: &self.limits }, from)
+            let course = Course { lookahead, limits: &self.limits, period: pace.period() };
+            before.toward(target, slew, &pace, &course, from)
         };
         let end = lookahead.end() - RESERVE;
         let scarce = !lookahead.is_complete() && from + PLENTY > end;
         let stops = |ramp: Ramp, times: i64| {
-            from + ramp.advance(before) + StreamTime(times * ramp.stopping_distance().0)
+            from + ramp.advance(before, &pace) + StreamTime(times * ramp.stopping_distance(&pace).0)
         };
         let mut event = Event::None;
         self.ramp = match self.activity {
@@ -346,33 +355,35 @@ impl Player {
                 let ramp = toward(self.wanted(), slew);
                 if scarce && stops(ramp, HINDRANCE) > end {
                     event = Event::Starved;
-                    let ramp = toward(Rate::ZERO, Slew::STOP);
+                    let ramp = toward(Rate::ZERO, pace.stop);
                     self.brake_in_the_dark(from);
                     self.marking = false;
                     ramp
                 } else {
                     if ramp.is_even_at(self.wanted()) {
-                        self.activity = Activity::Playing(Slew::OVERRIDE);
+                        self.activity = Activity::Playing(self.pace.gentle);
                     }
                     ramp
                 }
             }
             Activity::Rewinding(back) => {
-                let ramp = toward(Rate(-Rate::ONE.0), Slew::STOP);
+                let ramp = toward(Rate(-Rate::ONE.0), pace.stop);
                 if stops(ramp, 1) < back {
-                    let ramp = toward(Rate::ZERO, Slew::STOP);
+                    let ramp = toward(Rate::ZERO, pace.stop);
                     self.activity = Activity::Turning;
                     ramp
                 } else {
                     ramp
                 }
             }
-            Activity::Braking(PATIENCE..) => before.unhindered(Rate::ZERO, Slew::STOP),
+            Activity::Braking(cycles) if cycles >= self.patience => {
+                before.unhindered(Rate::ZERO, pace.stop)
+            }
             Activity::Braking(cycles) => {
                 self.activity = Activity::Braking(cycles + 1);
-                toward(Rate::ZERO, Slew::STOP)
+                toward(Rate::ZERO, pace.stop)
             }
-            Activity::Resting | Activity::Turning => toward(Rate::ZERO, Slew::STOP),
+            Activity::Resting | Activity::Turning => toward(Rate::ZERO, pace.stop),
         };
         // There is no more way to wait for room on, ahead or back.
         let too_far = scarce && stops(self.ramp, 1) > end;
@@ -384,7 +395,7 @@ impl Player {
             && beginning > StreamTime::default()
             && stops(self.ramp, 1) < beginning + RESERVE;
         if too_far || too_far_back {
-            self.ramp = before.unhindered(Rate::ZERO, Slew::STOP);
+            self.ramp = before.unhindered(Rate::ZERO, pace.stop);
         }
         if too_far_back && matches!(self.activity, Activity::Rewinding(_)) {
             self.activity = Activity::Turning;
@@ -402,7 +413,8 @@ impl Player {
 
     /// What the stream has of light between `next` and `after` that was not given before.
     fn light(&self, lookahead: &Lookahead) -> Result<LaserCycle, TooManyEdges> {
-        let stretch = Stretch { from: self.next.time, to: self.after.time };
+        let period = self.pace.period();
+        let stretch = Stretch { from: self.next.time, to: self.after.time, period };
         gate::laser(lookahead, stretch, self.dark_until, self.min_power)
     }
 
@@ -433,6 +445,6 @@ impl Player {
     fn rate_change(&self, reached: f64) -> f64 {
         // Out of a planned rest the rate jumps, but nothing moves there.
         let from_rest = self.next.rate == 0.0 && reached.abs() > 0.05;
-        if from_rest { 0.0 } else { (reached - self.next.rate) / CYCLE_TIME }
+        if from_rest { 0.0 } else { (reached - self.next.rate) / self.pace.period().seconds() }
     }
 }

@@ -13,8 +13,9 @@
 //! Unhindered, a hold from rate 1 takes 0.13 s. Overrides change the rate five times as gently.
 
 use crate::motion_limits::{Bends, Course, Going};
-use crate::stream_time::{FRACTION_BITS, StreamTime};
-use messages::time::CYCLE_TIME;
+use crate::stream_time::{FRACTION_BITS, SETPOINT_STEPS, StreamTime};
+use messages::Nanoseconds;
+use messages::time::{Period, SETPOINT_TIME};
 
 /// Bits after the binary point of a rate. The mean of two has one more: the [`FRACTION_BITS`] of
 /// stream time.
@@ -23,11 +24,19 @@ const RATE_BITS: u32 = FRACTION_BITS - 1;
 /// Changes that are tried between the largest and the one that is known to be safe.
 const TRIALS: u32 = 3;
 
-/// The largest bend on a way back, in counts.
-const LARGEST_BEND: i64 = 2 * Slew::STOP.bend;
+/// The largest bend on a way back, against that of a stop.
+const WAY_BACK_BEND: i64 = 2;
 
-/// Cycles in which a way back to an even rate must end.
-const WAY_BACK: u32 = 48;
+/// Time in which a way back to an even rate must end.
+const WAY_BACK: Nanoseconds = Nanoseconds(48_000_000);
+
+/// The largest change of the rate [1/s], and of that in a second [1/(2·s²)]: to and from rest, and between
+/// rates while marking.
+const STOP: [i64; 2] = [10, 625];
+const GENTLE: [i64; 2] = [2, 125];
+
+/// Nanoseconds in a second.
+const NANOSECONDS: i128 = 1_000_000_000;
 
 /// A rate in counts of 2⁻²⁹; 1 is as planned, negative is backwards.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,6 +59,46 @@ impl Rate {
     }
 }
 
+/// How rates change in cycles of one period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pace {
+    period: Period,
+    /// To and from rest: ṙ ≤ 10/s, r̈ ≤ 312.5/s².
+    pub stop: Slew,
+    /// Between rates while marking: ṙ ≤ 2/s, r̈ ≤ 62.5/s².
+    pub gentle: Slew,
+    /// Cycles in which a way back to an even rate must end.
+    way_back: u64,
+}
+
+impl Pace {
+    /// In cycles of this period.
+    pub fn new(period: Period) -> Self {
+        Self {
+            period,
+            stop: Slew::new(STOP, period),
+            gentle: Slew::new(GENTLE, period),
+            way_back: period.cycles_for(WAY_BACK),
+        }
+    }
+
+    /// The period of the cycles.
+    pub fn period(&self) -> Period {
+        self.period
+    }
+
+    /// The largest bend on a way back, in counts.
+    fn largest_bend(&self) -> i64 {
+        WAY_BACK_BEND * self.stop.bend
+    }
+
+    /// A change of the change, per second²; in counts.
+    fn bend_of(&self, counts: i64) -> f64 {
+        let cycle_time = self.period.seconds();
+        Rate(counts).value() / (cycle_time * cycle_time)
+    }
+}
+
 /// How fast the rate may change at most, in counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Slew {
@@ -60,10 +109,14 @@ pub struct Slew {
 }
 
 impl Slew {
-    /// To and from rest: ṙ ≤ 10/s, r̈ ≤ 312.5/s².
-    pub const STOP: Self = Self { change: Rate::ONE.0 / 100, bend: Rate::ONE.0 / 3200 };
-    /// Between rates while marking: ṙ ≤ 2/s, r̈ ≤ 62.5/s².
-    pub const OVERRIDE: Self = Self { change: Rate::ONE.0 / 500, bend: Rate::ONE.0 / 16_000 };
+    fn new([change, bend]: [i64; 2], period: Period) -> Self {
+        let [one, cycle] = [Rate::ONE.0, period.time().0].map(i128::from);
+        let counts = |counts: i128| i64::try_from(counts).unwrap_or(i64::MAX).max(1);
+        Self {
+            change: counts(one * cycle * i128::from(change) / NANOSECONDS),
+            bend: counts(one * cycle * cycle * i128::from(bend) / (2 * NANOSECONDS * NANOSECONDS)),
+        }
+    }
 
     /// The largest change, up to `self.change`, from which the rate still lands exactly within `gap`.
     fn landing(self, gap: i64) -> i64 {
@@ -82,10 +135,10 @@ impl Slew {
 }
 
 /// The most by which the rate changes [1/s].
-pub const LARGEST_CHANGE: f64 = Slew::STOP.change as f64 / Rate::ONE.0 as f64 / CYCLE_TIME;
+pub const LARGEST_CHANGE: f64 = STOP[0] as f64;
 
-/// The most by which that changes from one cycle to the next [1/s].
-pub const LARGEST_TURN: f64 = LARGEST_BEND as f64 / Rate::ONE.0 as f64 / CYCLE_TIME;
+/// The most by which that changes from one setpoint to the next [1/s].
+pub const LARGEST_TURN: f64 = (WAY_BACK_BEND * STOP[1]) as f64 / 2.0 * SETPOINT_TIME;
 
 /// A rate on its way.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -128,23 +181,33 @@ impl Ramp {
         Self { rate: self.rate + change, change, bend: change - self.change }
     }
 
-    /// How far the stream moves in the cycle in which the rate comes from `before` to this.
-    pub fn advance(self, before: Self) -> StreamTime {
-        StreamTime(before.rate + self.rate)
+    /// How far the stream moves in the cycle in which the rate comes from `before` to this: exactly in a
+    /// cycle of a setpoint and at the planned rate, else to a count.
+    pub fn advance(self, before: Self, pace: &Pace) -> StreamTime {
+        StreamTime((before.rate + self.rate) * pace.period.steps() / SETPOINT_STEPS)
     }
 
     /// One cycle later on the way to `target`, from `time` on, as fast as `slew` and the limits of
     /// `course` let it.
     #[must_use]
-    pub fn toward(self, target: Rate, slew: Slew, course: &Course<'_>, time: StreamTime) -> Self {
+    pub fn toward(
+        self,
+        target: Rate,
+        slew: Slew,
+        pace: &Pace,
+        course: &Course<'_>,
+        time: StreamTime,
+    ) -> Self {
         let gap = target.0 - self.rate;
         if gap == 0 && self.change == 0 {
             return Self::even(target);
         }
-        let bends = course.bends(time, self.going());
-        let mut safe = self.bent(-self.change, &bends);
-        let mut wished = self.bent(self.unhindered(target, slew).bend, &bends);
-        let is_safe = |ramp: Self| ramp.is_safe(target, gap, course, time + ramp.advance(self));
+        let bends = course.bends(time, self.going(pace));
+        let mut safe = self.bent(-self.change, &bends, pace);
+        let mut wished = self.bent(self.unhindered(target, slew).bend, &bends, pace);
+        let is_safe = |ramp: Self| {
+            ramp.is_safe([target.0, gap], pace, course, time + ramp.advance(self, pace))
+        };
         if bends.is_allowed && is_safe(wished) {
             return wished;
         }
@@ -160,9 +223,9 @@ impl Ramp {
     }
 
     /// One cycle later with this bend, or the nearest that is among `bends`.
-    fn bent(self, bend: i64, bends: &Bends) -> Self {
-        let largest = LARGEST_BEND as f64;
-        let counts = |bend: f64| (bend / bend_of(1)).clamp(-largest, largest);
+    fn bent(self, bend: i64, bends: &Bends, pace: &Pace) -> Self {
+        let largest = pace.largest_bend() as f64;
+        let counts = |bend: f64| (bend / pace.bend_of(1)).clamp(-largest, largest);
         let (least, most) = (counts(bends.least).ceil() as i64, counts(bends.most).floor() as i64);
         self.changed(self.change + bend.min(most).max(least))
     }
@@ -178,91 +241,101 @@ impl Ramp {
     }
 
     /// How far the stream moves until an unhindered stop has come to rest.
-    pub fn stopping_distance(mut self) -> StreamTime {
+    pub fn stopping_distance(mut self, pace: &Pace) -> StreamTime {
         let mut way = StreamTime::default();
         while !self.is_still() {
             let before = self;
-            self = self.unhindered(Rate::ZERO, Slew::STOP);
-            way = way + self.advance(before);
+            self = self.unhindered(Rate::ZERO, pace.stop);
+            way = way + self.advance(before, pace);
         }
         way
     }
 
     /// How far the stream moves from rest until the rate is `rate`, unhindered.
-    pub fn starting_distance(rate: Rate) -> StreamTime {
+    pub fn starting_distance(rate: Rate, pace: &Pace) -> StreamTime {
         let (mut ramp, mut way) = (Self::new(), StreamTime::default());
         while ramp.rate != rate.0 {
             let before = ramp;
-            ramp = ramp.unhindered(rate, Slew::STOP);
-            way = way + ramp.advance(before);
+            ramp = ramp.unhindered(rate, pace.stop);
+            way = way + ramp.advance(before, pace);
         }
         way
     }
 
     /// Whether there is a way from here, at `time`, to an even rate that is not beyond `target`, which
-    /// was `gap` away: as fast as the limits let it, and within them all the way.
-    fn is_safe(self, target: Rate, gap: i64, course: &Course<'_>, mut time: StreamTime) -> bool {
+    /// was `gap` away, in counts: as fast as the limits let it, and within them all the way.
+    fn is_safe(
+        self,
+        [target, gap]: [i64; 2],
+        pace: &Pace,
+        course: &Course<'_>,
+        mut time: StreamTime,
+    ) -> bool {
         let mut ramp = self;
-        for _ in 0..WAY_BACK {
-            let left = target.0 - ramp.rate;
+        let most = pace.largest_bend();
+        for _ in 0..pace.way_back {
+            let left = target - ramp.rate;
             let beyond = left.signum() * gap.signum() < 0 || ramp.rate.abs() > Rate::ONE.0;
-            if beyond || ramp.change.abs() > Slew::STOP.change {
+            if beyond || ramp.change.abs() > pace.stop.change {
                 return false;
             }
             let before = ramp;
-            let bend = (-ramp.change).clamp(-LARGEST_BEND, LARGEST_BEND);
-            if course.allows(time, ramp.going(), bend_of(bend)) {
+            let bend = (-ramp.change).clamp(-most, most);
+            if course.allows(time, ramp.going(pace), pace.bend_of(bend)) {
                 if ramp.change == 0 {
                     return true;
                 }
                 ramp = ramp.changed(ramp.change + bend);
             } else {
-                let bends = course.bends(time, ramp.going());
-                let largest = bend_of(LARGEST_BEND);
+                let bends = course.bends(time, ramp.going(pace));
+                let largest = pace.bend_of(most);
                 if !bends.is_allowed || bends.least > largest || bends.most < -largest {
                     return false;
                 }
-                ramp = ramp.bent(-ramp.change, &bends);
+                ramp = ramp.bent(-ramp.change, &bends, pace);
             }
-            time = time + ramp.advance(before);
+            time = time + ramp.advance(before, pace);
         }
         false
     }
 
-    fn going(self) -> Going {
-        let change = Rate(self.change).value() / CYCLE_TIME;
-        Going { rate: self.rate().value(), change, bend: bend_of(self.bend) }
+    fn going(self, pace: &Pace) -> Going {
+        let change = Rate(self.change).value() / pace.period.seconds();
+        Going { rate: self.rate().value(), change, bend: pace.bend_of(self.bend) }
     }
-}
-
-/// A change of the change, per second²; in counts.
-fn bend_of(counts: i64) -> f64 {
-    Rate(counts).value() / (CYCLE_TIME * CYCLE_TIME)
 }
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
+    /// The periods that are tried, the shortest, that of the setpoints and the longest among them.
+    fn paces() -> [Pace; 4] {
+        let half = Period::new(Nanoseconds(500_000)).unwrap();
+        [Period::SHORTEST, half, Period::OF_SETPOINTS, Period::LONGEST].map(Pace::new)
+    }
+
     /// Unhindered to `target`: the rates, and how far the stream moves.
-    fn run(mut ramp: Ramp, target: Rate, slew: Slew) -> (Vec<Ramp>, StreamTime) {
+    fn run(mut ramp: Ramp, target: Rate, slew: Slew, pace: &Pace) -> (Vec<Ramp>, StreamTime) {
         let (mut ramps, mut way) = (vec![ramp], StreamTime::default());
         while !ramp.is_even_at(target) {
             let before = ramp;
             ramp = ramp.unhindered(target, slew);
-            way = way + ramp.advance(before);
+            way = way + ramp.advance(before, pace);
             ramps.push(ramp);
-            assert!(ramps.len() < 5000, "never at {target:?}");
+            assert!(ramps.len() < 40_000, "never at {target:?}");
         }
         (ramps, way)
     }
 
     #[test]
     fn lands_exactly_and_keeps_both_limits() {
-        for (from, to) in [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (0.3, 0.302), (0.777, 0.1)] {
-            for slew in [Slew::STOP, Slew::OVERRIDE] {
+        let ways = [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (0.3, 0.302), (0.777, 0.1)];
+        for (pace, (from, to)) in paces().iter().flat_map(|pace| ways.map(|way| (pace, way))) {
+            for slew in [pace.stop, pace.gentle] {
                 let [from, to] = [from, to].map(Rate::nearest);
-                let (ramps, _) = run(Ramp::even(from), to, slew);
+                let (ramps, _) = run(Ramp::even(from), to, slew, pace);
                 let inside = from.min(to)..=from.max(to);
                 for ramp in &ramps {
                     assert!(inside.contains(&ramp.rate()), "{ramp:?} from {from:?} to {to:?}");
@@ -274,26 +347,31 @@ mod tests {
 
     #[test]
     fn foresees_the_way_to_rest_and_up_to_a_rate_exactly() {
-        let (ramps, way) = run(Ramp::new(), Rate::ONE, Slew::STOP);
-        // The last cycle is at the rate already.
-        assert_eq!(Ramp::starting_distance(Rate::ONE) + StreamTime::of(1), way);
-        for ramp in ramps {
-            let (_, way) = run(ramp, Rate::ZERO, Slew::STOP);
-            assert_eq!(ramp.stopping_distance(), way, "{ramp:?}");
+        for pace in &paces() {
+            let (ramps, way) = run(Ramp::new(), Rate::ONE, pace.stop, pace);
+            // The last cycle is at the rate already.
+            let cycle = StreamTime::in_cycles(1, pace.period());
+            assert_eq!(Ramp::starting_distance(Rate::ONE, pace) + cycle, way);
+            for ramp in ramps {
+                let (_, way) = run(ramp, Rate::ZERO, pace.stop, pace);
+                assert_eq!(ramp.stopping_distance(pace), way, "{ramp:?}");
+            }
         }
     }
 
     #[test]
     fn a_ramp_that_the_limits_bent_finds_its_way_to_rest_too() {
-        for rate in [-1.0, -0.3, 0.0, 1e-6, 0.2, 1.0] {
+        let rates = [-1.0, -0.3, 0.0, 1e-6, 0.2, 1.0];
+        for (pace, rate) in paces().iter().flat_map(|pace| rates.map(|rate| (pace, rate))) {
             for change in [-1.0, -0.37, 0.0, 0.5, 1.0] {
                 for bend in [-2.0, -1.0, 0.0, 0.4, 2.0] {
-                    let change = (Slew::STOP.change as f64 * change) as i64;
-                    let bend = (Slew::STOP.bend as f64 * bend) as i64;
+                    let change = (pace.stop.change as f64 * change) as i64;
+                    let bend = (pace.stop.bend as f64 * bend) as i64;
                     let ramp = Ramp { rate: Rate::nearest(rate).0, change, bend };
-                    let (ramps, way) = run(ramp, Rate::ZERO, Slew::STOP);
-                    assert_eq!(ramp.stopping_distance(), way, "{ramp:?}");
-                    assert!(ramps.len() < 320, "{} cycles from {ramp:?}", ramps.len());
+                    let (ramps, way) = run(ramp, Rate::ZERO, pace.stop, pace);
+                    assert_eq!(ramp.stopping_distance(pace), way, "{ramp:?}");
+                    let took = pace.period().of(ramps.len() as u64);
+                    assert!(took < Nanoseconds(320_000_000), "{took:?} from {ramp:?}");
                 }
             }
         }
@@ -301,7 +379,11 @@ mod tests {
 
     #[test]
     fn an_unhindered_hold_takes_what_the_header_says() {
-        let (ramps, _) = run(Ramp::even(Rate::ONE), Rate::ZERO, Slew::STOP);
-        assert!((131..=134).contains(&ramps.len()), "{} cycles", ramps.len());
+        for pace in &paces() {
+            let (ramps, _) = run(Ramp::even(Rate::ONE), Rate::ZERO, pace.stop, pace);
+            let took = pace.period().of(ramps.len() as u64).seconds();
+            let most = 0.1325 + 2.0 * pace.period().seconds();
+            assert!((0.131..=most).contains(&took), "{took} s, {:?}", pace.period());
+        }
     }
 }

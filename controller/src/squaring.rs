@@ -5,19 +5,18 @@
 
 use crate::feedforward::Planned;
 use machine::Machine;
-use messages::time::CYCLE_TIME;
-use messages::{ActuatorArray, MAX_ACTUATORS};
+use messages::{ActuatorArray, MAX_ACTUATORS, Nanoseconds};
 
 use crate::standing::STANDING_COUNTS;
 
 /// Share of an axis' largest speed that its actuators have at most on the way.
 const SPEED_SHARE: f64 = 0.02;
 
-/// Cycles that the way takes at least.
-const SHORTEST: u32 = 64;
+/// Time that the way takes at least.
+const SHORTEST: Nanoseconds = Nanoseconds(64_000_000);
 
-/// The most cycles, of an axis that hardly moves.
-const LONGEST: u32 = 10_000;
+/// The most time, of an axis that hardly moves.
+const LONGEST: Nanoseconds = Nanoseconds(10_000_000_000);
 
 /// The steepest slope of the quintic that is gone along, over its mean one.
 const STEEPEST: f64 = 1.875;
@@ -29,8 +28,10 @@ pub struct Squaring {
     end: Planned,
     /// From there to where it begins [rad].
     offset: ActuatorArray,
-    cycles: u32,
-    left: u32,
+    cycles: u64,
+    left: u64,
+    /// Time that the way takes [s].
+    duration: f64,
 }
 
 impl Squaring {
@@ -38,7 +39,9 @@ impl Squaring {
     /// they are, to what their encoders can tell.
     pub fn new(machine: &Machine, standing: &Planned) -> Self {
         let mut offset = [0.0; MAX_ACTUATORS];
-        let (mut cycles, mut is_square) = (SHORTEST, true);
+        let period = machine.realtime.period;
+        let most = period.cycles_for(LONGEST) as f64;
+        let (mut cycles, mut is_square) = (period.cycles_for(SHORTEST), true);
         for (axis, actuators) in machine.driven() {
             let own = axis.actuators.clone().zip(actuators);
             let place = |(index, it): (usize, &machine::Actuator)| {
@@ -51,13 +54,14 @@ impl Squaring {
                 offset[index] = off;
                 is_square &= off.abs() <= STANDING_COUNTS * actuator.encoder.resolution();
                 let fastest = SPEED_SHARE * axis.limits.velocity / actuator.ratio.abs();
-                let needed = STEEPEST * off.abs() / (fastest * CYCLE_TIME);
-                cycles = cycles.max(needed.min(f64::from(LONGEST)).ceil() as u32);
+                let needed = STEEPEST * off.abs() / (fastest * period.seconds());
+                cycles = cycles.max(needed.min(most).ceil() as u64);
             }
         }
         let mut end = *standing;
         end.angle.iter_mut().zip(&offset).for_each(|(angle, offset)| *angle -= offset);
-        Self { end, offset, cycles, left: if is_square { 0 } else { cycles } }
+        let duration = period.of(cycles).seconds();
+        Self { end, offset, cycles, left: if is_square { 0 } else { cycles }, duration }
     }
 
     /// Whether the way has been gone.
@@ -68,11 +72,11 @@ impl Squaring {
     /// Goes on by one cycle; where that leads, `None` where there is nowhere to go.
     pub fn advance(&mut self) -> Option<Planned> {
         self.left = self.left.checked_sub(1)?;
-        let at = f64::from(self.left) / f64::from(self.cycles);
+        let at = self.left as f64 / self.cycles as f64;
         // The quintic from 0 to 1 with no speed and no acceleration at either end.
         let share = at * at * at * (10.0 + at * (6.0 * at - 15.0));
         let slope = 30.0 * at * at * (1.0 - at) * (1.0 - at);
-        let rate = -slope / (f64::from(self.cycles) * CYCLE_TIME);
+        let rate = -slope / self.duration;
         let mut planned = self.end;
         for (index, offset) in self.offset.iter().enumerate() {
             planned.angle[index] += offset * share;
@@ -85,6 +89,7 @@ impl Squaring {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use messages::time::SETPOINT_TIME as CYCLE_TIME;
 
     /// The built-in machine with two motors on its second axis, one of them mirrored.
     fn gantry() -> Machine {
@@ -116,7 +121,7 @@ mod tests {
             }
             before = planned;
         }
-        assert!(squaring.is_done() && cycles >= SHORTEST);
+        assert!(squaring.is_done() && cycles >= 64);
         let joints = [before.angle[1] * ratio, before.angle[2] * -ratio];
         assert!(joints.iter().all(|joint| (joint - 0.1001).abs() < 1e-12), "{joints:?}");
         assert_eq!(before.speed, [0.0; MAX_ACTUATORS]);

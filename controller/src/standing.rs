@@ -5,18 +5,18 @@ use core::fmt;
 
 use machine::kinematics::{Joints, Mechanism};
 use machine::{Actuator, Machine, MechanismVisitor};
-use messages::time::CYCLE_TIME;
-use messages::{ActuatorArray, MAX_ACTUATORS};
+use messages::time::Period;
+use messages::{ActuatorArray, MAX_ACTUATORS, Nanoseconds};
 
-/// Encoder counts that an axis at rest may be off, or move in a cycle.
+/// Encoder counts that an axis at rest may be off, or move in a millisecond.
 pub const STANDING_COUNTS: f64 = 1.5;
 
 /// Cycles after a brake has had its time in which it may still open: the power comes a cycle after it is
 /// asked for, and brakes are no clocks.
-const RELEASE_MARGIN: u32 = 2;
+const RELEASE_MARGIN: u64 = 2;
 
-/// Cycles until a place at which the mechanism cannot be is tried again: it takes long to find that out.
-const RETRY: u32 = 100;
+/// Time until a place at which the mechanism cannot be is tried again: it takes long to find that out.
+const RETRY: Nanoseconds = Nanoseconds(100_000_000);
 
 /// The machine at rest, as its file says it is.
 pub struct Standing {
@@ -36,8 +36,9 @@ pub struct Standing {
     most: ActuatorArray,
     counts: ActuatorArray,
     /// Cycles in which the mechanism is not asked.
-    pause: u32,
-    release: u32,
+    pause: u64,
+    retry: u64,
+    release: u64,
 }
 
 /// A motor that is not in its place.
@@ -60,6 +61,7 @@ impl Strayed {
 impl Standing {
     /// Of this machine.
     pub fn new(machine: &Machine) -> Self {
+        let period = machine.realtime.period;
         let [mut most, mut counts, mut unpowered] = [[0.0; MAX_ACTUATORS]; 3];
         for (index, (actuator, axis)) in machine.drives().enumerate().take(MAX_ACTUATORS) {
             most[index] = axis.limits.following_error / actuator.ratio.abs();
@@ -78,7 +80,8 @@ impl Standing {
             most,
             counts,
             pause: 0,
-            release: release(&machine.actuators),
+            retry: period.cycles_for(RETRY),
+            release: release(&machine.actuators, period),
         };
         let mut angle = [0.0; MAX_ACTUATORS];
         for (angle, actuator) in angle.iter_mut().zip(&machine.actuators) {
@@ -97,7 +100,7 @@ impl Standing {
         if self.pause == 0 {
             match self.weight.at(angle) {
                 Some((torque, lever)) => (self.torque, self.lever) = (torque, lever),
-                None => self.pause = RETRY,
+                None => self.pause = self.retry,
             }
         }
         &self.torque
@@ -134,7 +137,7 @@ impl Standing {
     }
 
     /// Cycles after the power for which a brake may hold; 0 of a machine without.
-    pub fn release(&self) -> u32 {
+    pub fn release(&self) -> u64 {
         self.release
     }
 }
@@ -153,11 +156,12 @@ impl fmt::Debug for Standing {
 }
 
 /// Cycles that the slowest brake of `actuators` takes.
-fn release(actuators: &[Actuator]) -> u32 {
+fn release(actuators: &[Actuator], period: Period) -> u64 {
     let brakes =
         actuators.iter().map(|actuator| &actuator.brake).filter(|brake| brake.torque > 0.0);
     let slowest = brakes.map(|brake| brake.release).reduce(f64::max);
-    slowest.map_or(0, |release| (release / CYCLE_TIME).ceil() as u32 + RELEASE_MARGIN)
+    slowest
+        .map_or(0, |release| period.cycles_for(Nanoseconds::from_seconds(release)) + RELEASE_MARGIN)
 }
 
 /// A mechanism of any kind, asked for its weight.

@@ -10,15 +10,15 @@ pub(crate) enum State {
     /// Waiting for the power, then holding until the brakes are open and the axes have stood in their
     /// places for a moment. All in cycles.
     Enabling {
-        waited: u32,
-        held: u32,
-        settled: u32,
+        waited: u64,
+        held: u64,
+        settled: u64,
     },
     /// Enabled, and on the way to where the actuators of each axis are together, for so many cycles, having
     /// stood there for so many.
     Squaring {
-        waited: u32,
-        settled: u32,
+        waited: u64,
+        settled: u64,
     },
     Idle,
     Running,
@@ -27,7 +27,7 @@ pub(crate) enum State {
     /// Coming to rest with a fault latched.
     Failing {
         tracking: Tracking,
-        waited: u32,
+        waited: u64,
     },
     Faulted,
 }
@@ -40,7 +40,7 @@ pub(crate) enum AfterRest {
     /// The stream goes on.
     Resume,
     /// The stream goes on when enough of it has come in.
-    Supply { waited: u32 },
+    Supply { waited: u64 },
 }
 
 impl State {

@@ -4,13 +4,16 @@
 //! stream is at full rate again bit for bit, and "exactly where the gate was closed" is an
 //! equality, not a tolerance.
 
-use messages::time::CYCLE_TIME;
+use messages::time::{Period, SETPOINT_PERIOD, SETPOINT_TIME};
 
 /// Bits after the binary point of a [`StreamTime`].
 pub const FRACTION_BITS: u32 = 30;
 
 /// Counts of one setpoint.
 pub const ONE: i64 = 1 << FRACTION_BITS;
+
+/// Steps of a period in one setpoint.
+pub const SETPOINT_STEPS: i64 = SETPOINT_PERIOD.0 / Period::STEP.0;
 
 /// A point of stream time, or a difference of two, in counts of 2⁻³⁰ setpoints. It spans 99 days.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -20,6 +23,11 @@ impl StreamTime {
     /// The instant of the setpoint with this sequence number.
     pub fn of(sequence: u64) -> Self {
         Self((sequence as i64) << FRACTION_BITS)
+    }
+
+    /// What passes in `cycles` of this period at the planned rate.
+    pub fn in_cycles(cycles: u64, period: Period) -> Self {
+        Self((cycles as i64).saturating_mul(period.steps() * (ONE / SETPOINT_STEPS)))
     }
 
     /// The setpoint at or before this instant; 0 before the first.
@@ -39,7 +47,7 @@ impl StreamTime {
 
     /// In seconds.
     pub fn seconds(self) -> f64 {
-        self.setpoints() * CYCLE_TIME
+        self.setpoints() * SETPOINT_TIME
     }
 }
 

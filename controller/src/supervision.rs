@@ -7,13 +7,13 @@ use crate::ramp::{LARGEST_CHANGE, LARGEST_TURN};
 use crate::standing::STANDING_COUNTS;
 use machine::trip::Limit;
 use machine::trip::following::{CREEP, DISCONTINUITY, LEAD_STEP};
-use machine::{Actuator, Axis, DcMotor, Machine, StallTolerance};
+use machine::{Actuator, Axis, DcMotor, Machine, Timing};
 use messages::feedback::status;
 use messages::setpoint::flags;
-use messages::time::CYCLE_TIME;
+use messages::time::{SETPOINT_PERIOD, SETPOINT_TIME};
 use messages::{
     ActuatorArray, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_ACTUATORS, MAX_AXES,
-    Setpoint,
+    Nanoseconds, Setpoint,
 };
 
 /// Whether the axes can still be trusted to follow the plan.
@@ -61,17 +61,24 @@ impl Elapsed {
     pub const ONE: Self = Self { cycles: 1, missed: 0 };
 }
 
+/// Time in which a motor that stands moves by no more than [`STANDING_COUNTS`].
+const STANDING_TIME: Nanoseconds = Nanoseconds(1_000_000);
+
 /// The watch over feedback and motors.
 #[derive(Debug, Clone)]
 pub struct Supervision {
     axes: Vec<Axis>,
     actuators: Vec<Actuator>,
-    tolerance: StallTolerance,
+    timing: Timing,
     seen: Option<Seen>,
     /// Cycles since the last that was in time.
     late: u64,
     heating: ActuatorArray,
-    standing: u32,
+    standing: u64,
+    /// How far each motor has moved in the window of time in which it is watched [rad].
+    way: ActuatorArray,
+    /// How old that window is, in cycles; 0 where the next cycle begins one.
+    watched: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -88,7 +95,9 @@ impl Supervision {
         Self {
             axes: machine.axes.clone(),
             actuators: machine.actuators.clone(),
-            tolerance: machine.stall,
+            timing: machine.realtime,
+            way: [0.0; MAX_ACTUATORS],
+            watched: 0,
             seen: None,
             late: 0,
             heating: [0.0; MAX_ACTUATORS],
@@ -101,8 +110,8 @@ impl Supervision {
         self.late = 0;
     }
 
-    /// Cycles in a row in which no motor moved by more than an encoder count or so.
-    pub fn standing(&self) -> u32 {
+    /// Cycles in a row in which no motor was found to move.
+    pub fn standing(&self) -> u64 {
         self.standing
     }
 
@@ -119,16 +128,16 @@ impl Supervision {
             missed: feedback.missed,
         };
         let before = self.seen.replace(seen);
-        self.watch_standing(feedback);
         let same_run = before.filter(|before| before.epoch == seen.epoch);
         let gap = same_run.map_or(1, |before| seen.cycle.0.saturating_sub(before.cycle.0));
+        self.watch_standing(feedback, gap);
         self.heat(feedback, gap);
         if let Some((index, value)) = not_finite(feedback, self.actuators.len()) {
             let fault = Fault::new(FaultCode::NotFinite).on_actuator(index);
             return Err(Finding::lost(fault.with(FaultQuantity::Number, value)));
         }
         let Some(before) = before else { return Ok(Elapsed::ONE) };
-        let most = self.tolerance.feedback_gap();
+        let most = self.timing.feedback_gap();
         if before.epoch != seen.epoch || gap == 0 || gap > most {
             let (value, limit) = (gap as f64, most as f64);
             let fault = Fault::new(FaultCode::StaleFeedback);
@@ -136,8 +145,9 @@ impl Supervision {
         }
         let overran = seen.overruns > before.overruns && !feedback.has(status::SLIPPING);
         self.late = if overran { self.late + gap } else { 0 };
-        if self.late > self.tolerance.cycles() {
-            let (value, limit) = (self.late as f64, self.tolerance.cycles() as f64);
+        let tolerated = self.timing.stalled_cycles();
+        if self.late > tolerated {
+            let (value, limit) = (self.late as f64, tolerated as f64);
             let fault = Fault::new(FaultCode::Overrun);
             return Err(Finding::sound(fault.beyond(FaultQuantity::Overruns, value, limit)));
         }
@@ -255,7 +265,7 @@ impl Supervision {
         if let Some(value) = of_the_tool.find(|value| !value.is_finite()) {
             return Err(Finding::sound(not_finite.with(FaultQuantity::Number, *value)));
         }
-        if !setpoint.laser.is_valid() {
+        if !setpoint.laser.is_valid(SETPOINT_PERIOD) {
             return Err(Finding::sound(impossible_light(setpoint)));
         }
         for (index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
@@ -338,8 +348,8 @@ impl Supervision {
             let rests = ends || starts;
             let speeds = before.velocity[index] + setpoint.velocity[index];
             let moved = setpoint.position[index] - before.position[index];
-            let jump = if starts { 0.0 } else { moved - speeds / 2.0 * CYCLE_TIME };
-            let creep = if rests { setpoint.velocity[index] * CYCLE_TIME } else { 0.0 };
+            let jump = if starts { 0.0 } else { moved - speeds / 2.0 * SETPOINT_TIME };
+            let creep = if rests { setpoint.velocity[index] * SETPOINT_TIME } else { 0.0 };
             let steps = [
                 (FaultQuantity::Jump, jump, DISCONTINUITY * unit),
                 (FaultQuantity::Creep, creep, CREEP * unit),
@@ -380,7 +390,7 @@ impl Supervision {
     /// Warms the windings by the current measured for `cycles`, or lets them cool: powered or not,
     /// or they would stay warm for as long as a fault lasts.
     fn heat(&mut self, feedback: &Feedback, cycles: u64) {
-        let time = (cycles as f64 * CYCLE_TIME).min(DcMotor::HEATING_TIME);
+        let time = self.timing.period.of(cycles).seconds().min(DcMotor::HEATING_TIME);
         for (heating, current) in self.heating.iter_mut().zip(&feedback.current) {
             if current.is_finite() {
                 *heating = DcMotor::heated(*heating, *current, time, DcMotor::HEATING_TIME);
@@ -388,21 +398,35 @@ impl Supervision {
         }
     }
 
-    /// The first actuator that moves by more than an encoder count or so in a cycle, with its speed and what
-    /// counts as standing [joint units/s].
-    pub fn moving(&self, feedback: &Feedback) -> Option<(usize, f64, f64)> {
-        let mut drives = self.actuators.iter().zip(&feedback.velocity).enumerate();
-        drives.find_map(|(index, (actuator, speed))| {
+    /// The first actuator that has moved by more than an encoder count or so within [`STANDING_TIME`] or a
+    /// cycle, with its speed and what counts as standing [joint units/s].
+    pub fn moving(&self) -> Option<(usize, f64, f64)> {
+        let time = self.timing.period.seconds();
+        let window = time.max(STANDING_TIME.seconds());
+        let mut drives = self.actuators.iter().zip(&self.way).enumerate();
+        drives.find_map(|(index, (actuator, way))| {
             let limit = STANDING_COUNTS * actuator.encoder.resolution();
-            let stands = speed.abs() * CYCLE_TIME <= limit;
+            let stands = way.abs() <= limit;
             let ratio = actuator.ratio.abs();
-            (!stands).then(|| (index, speed.abs() * ratio, limit / CYCLE_TIME * ratio))
+            (!stands).then(|| (index, way.abs() / window * ratio, limit / window * ratio))
         })
     }
 
-    fn watch_standing(&mut self, feedback: &Feedback) {
-        let stands = self.moving(feedback).is_none();
+    /// Follows how far the motors are from where they were at the start of the window of time at hand: a
+    /// window, because a motor that creeps moves a count in few of the cycles of a short period.
+    fn watch_standing(&mut self, feedback: &Feedback, cycles: u64) {
+        let time = self.timing.period.seconds();
+        let speeds = &feedback.velocity;
+        for (way, speed) in self.way.iter_mut().zip(speeds) {
+            // As far as a cycle's mean speed goes: what was skipped is no longer than that.
+            *way = if self.watched == 0 { 0.0 } else { *way } + speed * time;
+        }
+        let stands = self.moving().is_none();
         self.standing = if stands { self.standing.saturating_add(1) } else { 0 };
+        self.watched += cycles;
+        if !stands || self.watched >= self.timing.period.cycles_for(STANDING_TIME) {
+            self.watched = 0;
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use machine::DcMotor;
 use messages::math;
-use messages::time::CYCLE_TIME;
+use messages::time::Period;
 
 /// The current that the feedforward voltage alone drives through one winding.
 ///
@@ -24,20 +24,21 @@ pub(crate) struct Winding {
 }
 
 impl Winding {
-    /// Of this motor, without current.
-    pub(crate) fn new(motor: &DcMotor) -> Self {
+    /// Of this motor in cycles of this `period`, without current.
+    pub(crate) fn new(motor: &DcMotor, period: Period) -> Self {
+        let cycle_time = period.seconds();
         let DcMotor { resistance, inductance, torque_constant, .. } = *motor;
         let time = inductance / resistance;
-        let keep = math::exp(-CYCLE_TIME / time);
+        let keep = math::exp(-cycle_time / time);
         // L·i′ + R·i = v − k·ω with ω = ω̄ + Δω·(t − T/2)/T, solved over one cycle.
         let tilt =
-            CYCLE_TIME / 2.0 * time * (1.0 - keep) - time * (time - keep * (time + CYCLE_TIME));
+            cycle_time / 2.0 * time * (1.0 - keep) - time * (time - keep * (time + cycle_time));
         Self {
             now: 0.0,
             next: 0.0,
             keep,
             per_volt: (1.0 - keep) / resistance,
-            per_change: -torque_constant * tilt / (inductance * CYCLE_TIME),
+            per_change: -torque_constant * tilt / (inductance * cycle_time),
             torque_constant,
         }
     }
@@ -73,14 +74,14 @@ mod tests {
     fn the_winding_is_the_exact_answer_to_an_even_voltage_and_a_tilted_speed() {
         let machine = Machine::builtin();
         let motor = machine.actuators[0].motor.dc().unwrap();
-        let mut winding = Winding::new(motor);
+        let mut winding = Winding::new(motor, Period::OF_SETPOINTS);
         let (mut current, mut speed) = (0.0, 0.0);
         for cycle in 0..50 {
             let (voltage, change) = (f64::from(cycle % 7) - 2.0, f64::from(cycle % 5) * 4.0 - 7.0);
             winding.advance(voltage, speed + change / 2.0, change);
             // Midpoint rule with 0.1 µs: its error is below 1e-8 of the current.
             let steps = 10_000;
-            let step = CYCLE_TIME / f64::from(steps);
+            let step = Period::OF_SETPOINTS.seconds() / f64::from(steps);
             for index in 0..steps {
                 let slope = |current: f64, share: f64| {
                     motor.current_rate(voltage, current, speed + change * share)

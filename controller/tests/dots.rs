@@ -60,7 +60,7 @@ fn finish(bench: &mut Bench, job: &Job, case: &str) {
 
 /// The lengths of stalls that are tried: up to the longest that is tolerated.
 fn stalls(machine: &Machine) -> [u64; 4] {
-    [1, 2, 4, machine.stall.cycles() - 1]
+    [1, 2, 4, machine.realtime.stalled_cycles() - 1]
 }
 
 #[test]

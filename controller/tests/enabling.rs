@@ -9,7 +9,7 @@ use controller::{Controller, Inputs, Outputs, Peers};
 use machine::{HoldingBrake, Machine};
 use messages::feedback::status;
 use messages::math;
-use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use messages::time::{SETPOINT_PERIOD as CYCLE_PERIOD, SETPOINT_TIME as CYCLE_TIME};
 use messages::{
     ActuatorArray, Command, CommandMode, ControllerState, FaultCode, FaultQuantity, Feedback,
     MAX_ACTUATORS, OperatorRequest, OperatorVerb,

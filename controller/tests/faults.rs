@@ -67,7 +67,7 @@ fn a_feedback_that_cannot_be_trusted_brakes_the_drives() {
     let quick = CommandMode::QuickStop;
     check(FaultCode::NotFinite, 2, quick, |feedback| feedback.position[1] = f64::NAN);
     check(FaultCode::NotFinite, 1, quick, |feedback| feedback.current[0] = f64::INFINITY);
-    let most = Machine::builtin().stall.feedback_gap();
+    let most = Machine::builtin().realtime.feedback_gap();
     check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.cycle.0 += most);
     check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.cycle.0 -= 1);
     check(FaultCode::StaleFeedback, 0, quick, |feedback| feedback.epoch += 1);

@@ -125,7 +125,7 @@ fn play(machine: &Machine, job: &Job, doubts: u64, random: &mut SplitMix64) -> (
         seen[command.state as usize] += 1;
         let targets = [command.position, command.velocity, command.effort, command.voltage];
         assert!(targets.iter().flatten().all(|target| target.is_finite()), "{targets:?}");
-        assert!(command.laser.is_valid(), "{:?}", command.laser);
+        assert!(command.laser.is_valid(messages::time::SETPOINT_PERIOD), "{:?}", command.laser);
         if !command.laser.is_lit() {
             continue;
         }
@@ -154,7 +154,8 @@ fn presence(lost: bool) -> Presence {
 #[test]
 fn whatever_comes_in_no_step_panics_and_no_light_is_given_that_is_not_due() {
     let mut builtin = Machine::builtin();
-    builtin.stall = StallTolerance::new(Nanoseconds::of_cycles(12)).unwrap();
+    let period = builtin.realtime.period;
+    builtin.realtime.stall = StallTolerance::new(period.of(12), period).unwrap();
     let mut steppers = load("cartesian_steppers.toml");
     steppers.laser.min_power = 0.2;
     let (mut lit, mut seen) = (0, [0; 7]);

@@ -34,7 +34,7 @@ fn finish(bench: &mut Bench, job: &Job, case: &str) {
 #[test]
 fn a_tolerated_stall_at_any_phase_loses_no_mark_and_doubles_none() {
     let machine = Machine::builtin();
-    let tolerated = machine.stall.cycles();
+    let tolerated = machine.realtime.stalled_cycles();
     let job = two_marks(&machine, 0.25, 0.5);
     let (on, off) = job.lit[0];
     // Before the motion, in the run-in, at both ends of the mark and inside it, between the marks.
@@ -73,7 +73,7 @@ fn stalls_again_and_again_at_any_time_lose_nothing() {
                 assert!(bench.ask(Some(&job), OperatorVerb::Hold, 0.0));
                 bench.run(Some(&job), below(300) as usize);
             }
-            bench.stall(below(machine.stall.cycles()));
+            bench.stall(below(machine.realtime.stalled_cycles()));
             if held {
                 bench.run(Some(&job), 300);
                 assert!(bench.ask(Some(&job), OperatorVerb::Resume, 0.0));
@@ -108,7 +108,7 @@ fn standing_axes_bear_a_stall_unmoved() {
     let machine = Machine::builtin();
     let mut bench = Bench::enabled(&machine);
     for _ in 0..20 {
-        bench.stall(machine.stall.cycles() - 1);
+        bench.stall(machine.realtime.stalled_cycles() - 1);
         bench.run(None, 5);
         assert_eq!(bench.state(), ControllerState::Idle);
     }

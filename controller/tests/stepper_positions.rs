@@ -11,10 +11,10 @@ use controller::{Controller, Inputs, Outputs, Peers};
 use machine::Machine;
 use messages::feedback::status;
 use messages::setpoint::flags;
-use messages::time::CYCLE_PERIOD;
+use messages::time::{Period, SETPOINT_PERIOD as CYCLE_PERIOD};
 use messages::{
-    ActuatorArray, CommandMode, ControllerState, Feedback, MAX_ACTUATORS, Nanoseconds,
-    OperatorRequest, OperatorVerb, Setpoint,
+    ActuatorArray, CommandMode, ControllerState, Feedback, MAX_ACTUATORS, OperatorRequest,
+    OperatorVerb, Setpoint,
 };
 use support::Move;
 
@@ -192,7 +192,7 @@ impl Drivers {
         self.feedback.cycle.0 += cycles;
         self.feedback.skipped = u16::try_from(cycles).unwrap();
         self.feedback.missed += cycles + 1;
-        self.feedback.deadline = self.feedback.deadline + Nanoseconds::of_cycles(cycles);
+        self.feedback.deadline = self.feedback.deadline + Period::OF_SETPOINTS.of(cycles);
     }
 
     /// Until a hold has come to rest.

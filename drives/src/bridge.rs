@@ -20,8 +20,7 @@
 //!   time: the deadline of cycle `n` stays `start + n × period`.
 //! - *Stall*: a time in which the cycle stood still; see [`messages::Stalls`].
 
-use machine::{Machine, StallTolerance};
-use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use machine::{Machine, Timing};
 use messages::{
     ActuatorArray, Command, CommandMode, Cycle, DrivesReport, Fault, FaultCode, Feedback,
     MAX_ACTUATORS, Nanoseconds, RealtimeFacts, StallCause, feedback::status,
@@ -32,9 +31,9 @@ use crate::stalls::{Stall, StallAccount};
 pub use crate::watchdog::GatePermission;
 use crate::watchdog::{Watch, Watchdog};
 
-/// Cycles without a single encoder count after which an axis counts as at rest: at one count
+/// Time without a single encoder count after which an axis counts as at rest: at one count
 /// (1/4096 of a turn) in 20 ms it would turn with less than 0.08 rad/s.
-const REST_CYCLES: u32 = 20;
+const REST: Nanoseconds = Nanoseconds(20_000_000);
 
 /// Whether the clock waits for a controller that is late but alive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -53,8 +52,8 @@ pub struct BridgeOptions {
     pub epoch: u64,
     /// Whether its clock may slip.
     pub deadlines: Deadlines,
-    /// How long the axes may go on without a fresh command.
-    pub stall: StallTolerance,
+    /// The period of the cycle, and how long the axes may go on without a fresh command.
+    pub timing: Timing,
 }
 
 /// A command that waits for its deadline.
@@ -101,7 +100,8 @@ pub struct Bridge {
     measurement: Measurement,
     feedback: Feedback,
     slips: u64,
-    resting: u32,
+    /// Cycles without a single encoder count.
+    resting: u64,
     lack: Option<Lack>,
     stalls: StallAccount,
     unexplained: Option<(u64, Stall)>,
@@ -125,7 +125,7 @@ impl Bridge {
         Self {
             port,
             options,
-            watchdog: Watchdog::new(actuators, options.stall),
+            watchdog: Watchdog::new(actuators, options.timing),
             permission: GatePermission::Granted,
             phase: Phase::Unstarted,
             latched: None,
@@ -245,7 +245,7 @@ impl Bridge {
             return;
         }
         self.phase = Phase::Done;
-        if now > self.feedback.deadline + CYCLE_PERIOD {
+        if now > self.feedback.deadline + self.options.timing.period.time() {
             self.phase = Phase::Overrun;
             self.feedback.overruns += 1;
         }
@@ -278,7 +278,7 @@ impl Bridge {
     }
 
     fn at_rest(&self) -> bool {
-        self.resting >= REST_CYCLES
+        self.resting >= self.options.timing.period.cycles_for(REST)
     }
 
     /// The stall that has ended in the newest begin, or stopped the axes there, to be explained by
@@ -295,7 +295,8 @@ impl Bridge {
     /// A deadline later than one period after the last means that the clock slipped, or on strict
     /// deadlines that cycles were skipped. Counts either; returns how many were skipped.
     fn count_late(&mut self, now: Nanoseconds, deadline: Nanoseconds) -> u64 {
-        let due = self.feedback.deadline + CYCLE_PERIOD;
+        let period = self.options.timing.period;
+        let due = self.feedback.deadline + period.time();
         let late = deadline - due;
         if self.phase == Phase::Unstarted || late.0 <= 0 {
             return 0;
@@ -304,7 +305,7 @@ impl Bridge {
         let (overruns, skipped) = match self.options.deadlines {
             Deadlines::Slipping => {
                 self.slips += 1;
-                if late >= CYCLE_PERIOD {
+                if late >= period.time() {
                     let published = self.latched.as_ref().map_or(now, |it| it.command.published);
                     let otherwise = if published < due { 0 } else { LATE_ANSWER };
                     let cycle = self.cycle_after(0);
@@ -312,10 +313,7 @@ impl Bridge {
                 }
                 (1, 0)
             }
-            Deadlines::Strict => {
-                let period = CYCLE_PERIOD.0.unsigned_abs();
-                (late.0.unsigned_abs().div_ceil(period), late.cycles())
-            }
+            Deadlines::Strict => (period.cycles_for(late), period.cycles_in(late)),
         };
         self.feedback.overruns += overruns.saturating_sub(counted);
         skipped
@@ -342,7 +340,7 @@ impl Bridge {
         }
         let misses = self.watchdog.misses();
         if misses > 0 {
-            let began = deadline - Nanoseconds::of_cycles(skipped);
+            let began = deadline - self.options.timing.period.of(skipped);
             let lack = Lack { cycle: self.cycle_after(0), began, otherwise: LATE_ANSWER };
             let lack = self.lack.get_or_insert(lack);
             if skipped > 0 {
@@ -351,7 +349,8 @@ impl Bridge {
         }
         let stopped = self.watchdog.watch() == Watch::Stopped;
         if misses == 0 || stopped {
-            let length = Nanoseconds::of_cycles(if misses == 0 { before.1 } else { misses });
+            let cycles = if misses == 0 { before.1 } else { misses };
+            let length = self.options.timing.period.of(cycles);
             if let Some(Lack { cycle, began, otherwise }) = self.lack.take() {
                 self.note(Stall { cycle, began, length, otherwise });
             }
@@ -393,13 +392,14 @@ impl Bridge {
     /// that lies `skipped` cycles further back than usual.
     fn describe(&mut self, first: bool, skipped: u64) {
         let measured = &self.measurement;
+        let cycle_time = self.options.timing.period.seconds();
         let actuators = self.port.profile().actuators.len().min(MAX_ACTUATORS);
         let mut velocity: ActuatorArray = [0.0; MAX_ACTUATORS];
         let moved = measured.counts != self.feedback.counts;
         if !first {
             let pairs = measured.position.iter().zip(&self.feedback.position);
             for (velocity, (now, before)) in velocity.iter_mut().zip(pairs).take(actuators) {
-                *velocity = (now - before) / (CYCLE_TIME * (1.0 + skipped as f64));
+                *velocity = (now - before) / (cycle_time * (1.0 + skipped as f64));
             }
         }
         self.resting = if first || moved { 0 } else { self.resting.saturating_add(1) };

@@ -46,7 +46,7 @@ use machine::{
     Actuator, ActuatorMode, Axis, LaserSource, Machine, Mechanism, MechanismVisitor, Motor,
 };
 use messages::random::SplitMix64;
-use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use messages::time::Period;
 use messages::{
     ActuatorArray, CommandMode, Fault, FaultCode, FaultQuantity, GateEdge, LaserCycle,
     MAX_ACTUATORS, Nanoseconds,
@@ -71,8 +71,8 @@ use winding::Weights;
 /// reaches 2.78 along the negative real axis and 2.6 in the worst direction of the left half.
 const STABLE_PRODUCT: f64 = 2.5;
 
-/// Substeps in a cycle beyond which a transmission should be declared rigid.
-const MOST_SUBSTEPS: f64 = 1000.0;
+/// Substeps in a second beyond which a transmission should be declared rigid: 1000 in a millisecond.
+const MOST_SUBSTEPS: f64 = 1e6;
 
 /// How the plant is simulated; what it is stands in the machine file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,8 +126,8 @@ pub enum PlantError {
     Substep(f64),
     /// The transmission needs a finer substep than can be afforded.
     #[error(
-        "the transmission's fastest motion has a rate of {rate} 1/s, which needs more than \
-         {MOST_SUBSTEPS} substeps in a cycle: leave its stiffness out to make it rigid"
+        "the transmission's fastest motion has a rate of {rate} 1/s, which needs more than 1000 \
+         substeps in a millisecond: leave its stiffness out to make it rigid"
     )]
     TooStiff {
         /// Bound of the fastest eigenvalue [1/s].
@@ -136,8 +136,8 @@ pub enum PlantError {
     /// Windings and rotors need a finer substep than can be afforded.
     #[error(
         "a winding and its rotor turn each other at a rate of {rate} 1/s, by `torque_constant` against \
-         `inductance`, `resistance` and `rotor_inertia`, which needs more than {MOST_SUBSTEPS} substeps in a \
-         cycle: one of them is not of a motor"
+         `inductance`, `resistance` and `rotor_inertia`, which needs more than 1000 substeps in a \
+         millisecond: one of them is not of a motor"
     )]
     TooQuick {
         /// Bound of their rate [1/s].
@@ -172,14 +172,17 @@ impl MechanismVisitor for Build<'_> {
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
         let Build { machine, options } = self;
         let home = &machine.home_joints;
-        let Machine { axes, actuators, laser, .. } = machine;
+        let Machine { axes, actuators, laser, realtime, .. } = machine;
+        let period = realtime.period;
         // One size for all machines with several motors on an axis, so that no more has to be compiled.
         if actuators.len() == axes.len() {
-            let plant = Plant::<N, M>::new(mechanism, axes, actuators, laser, home, options)?;
+            let plant =
+                Plant::<N, M>::new(mechanism, axes, actuators, laser, home, period, options)?;
             return Ok(Box::new(plant));
         }
-        let plant =
-            Plant::<N, M, MAX_ACTUATORS>::new(mechanism, axes, actuators, laser, home, options)?;
+        let plant = Plant::<N, M, MAX_ACTUATORS>::new(
+            mechanism, axes, actuators, laser, home, period, options,
+        )?;
         Ok(Box::new(plant))
     }
 }
@@ -187,6 +190,7 @@ impl MechanismVisitor for Build<'_> {
 /// A plant with its mechanism known, and room for `A` motors: as many as axes, or [`MAX_ACTUATORS`].
 #[derive(Debug, Clone)]
 pub struct Plant<const N: usize, M: Mechanism<N>, const A: usize = N> {
+    period: Period,
     dynamics: Dynamics<N, M, A>,
     brake: Brake<A>,
     /// How many motors there are.
@@ -220,7 +224,8 @@ pub struct Plant<const N: usize, M: Mechanism<N>, const A: usize = N> {
 }
 
 impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
-    /// A plant of `mechanism`, at rest with its joints at `home` [m or rad], unpowered and dark.
+    /// A plant of `mechanism`, at rest with its joints at `home` [m or rad], unpowered and dark, which moves
+    /// on by cycles of `period`.
     ///
     /// # Errors
     /// If it cannot be simulated.
@@ -230,6 +235,7 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
         actuators: &[Actuator],
         laser: &LaserSource,
         home: &[f64],
+        period: Period,
         options: PlantOptions,
     ) -> Result<Self, PlantError> {
         let PlantOptions { substep, current_resolution, seed } = options;
@@ -264,11 +270,11 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
                 equilibrium::field_ahead(actuator, gravity[axis]).map_err(PlantError::Hold)?;
             origin[row] = angle[row] + field / ratio;
         }
-        let stepping = Stepping::of(axes, actuators, origin);
+        let stepping = Stepping::of(axes, actuators, origin, period.seconds());
         let field = stepping.as_ref().map(|stepping| stepping.field(angle));
         let dynamics = Dynamics::new(mechanism, motors, chain)?.with_field(field);
 
-        let substeps = substeps(&dynamics, substep)?;
+        let substeps = substeps(&dynamics, substep, period.seconds())?;
         let state = State {
             current: SVector::zeros(),
             angle,
@@ -277,11 +283,12 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             load_speed: SVector::zeros(),
         };
         Ok(Self {
+            period,
             brake: Brake::of(axes, actuators),
             servos: core::array::from_fn(|row| actuators.get(row).and_then(Servo::of)),
             motors: actuators.len(),
-            source: Source::new(laser),
-            weights: motors.windings.weights(CYCLE_TIME / f64::from(substeps)),
+            source: Source::new(laser, period),
+            weights: motors.windings.weights(period.seconds() / f64::from(substeps)),
             substeps,
             current_resolution,
             resolution: SVector::from_fn(|row, _| {
@@ -326,7 +333,8 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             CommandMode::Disabled => None,
             _ => Some(self.powered_cycles.map_or(0, |cycles| cycles.saturating_add(1))),
         };
-        self.dynamics.power(self.powered_cycles.map(|cycles| f64::from(cycles) * CYCLE_TIME));
+        let cycle_time = self.period.seconds();
+        self.dynamics.power(self.powered_cycles.map(|cycles| f64::from(cycles) * cycle_time));
         let motors = *self.dynamics.motors();
         let step = self.weights.step;
         for index in 0..self.substeps {
@@ -456,7 +464,7 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
                 return Some(fault.with(FaultQuantity::Number, *value));
             }
         }
-        (!actuation.laser.is_valid()).then(|| impossible_light(&actuation.laser))
+        (!actuation.laser.is_valid(self.period.time())).then(|| impossible_light(&actuation.laser))
     }
 
     /// Reports `fault` unless there is an earlier one.
@@ -467,17 +475,19 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
     }
 }
 
-/// Substeps in a cycle, none of them longer than `longest` [s], that all of `dynamics` is stable in.
+/// Substeps in a cycle of `cycle_time` [s], none of them longer than `longest` [s], that all of `dynamics`
+/// is stable in.
 ///
 /// # Errors
 /// More than can be afforded.
 fn substeps<const N: usize, M: Mechanism<N>, const A: usize>(
     dynamics: &Dynamics<N, M, A>,
     longest: f64,
+    cycle_time: f64,
 ) -> Result<u32, PlantError> {
     let (mechanical, electrical) = (dynamics.fastest(), dynamics.electrical());
-    let stable = (mechanical + electrical) * CYCLE_TIME / STABLE_PRODUCT;
-    let substeps = (CYCLE_TIME / longest - 1e-9).max(stable).ceil();
+    let stable = (mechanical + electrical) / STABLE_PRODUCT;
+    let substeps = (cycle_time / longest - 1e-9).max(stable * cycle_time).ceil();
     if stable <= MOST_SUBSTEPS {
         Ok(substeps as u32)
     } else if electrical > mechanical {
@@ -527,7 +537,9 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
 
     /// Adds the light of a cycle to what the laser did since the last exchange.
     fn tell(&mut self, light: &LaserCycle) -> Result<(), source::TooManyEdges> {
-        let start = self.passed_cycles.saturating_mul(CYCLE_PERIOD.0 as u32);
+        let start = self
+            .passed_cycles
+            .saturating_mul(u32::try_from(self.period.time().0).unwrap_or(u32::MAX));
         if self.passed_cycles == 0 {
             self.light = *light;
             return Ok(());

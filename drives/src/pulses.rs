@@ -7,11 +7,13 @@
 
 use machine::pulses::{crossings, nearest};
 use messages::Nanoseconds;
-use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use messages::time::NANOSECONDS_PER_SECOND;
 
 /// A commanded angle through one cycle.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
+    /// Time of the cycle [s].
+    pub time: f64,
     /// Angle at its start [rad].
     pub from: f64,
     /// Speed at its start [rad/s].
@@ -46,20 +48,26 @@ pub fn count(per_radian: f64, angle: f64) -> i64 {
 }
 
 impl Segment {
-    /// At rest at `angle` [rad].
-    pub fn rest(angle: f64) -> Self {
-        Self { from: angle, to: angle, ..Self::default() }
+    /// At rest at `angle` [rad], for a cycle of `time` [s].
+    pub fn rest(angle: f64, time: f64) -> Self {
+        Self { time, from: angle, from_speed: 0.0, to: angle, to_speed: 0.0 }
     }
 
     /// What comes after this one at an even speed.
     pub fn coast(&self) -> Self {
         let speed = self.to_speed;
-        self.then(self.to + speed * CYCLE_TIME, speed)
+        self.then(self.to + speed * self.time, speed)
     }
 
     /// What comes after this one, to `angle` [rad] and `speed` [rad/s] at its end.
     pub fn then(&self, angle: f64, speed: f64) -> Self {
-        Self { from: self.to, from_speed: self.to_speed, to: angle, to_speed: speed }
+        Self {
+            time: self.time,
+            from: self.to,
+            from_speed: self.to_speed,
+            to: angle,
+            to_speed: speed,
+        }
     }
 
     /// What comes after this one, slowing down by `deceleration` [rad/s²] or to rest.
@@ -68,10 +76,10 @@ impl Segment {
         if speed == 0.0 {
             return self.then(self.to, 0.0);
         }
-        let left = speed.abs() - deceleration * CYCLE_TIME;
+        let left = speed.abs() - deceleration * self.time;
         if left > 0.0 {
             let end = left * speed.signum();
-            return self.then(self.to + 0.5 * (speed + end) * CYCLE_TIME, end);
+            return self.then(self.to + 0.5 * (speed + end) * self.time, end);
         }
         self.then(self.to + 0.5 * speed * speed.abs() / deceleration, 0.0)
     }
@@ -79,7 +87,7 @@ impl Segment {
     /// Angle [rad] and speed [rad/s] at the share `at` of the cycle; exactly its ends at 0 and 1.
     pub fn at(&self, at: f64) -> (f64, f64) {
         let (slope, square, cube) = self.coefficients();
-        let speed = (slope + at * (2.0 * square + at * 3.0 * cube)) / CYCLE_TIME;
+        let speed = (slope + at * (2.0 * square + at * 3.0 * cube)) / self.time;
         let angle = match at {
             1.0 => self.to,
             _ => self.from + at * (slope + at * (square + at * cube)),
@@ -120,12 +128,13 @@ impl Segment {
     ///
     /// They take the count from that of [`Segment::from`] to that of [`Segment::to`].
     pub fn pulses(&self, per_radian: f64, mut each: impl FnMut(Pulse)) {
-        let rate = per_radian * CYCLE_TIME;
+        let rate = per_radian * self.time;
+        let nanoseconds = (self.time * NANOSECONDS_PER_SECOND).round();
         let (from, to) = (per_radian * self.from, per_radian * self.to);
         let mut reached = nearest(from);
         for crossing in crossings(from, to, rate * self.from_speed, rate * self.to_speed) {
             let direction = if crossing.count > reached { Direction::Up } else { Direction::Down };
-            let offset = (crossing.share * CYCLE_PERIOD.0 as f64).round() as i64;
+            let offset = (crossing.share * nanoseconds).round() as i64;
             each(Pulse { offset: Nanoseconds(offset), direction });
             reached = crossing.count;
         }
@@ -134,7 +143,7 @@ impl Segment {
     /// Slope, square and cube of the angle in the share of the cycle.
     fn coefficients(&self) -> (f64, f64, f64) {
         let rise = self.to - self.from;
-        let (slope, last) = (self.from_speed * CYCLE_TIME, self.to_speed * CYCLE_TIME);
+        let (slope, last) = (self.from_speed * self.time, self.to_speed * self.time);
         (slope, 3.0 * rise - 2.0 * slope - last, slope + last - 2.0 * rise)
     }
 }
@@ -142,6 +151,7 @@ impl Segment {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use messages::time::SETPOINT_TIME as CYCLE_TIME;
 
     const PER_RADIAN: f64 = 3200.0 / core::f64::consts::TAU;
 
@@ -159,8 +169,13 @@ mod tests {
     fn an_even_speed_gives_even_pulses_at_the_half_integers() {
         // 10 pulses in a cycle, from 0: they fall at 0.05, 0.15, … of it.
         let speed = 10.0 / PER_RADIAN / CYCLE_TIME;
-        let segment =
-            Segment { from: 0.0, from_speed: speed, to: 10.0 / PER_RADIAN, to_speed: speed };
+        let segment = Segment {
+            time: CYCLE_TIME,
+            from: 0.0,
+            from_speed: speed,
+            to: 10.0 / PER_RADIAN,
+            to_speed: speed,
+        };
         let offsets: Vec<i64> = all(&segment).iter().map(|pulse| pulse.offset.0).collect();
         let expected: Vec<i64> = (0..10).map(|index| 50_000 + 100_000 * index).collect();
         assert_eq!(offsets, expected);
@@ -172,6 +187,7 @@ mod tests {
         // From rest to 32 pulses a cycle: θ = 16·s² pulses, so pulse n at √((n − ½)/16).
         let unit = 1.0 / PER_RADIAN;
         let segment = Segment {
+            time: CYCLE_TIME,
             from: 0.0,
             from_speed: 0.0,
             to: 16.0 * unit,
@@ -191,7 +207,8 @@ mod tests {
         // 3.2 pulses up and back: θ = 12.8·s·(1 − s).
         let unit = 1.0 / PER_RADIAN;
         let speed = 12.8 * unit / CYCLE_TIME;
-        let segment = Segment { from: 0.0, from_speed: speed, to: 0.0, to_speed: -speed };
+        let segment =
+            Segment { time: CYCLE_TIME, from: 0.0, from_speed: speed, to: 0.0, to_speed: -speed };
         let pulses = all(&segment);
         let directions: Vec<_> = pulses.iter().map(|pulse| pulse.direction).collect();
         assert_eq!(directions, [[Direction::Up; 3], [Direction::Down; 3]].concat());
@@ -210,6 +227,7 @@ mod tests {
         {
             let from = 1e6 + 0.3;
             let segment = Segment {
+                time: CYCLE_TIME,
                 from: from * unit,
                 from_speed: speed(from_speed),
                 to: (from + rise) * unit,
@@ -229,14 +247,14 @@ mod tests {
                 assert!((found - mean).abs() < 2e-2, "{rise} {index}: {found} {mean}");
             }
         }
-        assert_eq!(Segment::rest(0.0).mean_count(PER_RADIAN, 0.0, 0.05), 0.0);
-        assert!(Segment::rest(f64::NAN).mean_count(PER_RADIAN, 0.0, 0.05).abs() < 1.0);
+        assert_eq!(Segment::rest(0.0, CYCLE_TIME).mean_count(PER_RADIAN, 0.0, 0.05), 0.0);
+        assert!(Segment::rest(f64::NAN, CYCLE_TIME).mean_count(PER_RADIAN, 0.0, 0.05).abs() < 1.0);
     }
 
     #[test]
     fn the_count_is_absolute_over_200_segments() {
         let mut sent = 0;
-        let mut segment = Segment::rest(0.0);
+        let mut segment = Segment::rest(0.0, CYCLE_TIME);
         let mut last = 0;
         for index in 1..=200_i64 {
             let phase = 0.063 * index as f64;
@@ -257,7 +275,8 @@ mod tests {
 
     #[test]
     fn braking_ends_where_the_deceleration_says() {
-        let mut segment = Segment { from: 0.0, from_speed: 9.3, to: 0.0093, to_speed: 9.3 };
+        let mut segment =
+            Segment { time: CYCLE_TIME, from: 0.0, from_speed: 9.3, to: 0.0093, to_speed: 9.3 };
         let exact = segment.to + 9.3 * 9.3 / (2.0 * 700.0);
         for _ in 0..20 {
             segment = segment.brake(700.0);

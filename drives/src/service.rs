@@ -14,10 +14,10 @@
 
 use crate::bridge::{Bridge, BridgeOptions, Deadlines, GatePermission};
 use crate::port::{Freshness, Port, PortError};
-use machine::{Machine, StallTolerance};
+use machine::{Machine, Timing};
 use messages::feedback::status;
 use messages::report::refused;
-use messages::time::CYCLE_PERIOD;
+use messages::time::Period;
 use messages::{Command, DrivesReport, FaultCode, Feedback, Nanoseconds, RealtimeFacts};
 use runtime::clock::{self, PeriodicClock};
 use runtime::peer::{PeerState, Peers};
@@ -26,9 +26,14 @@ use runtime::thread::{self, RealtimeOptions};
 use runtime::wake::{Listener, Notifier, Wake};
 use runtime::{Domain, Publisher, Role, Samples, ServiceError, Subscriber, message, signal};
 
-/// How long drives waits for a command in its cycle, from the deadline or the feedback, whichever was
-/// later, when it is strict: what made drives late is not the controller's to make up for.
-const STRICT_BOUND: Nanoseconds = Nanoseconds(300_000);
+/// Part of the period for which drives waits for a command, from the deadline or the feedback, whichever
+/// was later, when it is strict: what made drives late is not the controller's to make up for. 300 µs
+/// of 1 ms.
+const STRICT_BOUND: [i64; 2] = [3, 10];
+
+/// The largest part of the period for which drives spins before a deadline: what is left is the
+/// controller's, on the same core.
+const SPIN_PART: i64 = 10;
 
 /// How long simulated drives wait for the command of a controller that is alive.
 const SLIPPING_BOUND: Nanoseconds = Nanoseconds(100_000_000);
@@ -36,8 +41,8 @@ const SLIPPING_BOUND: Nanoseconds = Nanoseconds(100_000_000);
 /// After how many such waits in a row without an answer drives takes the controller to hang.
 const SLIPS_IN_VAIN: u64 = 3;
 
-/// Cycles between two reports.
-const REPORT_INTERVAL: u64 = 100;
+/// Time between two reports.
+const REPORT_INTERVAL: Nanoseconds = Nanoseconds(100_000_000);
 
 /// How long a service that shall end leaves the axes to a live controller.
 const CONTROLLER_PATIENCE: Nanoseconds = Nanoseconds(1_000_000_000);
@@ -65,7 +70,7 @@ pub fn run(
     port: Box<dyn Port>,
     options: &ServiceOptions,
 ) -> Result<(), ServiceError> {
-    let mut cycle = ServiceCycle::open(domain, port, options, machine.stall)?;
+    let mut cycle = ServiceCycle::open(domain, port, options, machine.realtime)?;
     let result = cycle.drive(machine, options);
     let closed = cycle.bridge.close().map_err(work);
     result.and(closed)
@@ -93,6 +98,7 @@ impl Vitality {
 
 struct ServiceCycle {
     bridge: Bridge,
+    period: Period,
     deadlines: Deadlines,
     peers: Peers,
     feedbacks: Publisher<Feedback>,
@@ -112,15 +118,16 @@ impl ServiceCycle {
         domain: &Domain,
         port: Box<dyn Port>,
         options: &ServiceOptions,
-        stall: StallTolerance,
+        timing: Timing,
     ) -> Result<Self, ServiceError> {
         let bridge_options = BridgeOptions {
             epoch: clock::now().0.unsigned_abs(),
             deadlines: options.deadlines,
-            stall,
+            timing,
         };
         Ok(Self {
             bridge: Bridge::new(port, bridge_options),
+            period: timing.period,
             deadlines: options.deadlines,
             peers: Peers::watch(domain, &[Role::Domain, Role::Planner, Role::Controller])?,
             feedbacks: domain.publisher()?,
@@ -155,7 +162,10 @@ impl ServiceCycle {
         margin: Nanoseconds,
         facts: RealtimeFacts,
     ) -> Result<(), ServiceError> {
-        let mut clock = PeriodicClock::new(CYCLE_PERIOD, margin);
+        let period = self.period.time();
+        let margin = margin.min(Nanoseconds(period.0 / SPIN_PART));
+        let report_interval = self.period.cycles_for(REPORT_INTERVAL);
+        let mut clock = PeriodicClock::new(period, margin);
         loop {
             clock.wait();
             let vitality = self.check_peers();
@@ -169,7 +179,7 @@ impl ServiceCycle {
             self.account_for_stalls();
 
             let report = self.bridge.report(facts);
-            if report.cycle.0.is_multiple_of(REPORT_INTERVAL) || self.has_news(&report) {
+            if report.cycle.0.is_multiple_of(report_interval) || self.has_news(&report) {
                 self.publish(&report)?;
             }
             if self.may_end(&report) {
@@ -232,7 +242,8 @@ impl ServiceCycle {
         let until = if patient {
             deadline + SLIPPING_BOUND
         } else {
-            deadline.max(published) + STRICT_BOUND
+            let [part, whole] = STRICT_BOUND;
+            deadline.max(published) + Nanoseconds(self.period.time().0 * part / whole)
         };
         loop {
             while let Some(command) = self.commands.newest()? {
@@ -250,7 +261,7 @@ impl ServiceCycle {
 
     /// While waiting long for a controller, check every period whether it still lives.
     fn next_look(&self, until: Nanoseconds, patient: bool) -> Nanoseconds {
-        if patient { until.min(clock::now() + CYCLE_PERIOD) } else { until }
+        if patient { until.min(clock::now() + self.period.time()) } else { until }
     }
 
     fn controller_is_gone(&mut self, patient: bool) -> bool {

@@ -81,7 +81,8 @@ mod tests {
     const LATE: u32 = StallCause::LateAnswer.bit();
 
     fn stall(cycle: u64, cycles: u64) -> Stall {
-        let [began, length] = [cycle, cycles].map(Nanoseconds::of_cycles);
+        let [began, length] =
+            [cycle, cycles].map(|cycles| messages::time::Period::OF_SETPOINTS.of(cycles));
         Stall { cycle: Cycle(cycle), began, length, otherwise: 0 }
     }
 

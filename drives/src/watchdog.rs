@@ -6,7 +6,7 @@
 //!   axes go on with the last command for it, which at constant speed is the right voltage.
 //! - **Lost peer**: the gate stays closed whatever the command says. The command stays fresh: how the
 //!   axes come to rest is the controller's to say.
-//! - **Axes**: once more cycles in a row than the tolerated stall has ([`StallTolerance`]) lack a
+//! - **Axes**: once more cycles in a row than the tolerated stall has ([`machine::StallTolerance`]) lack a
 //!   fresh command, or at once for a command that makes no sense, a fault of the port or a lost controller,
 //!   they are stopped by the drive's own brake, in the dark and with all outputs off. Until then they
 //!   go on with the last command.
@@ -24,7 +24,8 @@
 //! This is software on the control computer and not a safety function: the laser's interlock and
 //! the motors' safe torque off are wired.
 
-use machine::StallTolerance;
+use machine::Timing;
+use messages::time::Period;
 use messages::{
     ActuatorArray, Command, CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle,
     MAX_ACTUATORS, MAX_EDGES, Nanoseconds,
@@ -32,8 +33,8 @@ use messages::{
 
 use crate::port::{Actuation, Freshness};
 
-/// Skipped cycles that are gone through one by one; axes that brake rest long before.
-const MOST_PASSED: u64 = 1000;
+/// Time whose skipped cycles are gone through one by one; axes that brake rest long before.
+const MOST_PASSED: Nanoseconds = Nanoseconds(1_000_000_000);
 
 /// Whether the gate may open in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -71,6 +72,7 @@ pub struct Counts {
 #[derive(Debug, Clone)]
 pub struct Watchdog {
     actuators: usize,
+    period: Period,
     tolerated: u64,
     watch: Watch,
     /// Cycles in a row without a fresh command.
@@ -84,11 +86,13 @@ pub struct Watchdog {
 }
 
 impl Watchdog {
-    /// A watchdog over `actuators` motors that waits for the first command, and bears stalls of `tolerance`.
-    pub fn new(actuators: usize, tolerance: StallTolerance) -> Self {
+    /// A watchdog over `actuators` motors that waits for the first command, and bears the stalls of
+    /// `timing`.
+    pub fn new(actuators: usize, timing: Timing) -> Self {
         Self {
             actuators: actuators.min(MAX_ACTUATORS),
-            tolerated: tolerance.cycles(),
+            period: timing.period,
+            tolerated: timing.stalled_cycles(),
             watch: Watch::Waiting,
             misses: 0,
             reset: 0,
@@ -124,13 +128,14 @@ impl Watchdog {
     /// only counted.
     pub fn skip(&mut self, cycles: u64, now: Nanoseconds, mut passed: impl FnMut(&Actuation)) {
         let lacking = self.misses.saturating_add(cycles).saturating_add(1);
-        for _ in 0..cycles.min(MOST_PASSED) {
+        let most = self.period.cycles_for(MOST_PASSED);
+        for _ in 0..cycles.min(most) {
             self.missed(lacking, now);
             self.watch_gate(GatePermission::Granted);
             passed(&self.last);
         }
         if self.watch != Watch::Waiting {
-            let rest = cycles.saturating_sub(MOST_PASSED);
+            let rest = cycles.saturating_sub(most);
             self.misses = self.misses.saturating_add(rest);
             self.counts.missed += rest;
         }
@@ -180,7 +185,7 @@ impl Watchdog {
             }
             Watch::Following => {
                 self.reset = command.reset;
-                if let Some(doubt) = doubt(command, self.actuators) {
+                if let Some(doubt) = doubt(command, self.actuators, self.period) {
                     self.stop(doubt.at(now));
                 }
             }
@@ -258,7 +263,7 @@ fn actuation(command: &Command, mode: CommandMode) -> Actuation {
 }
 
 /// What makes `command` impossible to carry out, if anything: a target that is not finite, or a laser cycle that makes no sense.
-fn doubt(command: &Command, actuators: usize) -> Option<Fault> {
+fn doubt(command: &Command, actuators: usize, period: Period) -> Option<Fault> {
     let targets: &[&ActuatorArray] = match command.mode() {
         CommandMode::Disabled | CommandMode::QuickStop => &[],
         CommandMode::Driven => {
@@ -272,7 +277,7 @@ fn doubt(command: &Command, actuators: usize) -> Option<Fault> {
         let fault = Fault::new(FaultCode::NotFinite).on_actuator(index);
         return Some(fault.with(FaultQuantity::Number, *target));
     }
-    if !command.laser.is_valid() {
+    if !command.laser.is_valid(period.time()) {
         return Some(impossible_light(&command.laser));
     }
     None

@@ -26,7 +26,8 @@ fn assert_allocates_nothing(name: &str, machine: &Machine) {
     let (port, built) =
         Allocations::during(|| SimulatedPlant::new(machine, PlantOptions::default()));
     assert!(built.allocations > 0, "the counting allocator does not count");
-    let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
+    let options =
+        BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, timing: machine.realtime };
     let mut bridge = Bridge::new(port.unwrap(), options);
     let mut home = None;
     let mut moved = 0.0_f64;

@@ -20,7 +20,16 @@ fn braked(brake: HoldingBrake) -> (Plant<1, Shaft>, f64) {
     let shaft = Shaft { load: LOAD, spread: 0.0 };
     let options = PlantOptions::default();
     let axes = [shaft::axis()];
-    let plant = Plant::new(shaft, &axes, &actuators, &LaserSource::IDEAL, &[0.0], options).unwrap();
+    let plant = Plant::new(
+        shaft,
+        &axes,
+        &actuators,
+        &LaserSource::IDEAL,
+        &[0.0],
+        messages::time::Period::OF_SETPOINTS,
+        options,
+    )
+    .unwrap();
     (plant, motor.voltage(LOAD / motor.torque_constant, 0.0, 0.0))
 }
 

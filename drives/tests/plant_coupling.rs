@@ -98,9 +98,16 @@ fn where_the_chain_ends_the_plant_jams_with_a_fault() {
     let pose = Pose::at(Vector3::new(0.35, 0.0, 0.0));
     let home = arm.inverse(&pose, (), &Joints::zeros()).unwrap();
     let (axes, actuators) = drives();
-    let mut plant: Plant<2, _> =
-        Plant::new(arm, &axes, &actuators, &dark, home.as_slice(), PlantOptions::default())
-            .unwrap();
+    let mut plant: Plant<2, _> = Plant::new(
+        arm,
+        &axes,
+        &actuators,
+        &dark,
+        home.as_slice(),
+        messages::time::Period::OF_SETPOINTS,
+        PlantOptions::default(),
+    )
+    .unwrap();
     let push = Actuation {
         freshness: Freshness::Fresh,
         mode: CommandMode::Driven,

@@ -54,7 +54,16 @@ const SMOOTH: Friction = Friction { coulomb: 0.0, viscous: 0.0 };
 
 fn plant(mechanism: CoreXy, machine: &Machine) -> Plant<2, CoreXy> {
     let Machine { axes, actuators, home_joints, .. } = machine;
-    Plant::new(mechanism, axes, actuators, &DARK, home_joints, PlantOptions::default()).unwrap()
+    Plant::new(
+        mechanism,
+        axes,
+        actuators,
+        &DARK,
+        home_joints,
+        messages::time::Period::OF_SETPOINTS,
+        PlantOptions::default(),
+    )
+    .unwrap()
 }
 
 fn voltage(voltage: &[f64]) -> Actuation {
@@ -385,9 +394,16 @@ fn an_elastic_lift_holds_its_height_on_the_brake() {
     actuator.gains.inertia = 2e-6 + 5.0 * actuator.ratio * actuator.ratio;
     let (axes, actuators) = shaft::alike(&actuator, 3);
     let lift = Cartesian { elasticity: Some([spring; 3]), ..Cartesian::rigid(mass) };
-    let mut plant: Plant<3, _> =
-        Plant::new(lift, &axes, &actuators, &DARK, &[0.1, 0.1, 0.05], PlantOptions::default())
-            .unwrap();
+    let mut plant: Plant<3, _> = Plant::new(
+        lift,
+        &axes,
+        &actuators,
+        &DARK,
+        &[0.1, 0.1, 0.05],
+        messages::time::Period::OF_SETPOINTS,
+        PlantOptions::default(),
+    )
+    .unwrap();
     let mut measurement = Measurement::default();
     for _ in 0..2000 {
         measurement = cycle(&mut plant, &Actuation::QUICK_STOP);

@@ -7,7 +7,7 @@ use drives::{Actuation, Freshness, Measurement, PlantOptions, Port, Power, Simul
 use machine::transmission::{Elasticity, screw::at_nut};
 use machine::{Cartesian, Machine, MechanismKind};
 use messages::laser::{GateEdge, MAX_EDGES};
-use messages::time::CYCLE_PERIOD;
+use messages::time::SETPOINT_PERIOD as CYCLE_PERIOD;
 use messages::{CommandMode, FaultCode, LaserCycle, MAX_ACTUATORS};
 
 /// A port under test, with what its machine can bear.

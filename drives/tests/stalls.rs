@@ -6,10 +6,11 @@ use drives::{
     Actuation, ActuatorProfile, Bridge, BridgeOptions, Deadlines, Measurement, PlantOptions, Port,
     Profile, SimulatedPlant,
 };
-use machine::{ActuatorMode, LaserSource, Machine, StallTolerance};
+use machine::{ActuatorMode, LaserSource, Machine, StallTolerance, Timing};
 use messages::feedback::status;
 use messages::laser::{GateEdge, LaserCycle};
 use messages::random::SplitMix64;
+use messages::time::Period;
 use messages::{
     Command, CommandMode, Cycle, FaultCode, Feedback, Nanoseconds, RealtimeFacts, StallCause,
     axis::actuator_array,
@@ -32,8 +33,10 @@ impl Run {
     }
 
     fn over(port: Box<dyn Port>, tolerated: i64, deadlines: Deadlines) -> Self {
-        let stall = StallTolerance::new(Nanoseconds(tolerated * PERIOD)).unwrap();
-        let bridge = Bridge::new(port, BridgeOptions { epoch: EPOCH, deadlines, stall });
+        let period = Period::OF_SETPOINTS;
+        let stall = StallTolerance::new(Nanoseconds(tolerated * PERIOD), period).unwrap();
+        let timing = Timing { period, stall };
+        let bridge = Bridge::new(port, BridgeOptions { epoch: EPOCH, deadlines, timing });
         Self { bridge, deadline: Nanoseconds(START) }
     }
 

@@ -8,7 +8,7 @@ mod shaft;
 use drives::plant::{Plant, PlantOptions};
 use drives::{Actuation, Freshness, Measurement, Port, Power};
 use machine::{Actuator, Axis, Encoder, Friction, LaserSource, LoopGains, Motor, StepperMotor};
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME as CYCLE_TIME;
 use messages::{CommandMode, FaultCode, axis::actuator_array};
 use shaft::Shaft;
 
@@ -55,7 +55,16 @@ fn plant(actuator: &Actuator, load: f64) -> Plant<1, Shaft> {
 fn plant_of(axis: &Axis, actuator: &Actuator, load: f64) -> Plant<1, Shaft> {
     let shaft = Shaft { load, spread: 0.0 };
     let (axes, actuators) = (core::slice::from_ref(axis), core::slice::from_ref(actuator));
-    Plant::new(shaft, axes, actuators, &DARK, &[0.0], PlantOptions::default()).unwrap()
+    Plant::new(
+        shaft,
+        axes,
+        actuators,
+        &DARK,
+        &[0.0],
+        messages::time::Period::OF_SETPOINTS,
+        PlantOptions::default(),
+    )
+    .unwrap()
 }
 
 fn to(position: f64, velocity: f64) -> Actuation {

@@ -8,9 +8,10 @@ use drives::{
     Actuation, ActuatorProfile, Bridge, BridgeOptions, Deadlines, Freshness, GatePermission,
     Measurement, PlantOptions, Port, Profile, SimulatedPlant,
 };
-use machine::{ActuatorMode, Machine, StallTolerance};
+use machine::{ActuatorMode, Machine, StallTolerance, Timing};
 use messages::feedback::status;
 use messages::laser::{GateEdge, LaserCycle, MAX_EDGES};
+use messages::time::Period;
 use messages::{
     Command, CommandMode, Cycle, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds,
     RealtimeFacts, axis::actuator_array,
@@ -23,8 +24,10 @@ const PERIOD: i64 = 1_000_000;
 const TOLERATED: i64 = 2;
 
 fn options(deadlines: Deadlines) -> BridgeOptions {
-    let stall = StallTolerance::new(Nanoseconds(TOLERATED * PERIOD)).unwrap();
-    BridgeOptions { epoch: EPOCH, deadlines, stall }
+    let period = Period::OF_SETPOINTS;
+    let stall = StallTolerance::new(Nanoseconds(TOLERATED * PERIOD), period).unwrap();
+    let timing = Timing { period, stall };
+    BridgeOptions { epoch: EPOCH, deadlines, timing }
 }
 
 /// A bridge over the built-in machine, run in virtual time.

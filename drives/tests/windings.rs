@@ -26,7 +26,15 @@ fn plant(values: Values, substep: f64) -> Result<Plant<1, Shaft>, PlantError> {
     (motor.inductance, motor.torque_constant) = (values.inductance, values.torque_constant);
     let shaft = Shaft { load: 0.0, spread: 0.0 };
     let options = PlantOptions { substep, ..PlantOptions::default() };
-    Plant::new(shaft, &[shaft::axis()], &[actuator], &LaserSource::IDEAL, &[0.0], options)
+    Plant::new(
+        shaft,
+        &[shaft::axis()],
+        &[actuator],
+        &LaserSource::IDEAL,
+        &[0.0],
+        messages::time::Period::OF_SETPOINTS,
+        options,
+    )
 }
 
 /// Angle and speed at the ends of 40 cycles, of which the voltage is on in the first 20.

@@ -41,7 +41,7 @@ pub use frame::Frame;
 pub use gcode_settings::{GcodeSettings, ZMeaning};
 pub use kinematics::{Mechanism, Pose};
 pub use laser::LaserSource;
-pub use limits::{AxisLimits, CornerMode, PathLimits, StallTolerance, WorkArea};
+pub use limits::{AxisLimits, CornerMode, PathLimits, StallTolerance, Timing, WorkArea};
 pub use machine::{Machine, Warning};
 pub use mechanisms::{Cartesian, CoreXy, Mcm, MechanismKind, MechanismVisitor, Polar, Serial};
 pub use motor::{DcMotor, Motor, StepperMotor};

@@ -2,7 +2,7 @@
 //! the axes may go on without a command.
 
 use messages::Nanoseconds;
-use messages::time::CYCLE_PERIOD;
+use messages::time::Period;
 
 /// Limits of the tool's motion; they bind the norms of the vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,48 +56,66 @@ pub struct WorkArea {
     pub upper: [f64; 3],
 }
 
+/// When the control cycle comes, and how late it may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Timing {
+    /// Its period.
+    pub period: Period,
+    /// How long the axes may go on without a fresh command.
+    pub stall: StallTolerance,
+}
+
+impl Timing {
+    /// What a file that says nothing has.
+    pub const DEFAULT: Self =
+        Self { period: Period::OF_SETPOINTS, stall: StallTolerance(Nanoseconds(10_000_000)) };
+
+    /// Cycles in a row that may lack a fresh command, at least 1: whole ones, because a command acts
+    /// for a whole cycle or not at all.
+    pub fn stalled_cycles(self) -> u64 {
+        self.period.cycles_in(self.stall.time()).max(1)
+    }
+
+    /// Cycles from one feedback to the next that the controller sees, at most: the answer to the one
+    /// before is still in force in the first of them, the others lack a command.
+    pub fn feedback_gap(self) -> u64 {
+        self.stalled_cycles() + 1
+    }
+}
+
 /// How long the axes may go on with their last command, in the dark, before they are stopped.
 ///
 /// Every watch over time derives from this one value:
 ///
-/// - drives stops the axes once more than [`Self::cycles`] cycles in a row lack a fresh command, be
-///   it that drives itself was late for them or the controller;
-/// - the controller takes a feedback that came at most [`Self::feedback_gap`] cycles after the one
+/// - drives stops the axes once more than [`Timing::stalled_cycles`] cycles in a row lack a fresh
+///   command, be it that drives itself was late for them or the controller;
+/// - the controller takes a feedback that came at most [`Timing::feedback_gap`] cycles after the one
 ///   before;
-/// - the controller stops the axes once drives has been late for more than [`Self::cycles`] cycles
-///   without a cycle in time between.
+/// - the controller stops the axes once drives has been late for more than [`Timing::stalled_cycles`]
+///   cycles without a cycle in time between.
 ///
 /// A hardware bridge arms the watchdog of its drives with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct StallTolerance(Nanoseconds);
 
 impl StallTolerance {
-    /// The shortest that makes sense: one cycle, which a single late command takes.
-    pub const SHORTEST: Self = Self(CYCLE_PERIOD);
-
     /// The longest that makes sense. At 10 m/s² an axis that keeps its speed is then 12 mm from its
     /// reference: any following error is found long before.
-    pub const LONGEST: Self = Self(Nanoseconds(50 * CYCLE_PERIOD.0));
+    pub const LONGEST: Self = Self(Nanoseconds(50_000_000));
 
-    /// This long; `None` outside of [`Self::SHORTEST`] to [`Self::LONGEST`].
-    pub fn new(time: Nanoseconds) -> Option<Self> {
-        (Self::SHORTEST..=Self::LONGEST).contains(&Self(time)).then_some(Self(time))
+    /// The shortest that makes sense: one cycle, which a single late command takes.
+    pub fn shortest(period: Period) -> Self {
+        Self(period.time())
+    }
+
+    /// This long, where the cycle has this `period`; `None` outside of [`Self::shortest`] to
+    /// [`Self::LONGEST`].
+    pub fn new(time: Nanoseconds, period: Period) -> Option<Self> {
+        (Self::shortest(period)..=Self::LONGEST).contains(&Self(time)).then_some(Self(time))
     }
 
     /// The time.
     pub fn time(self) -> Nanoseconds {
         self.0
-    }
-
-    /// Cycles in a row that may lack a fresh command, at least 1: whole ones, because a command acts
-    /// for a whole cycle or not at all.
-    pub fn cycles(self) -> u64 {
-        self.0.cycles()
-    }
-
-    /// Cycles from one feedback to the next that the controller sees, at most: the answer to the one
-    /// before is still in force in the first of them, the others lack a command.
-    pub fn feedback_gap(self) -> u64 {
-        self.cycles() + 1
     }
 }

@@ -8,7 +8,7 @@ use crate::document::{Concern, DocumentError, Override};
 use crate::drives::Drives;
 use crate::gcode_settings::GcodeSettings;
 use crate::laser::LaserSource;
-use crate::limits::{CornerMode, PathLimits, StallTolerance, WorkArea};
+use crate::limits::{CornerMode, PathLimits, Timing, WorkArea};
 use crate::mechanisms::MechanismKind;
 use crate::operating::Operating;
 
@@ -39,8 +39,8 @@ pub struct Machine {
     pub path: PathLimits,
     /// How corners are passed where a job says nothing of them.
     pub corners: CornerMode,
-    /// How long the axes may go on without a fresh command.
-    pub stall: StallTolerance,
+    /// When the control cycle comes, and how late it may be.
+    pub realtime: Timing,
     /// Its switches, how its axes are homed, and what is done for safety.
     pub operating: Operating,
     /// What drives the motors.

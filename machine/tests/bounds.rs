@@ -11,9 +11,10 @@ const MANUAL: &str = include_str!("../../docs/machine-files.md");
 
 const COREXY: &str = include_str!("../../machines/corexy.toml");
 
-/// The laser's delays and the tolerated stall have one range each, which `validate` tells in words
-/// of its own.
-const ELSEWHERE: [&str; 3] = ["LaserTable.on_delay", "LaserTable.off_delay", "RealtimeTable.stall"];
+/// The laser's delays, the period of the cycle and the tolerated stall have one range each, which
+/// `validate` tells in words of its own.
+const ELSEWHERE: [&str; 4] =
+    ["LaserTable.on_delay", "LaserTable.off_delay", "RealtimeTable.period", "RealtimeTable.stall"];
 
 #[test]
 fn every_range_is_written_in_one_unit_and_what_is_usual_is_possible() {

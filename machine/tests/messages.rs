@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use machine::document::{Document, Override, Position};
-use machine::{CornerMode, Machine, MechanismKind};
+use machine::{CornerMode, Machine, MechanismKind, Timing};
 
 const COREXY: &str = include_str!("../../machines/corexy.toml");
 
@@ -147,15 +147,42 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
 
 #[test]
 fn a_tolerated_stall_is_a_time_of_which_whole_cycles_count() {
-    let read = |stall: &str| {
-        let text = COREXY.replacen("[laser]", &format!("[realtime]\nstall = {stall}\n[laser]"), 1);
-        Machine::parse("machine.toml", &text, &[]).unwrap().stall
+    let read = |table: &str| {
+        let text = COREXY.replacen("[laser]", &format!("[realtime]\n{table}\n[laser]"), 1);
+        Machine::parse("machine.toml", &text, &[]).unwrap().realtime
     };
     for (stall, cycles) in [("1 ms", 1), ("2.999 ms", 2), ("0.01 s", 10), ("50 ms", 50)] {
-        let tolerance = read(&format!("\"{stall}\""));
-        assert_eq!((tolerance.cycles(), tolerance.feedback_gap()), (cycles, cycles + 1), "{stall}");
+        let timing = read(&format!("stall = \"{stall}\""));
+        let found = (timing.stalled_cycles(), timing.feedback_gap());
+        assert_eq!(found, (cycles, cycles + 1), "{stall}");
     }
-    assert_eq!(Machine::builtin().stall, read("\"10 ms\""));
+    for (period, cycles) in [("125 us", 80), ("0.25 ms", 40), ("3 ms", 3), ("4 ms", 2)] {
+        let timing = read(&format!("period = \"{period}\"\nstall = \"10 ms\""));
+        assert_eq!(timing.stalled_cycles(), cycles, "{period}");
+    }
+    assert_eq!(Machine::builtin().realtime, Timing::DEFAULT);
+    assert_eq!(read("period = \"1 ms\"\nstall = \"10 ms\""), Timing::DEFAULT);
+}
+
+#[test]
+fn a_period_that_no_cycle_can_have_is_refused_and_a_stall_is_at_least_one() {
+    for (period, found) in [("200 us", "0.0002"), ("0.1 ms", "0.0001"), ("5 ms", "0.005")] {
+        refused(
+            "[laser]",
+            &format!("[realtime]\nperiod = \"{period}\"\n[laser]"),
+            &[&format!(
+                "101:10: a control cycle cannot have a `period` of {found} s; write a whole multiple of \
+                 125 us, from 125 us (8 kHz) to 4000 us (250 Hz)"
+            )],
+        );
+    }
+    refused(
+        "[laser]",
+        "[realtime]\nperiod = \"4 ms\"\nstall = \"3 ms\"\n[laser]",
+        &[
+            "102:9: a `stall` of 0.003 s cannot be tolerated; write a time from 4 ms, one cycle, to 50 ms",
+        ],
+    );
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! The laser's part of a cycle: gate, power, and when inside the cycle they change.
 
-use crate::sample;
+use crate::{Nanoseconds, sample};
 
-/// The most gate edges one cycle can hold; the planner refuses a job that needs more.
+/// The most gate edges one cycle can hold, of the setpoints or of control; the planner refuses a job
+/// that needs more.
 pub const MAX_EDGES: usize = 16;
 
 sample! {
@@ -57,15 +58,16 @@ impl LaserCycle {
         self.edges().last().map_or((self.gate, self.power), |edge| (edge.gate, edge.power))
     }
 
-    /// Whether it makes sense: edges in order inside the cycle, power a fraction, count in range.
-    /// Drives keeps a cycle dark that does not.
-    pub fn is_valid(&self) -> bool {
+    /// Whether it makes sense in a cycle of this `period`: edges in order inside it, power a fraction,
+    /// count in range. Drives keeps a cycle dark that does not.
+    pub fn is_valid(&self, period: Nanoseconds) -> bool {
         let fraction = |power: f64| (0.0..=1.0).contains(&power);
         self.edge_count as usize <= MAX_EDGES
             && fraction(self.power)
-            && self.edges().iter().all(|edge| {
-                fraction(edge.power) && i64::from(edge.offset) < crate::time::CYCLE_PERIOD.0
-            })
+            && self
+                .edges()
+                .iter()
+                .all(|edge| fraction(edge.power) && i64::from(edge.offset) < period.0)
             && self.edges().windows(2).all(|pair| pair[0].offset <= pair[1].offset)
     }
 
@@ -85,6 +87,7 @@ impl LaserCycle {
 #[cfg(test)]
 mod tests {
     use super::{GateEdge, LaserCycle, MAX_EDGES};
+    use crate::time::SETPOINT_PERIOD as PERIOD;
 
     fn edge(offset: u32, gate: u32, power: f64) -> GateEdge {
         GateEdge { offset, gate, power }
@@ -98,25 +101,29 @@ mod tests {
 
     #[test]
     fn a_cycle_in_order_is_valid() {
-        assert!(LaserCycle::OFF.is_valid());
-        assert!(cycle(3, 1.0, &[]).is_valid());
+        assert!(LaserCycle::OFF.is_valid(PERIOD));
+        assert!(cycle(3, 1.0, &[]).is_valid(PERIOD));
         assert!(
-            cycle(0, 0.0, &[edge(0, 1, 0.5), edge(0, 0, 0.0), edge(999_999, 2, 1.0)]).is_valid()
+            cycle(0, 0.0, &[edge(0, 1, 0.5), edge(0, 0, 0.0), edge(999_999, 2, 1.0)])
+                .is_valid(PERIOD)
         );
-        assert!(cycle(0, 0.0, &[edge(7, 1, 0.5); MAX_EDGES]).is_valid());
+        assert!(cycle(0, 0.0, &[edge(7, 1, 0.5); MAX_EDGES]).is_valid(PERIOD));
     }
 
     #[test]
     fn a_cycle_that_makes_no_sense_is_not() {
         for power in [-0.1, 1.000_001, f64::NAN, f64::INFINITY] {
-            assert!(!cycle(1, power, &[]).is_valid(), "{power} at the start");
-            assert!(!cycle(0, 0.0, &[edge(0, 1, power)]).is_valid(), "{power} at an edge");
+            assert!(!cycle(1, power, &[]).is_valid(PERIOD), "{power} at the start");
+            assert!(!cycle(0, 0.0, &[edge(0, 1, power)]).is_valid(PERIOD), "{power} at an edge");
         }
-        assert!(!cycle(0, 0.0, &[edge(1_000_000, 1, 0.5)]).is_valid(), "beyond the cycle");
-        assert!(!cycle(0, 0.0, &[edge(5, 1, 0.5), edge(4, 0, 0.0)]).is_valid(), "back in time");
+        assert!(!cycle(0, 0.0, &[edge(1_000_000, 1, 0.5)]).is_valid(PERIOD), "beyond the cycle");
+        assert!(
+            !cycle(0, 0.0, &[edge(5, 1, 0.5), edge(4, 0, 0.0)]).is_valid(PERIOD),
+            "back in time"
+        );
         let count = MAX_EDGES as u32 + 1;
         for edge_count in [count, u32::MAX] {
-            assert!(!LaserCycle { edge_count, ..LaserCycle::OFF }.is_valid(), "{edge_count}");
+            assert!(!LaserCycle { edge_count, ..LaserCycle::OFF }.is_valid(PERIOD), "{edge_count}");
         }
     }
 
@@ -124,7 +131,7 @@ mod tests {
     fn edges_that_do_not_count_are_not_looked_at() {
         let mut cycle = cycle(0, 0.0, &[edge(3, 1, 0.5)]);
         cycle.edges[1] = edge(u32::MAX, 9, f64::NAN);
-        assert!(cycle.is_valid());
+        assert!(cycle.is_valid(PERIOD));
         assert_eq!(cycle.last(), (1, 0.5));
     }
 

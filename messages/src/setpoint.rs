@@ -1,4 +1,4 @@
-//! Planner to controller: the trajectory, one sample a cycle, ahead of time.
+//! Planner to controller: the trajectory, one sample a setpoint period, ahead of time.
 
 use crate::{ActuatorArray, AxisArray, LaserCycle, Nanoseconds, sample};
 
@@ -11,7 +11,7 @@ pub mod flags {
 }
 
 sample! {
-    /// The planned motion at one instant of stream time, `sequence × CYCLE_TIME`.
+    /// The planned motion at one instant of stream time, `sequence × SETPOINT_TIME`.
     ///
     /// Joint quantities are on the load side of the transmission, in the joint's own unit
     /// (metres of a carriage or belt, radians of an arm), and exact derivatives of the planned
@@ -34,7 +34,7 @@ sample! {
         flags: u64,
         /// Digital outputs, one bit each; bit 0 is the air assist.
         outputs: u64,
-        /// The stroke being marked during the cycle that starts here, from 1; 0 for none.
+        /// The stroke being marked from here to the next setpoint, from 1; 0 for none.
         stroke: u64,
         /// Tool centre point in the machine frame [m].
         tool: [f64; 3],
@@ -65,7 +65,7 @@ sample! {
         static_effort: ActuatorArray,
         /// Motor torque per unit of rate change [N·m·s].
         momentum: ActuatorArray,
-        /// The laser in the cycle that starts here.
+        /// The laser from here to the next setpoint.
         laser: LaserCycle,
     }
 }

@@ -23,7 +23,7 @@ use crate::summary::{
 use machine::{Actuator, Machine};
 use messages::artwork::Artwork;
 use messages::plan::PlanFacts;
-use messages::time::CYCLE_TIME;
+use messages::time::Period;
 use messages::{ControllerReport, DrivesReport, Fault, FaultCode, RealtimeFacts, run_folder};
 use runtime::thread;
 use serde::Deserialize;
@@ -35,8 +35,9 @@ use std::time::Instant;
 /// cycle later, and the feedback tells one after that.
 pub const LIGHT_LAG: u64 = 2;
 
-/// Cycles that the controller counts beyond a stream's setpoints: the one that finds it at rest.
-const END_CYCLES: u64 = 1;
+/// Cycles that the controller counts beyond the time of a stream's last setpoint: the one of its first, and the
+/// one that finds it at rest.
+const END_CYCLES: u64 = 2;
 
 /// How a run ended, as its supervisor (or the monitor after the supervisor's death) knows.
 #[derive(Debug, Clone, Default)]
@@ -77,6 +78,7 @@ pub fn summarise(
     results: Option<&RunResults>,
     clock: Clock,
 ) -> Summary {
+    let period = machine.realtime.period;
     let job = JobSummary {
         name: if plan.name.is_empty() { run_outcome.job.clone() } else { plan.name.clone() },
         strokes: plan.strokes as u64,
@@ -98,16 +100,19 @@ pub fn summarise(
         summary.take_controller(report);
         summary.time = if report.completed == 1 {
             // What the stream took beyond its plan was holds and overrides.
-            let beyond = (report.cycles as f64 - (plan.samples + END_CYCLES) as f64) * CYCLE_TIME;
+            let planned = period
+                .cycles_for(Period::OF_SETPOINTS.of(plan.samples.saturating_sub(1)))
+                + END_CYCLES;
+            let beyond = (report.cycles as f64 - planned as f64) * period.seconds();
             (plan.duration + beyond).max(0.0)
         } else {
-            report.cycles as f64 * CYCLE_TIME
+            period.of(report.cycles).seconds()
         };
     }
     if let Some(report) = &run_outcome.drives {
         summary.overruns = report.overruns.saturating_sub(run_outcome.overruns_before);
         if let Some(stream) = &run_outcome.controller {
-            summary.stalls = StallSummary::of(&report.stalls, stream);
+            summary.stalls = StallSummary::of(&report.stalls, stream, period);
         }
         // A clock that slips has the machine wait: the marks are the same.
         if report.slips == 0 {
@@ -120,7 +125,7 @@ pub fn summarise(
     }
     if let Some(results) = results {
         summary.latency = results.histograms.summary();
-        summary.recording = Some(results.continuity.summary());
+        summary.recording = Some(results.continuity.summary(period));
         match &results.marks {
             Ok(evaluation) => {
                 summary.warnings.extend(warnings(evaluation));
@@ -299,7 +304,7 @@ fn examine(
     let at = |error: RecordingError| format!("{}: {error}", path.display());
     let file = File::open(&path).map_err(|error| at(error.into()))?;
     let reader = RecordingReader::new(BufReader::new(file)).map_err(at)?;
-    let mut analysis = RunAnalysis::new(artwork, Clock::Real).with_fastest(speed);
+    let mut analysis = RunAnalysis::new(artwork, Clock::Real, reader.period()).with_fastest(speed);
     for record in reader {
         match record {
             Ok(record) => analysis.push(&record),

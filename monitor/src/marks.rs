@@ -24,7 +24,7 @@ use frontier::{Frontier, Unseen, first_light, last_light};
 use line::{Foot, Line};
 use messages::ControllerReport;
 use messages::artwork::Artwork;
-use messages::time::CYCLE_TIME;
+use messages::time::{Period, SETPOINT_TIME};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -122,6 +122,7 @@ pub enum Unevaluated {
 #[derive(Debug)]
 pub struct MarkEvaluator<'a> {
     artwork: &'a Artwork,
+    period: Period,
     path: ToolPath,
     newest: Option<Moment>,
     strokes: Vec<StrokeState>,
@@ -205,8 +206,8 @@ impl MeanSquare {
     }
 }
 
-/// Sub-steps of a lit cycle: at 0.25 m/s a point each 0.125 mm.
-const STEPS: f64 = 2.0;
+/// Time between two points of light [s]: at 0.25 m/s one each 0.125 mm.
+const STEP_TIME: f64 = SETPOINT_TIME / 2.0;
 
 /// How far from its expected place on a stroke the tool is looked for at first [m].
 const FIRST_REACH: f64 = 1e-3;
@@ -218,10 +219,11 @@ const REACH: f64 = 1e-4;
 const LOST_TRACK: f64 = 2e-4;
 
 impl<'a> MarkEvaluator<'a> {
-    /// An evaluator for `artwork`, before the first record.
-    pub fn new(artwork: &'a Artwork) -> Self {
+    /// An evaluator for `artwork` and cycles of this `period`, before the first record.
+    pub fn new(artwork: &'a Artwork, period: Period) -> Self {
         Self {
             artwork,
+            period,
             path: ToolPath::default(),
             newest: None,
             strokes: vec![StrokeState::default(); artwork.strokes.len()],
@@ -247,7 +249,7 @@ impl<'a> MarkEvaluator<'a> {
     /// Takes the next record, with the tool where drives reported it. A record without a tool
     /// position is as good as none.
     pub fn push(&mut self, record: &CycleRecord) {
-        let moment = Moment::of(record);
+        let moment = Moment::of(record, self.period);
         self.played |= moment.asked.stream != 0 || moment.laser.is_lit();
         if moment.tool_known {
             self.moment(moment);
@@ -393,8 +395,8 @@ impl<'a> MarkEvaluator<'a> {
 
     /// Marks from part `from` to part `to` of an interval.
     fn light(&mut self, interval: &Interval, stroke: u64, from: f64, to: f64) {
-        let cycles = interval.time() / CYCLE_TIME;
-        let steps = ((to - from) * cycles * STEPS).ceil().max(1.0);
+        let time = interval.time() / STEP_TIME;
+        let steps = ((to - from) * time).ceil().max(1.0);
         let step = (to - from) / steps;
         for index in 0..=steps as u32 {
             let part = from + step * f64::from(index);

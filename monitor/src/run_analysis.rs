@@ -9,6 +9,7 @@ use crate::recording::continuity::{Continuity, Gap, Stamp, Succession};
 use crate::trace::Trace;
 use messages::ControllerReport;
 use messages::artwork::Artwork;
+use messages::time::Period;
 
 /// Whether the stamps in the samples are those of a real clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,14 +46,14 @@ pub struct RunResults {
 }
 
 impl<'a> RunAnalysis<'a> {
-    /// An analysis of nothing yet, against what was to be marked; in virtual time there are
-    /// no latencies.
-    pub fn new(artwork: &'a Artwork, clock: Clock) -> Self {
+    /// An analysis of nothing yet, against what was to be marked, of cycles of this `period`; in virtual
+    /// time there are no latencies.
+    pub fn new(artwork: &'a Artwork, clock: Clock, period: Period) -> Self {
         Self {
             clock,
-            evaluator: MarkEvaluator::new(artwork),
+            evaluator: MarkEvaluator::new(artwork, period),
             histograms: HopHistograms::new(),
-            trace: Trace::new(clock == Clock::Real),
+            trace: Trace::new(clock == Clock::Real, period),
             first: None,
             newest: None,
             continuity: Continuity::default(),
@@ -121,7 +122,7 @@ mod tests {
     fn what_the_stream_has_before_and_after_the_records_is_missing() {
         let artwork = Artwork::default();
         let check = |cycles: &[u64], expect: (u64, u64, u64)| {
-            let mut analysis = RunAnalysis::new(&artwork, Clock::Virtual);
+            let mut analysis = RunAnalysis::new(&artwork, Clock::Virtual, Period::OF_SETPOINTS);
             for &cycle in cycles {
                 let feedback = Feedback { cycle: Cycle(cycle), ..Feedback::default() };
                 analysis.push(&CycleRecord::unanswered(feedback));

@@ -12,6 +12,7 @@ use crate::conclusion::RecordingState;
 use crate::run_folder::{FileError, RunFolder};
 use crate::stage::Inputs;
 use machine::Machine;
+use messages::time::Period;
 use messages::{Command, ControllerReport, DrivesReport, Feedback, JobOffer, run_folder};
 use recording::Recording;
 use runtime::channel::DEEP;
@@ -33,7 +34,7 @@ const SILENCE: Duration = Duration::from_millis(300);
 /// # Errors
 /// When a channel fails, or when a recording fails and not even that can be written down.
 pub fn run(domain: &Domain, machine: &Machine) -> Result<(), ServiceError> {
-    let mut service = Service::open(domain)?;
+    let mut service = Service::open(domain, machine.realtime.period)?;
     while signal::termination().is_none() && service.has_supervisor() {
         service.poll()?;
         std::thread::sleep(POLL_INTERVAL);
@@ -65,6 +66,8 @@ struct Service {
     early: bool,
     job: Option<Job>,
     recording: Option<Recording>,
+    /// The period of the cycle.
+    period: Period,
 }
 
 /// The newest job that was offered.
@@ -77,7 +80,7 @@ struct Job {
 }
 
 impl Service {
-    fn open(domain: &Domain) -> Result<Self, ServiceError> {
+    fn open(domain: &Domain, period: Period) -> Result<Self, ServiceError> {
         Ok(Self {
             feedbacks: domain.subscriber(Samples::All)?,
             commands: domain.subscriber(Samples::All)?,
@@ -94,6 +97,7 @@ impl Service {
             early: true,
             job: None,
             recording: None,
+            period,
         })
     }
 
@@ -188,7 +192,7 @@ impl Service {
             if !goes_on {
                 self.forget();
             }
-            match Recording::begin(stream, folder.clone(), overruns_before) {
+            match Recording::begin(stream, folder.clone(), overruns_before, self.period) {
                 Ok(recording) => self.recording = Some(recording),
                 Err(error) => refuse(&folder, stream, &error)?,
             }

@@ -9,20 +9,23 @@ use crate::recording::CycleRecord;
 use crate::recording::continuity::Succession;
 use envelope::Envelope;
 use messages::hop::{Hop, latencies};
-use messages::{LaserCycle, MAX_ACTUATORS};
+use messages::time::Period;
+use messages::{LaserCycle, MAX_ACTUATORS, Nanoseconds};
 use outline::{Outline, OutlinePoint};
 
-/// Share of so many cycles in which the laser marked, 0..=1.
-pub fn lit_share(laser: &LaserCycle, cycles: u64) -> f64 {
-    LitSpans::of(laser, cycles).share()
+/// Share of `time` in which the laser marked, 0..=1.
+pub fn lit_share(laser: &LaserCycle, time: Nanoseconds) -> f64 {
+    LitSpans::of(laser, time).share()
 }
 
-/// Skipped cycles that the curves show as a gap at most, a minute; a longer one looks no different.
-const LONGEST_GAP: u64 = 60_000;
+/// The longest time of skipped cycles that the curves show as a gap; a longer one looks no different.
+const LONGEST_GAP: Nanoseconds = Nanoseconds(60_000_000_000);
 
 /// The curves of a run over time and its paths in the plane.
 #[derive(Debug)]
 pub struct Trace {
+    /// The period of the cycle.
+    pub period: Period,
     path: ToolPath,
     waiting: Option<CycleRecord>,
     timed: bool,
@@ -49,9 +52,11 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// An empty trace; `timed` tells whether the samples' stamps are those of a real clock.
-    pub fn new(timed: bool) -> Self {
+    /// An empty trace of cycles of this `period`; `timed` tells whether the samples' stamps are those of a
+    /// real clock.
+    pub fn new(timed: bool, period: Period) -> Self {
         Self {
+            period,
             path: ToolPath::default(),
             waiting: None,
             timed,
@@ -71,7 +76,7 @@ impl Trace {
     /// Takes the next record. Over cycles that nobody recorded the curves have a gap.
     pub fn push(&mut self, record: &CycleRecord) {
         let CycleRecord { feedback, command } = record;
-        let moment = Moment::of(record);
+        let moment = Moment::of(record, self.period);
         let succession = self.path.succession(&moment);
         let absent = match succession {
             Succession::After(gap) => gap.cycles(),
@@ -79,7 +84,7 @@ impl Trace {
         };
         self.of_records().for_each(|envelope| envelope.skip(absent));
         let answered = record.is_answered();
-        for _ in 0..u64::from(feedback.skipped).min(LONGEST_GAP) {
+        for _ in 0..u64::from(feedback.skipped).min(self.period.cycles_for(LONGEST_GAP)) {
             let curves = [&mut self.following_error, &mut self.current, &mut self.voltage];
             curves.into_iter().flatten().for_each(|envelope| envelope.push(None));
             if self.timed {
@@ -153,7 +158,7 @@ impl Trace {
     }
 
     fn interval(&mut self, interval: &Interval) {
-        for _ in 1..interval.end.stamp.elapsed.min(LONGEST_GAP) {
+        for _ in 1..interval.end.stamp.elapsed.min(self.period.cycles_for(LONGEST_GAP)) {
             let curves = [
                 &mut self.power,
                 &mut self.speed,

@@ -37,7 +37,7 @@ use machine::kinematics::Joints;
 use machine::{Machine, Mechanism, PathLimits, WorkArea};
 use messages::Setpoint;
 use messages::artwork::ArtworkLine;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use nalgebra::Vector3;
 
 use crate::drawing::{Note, Turns};
@@ -63,7 +63,7 @@ const LONGEST: f64 = 7.0 * 86_400.0;
 
 /// For how long samples depend on the motion before them [s]: they are differences over earlier cycles and
 /// a mean over one.
-const REMEMBERED: f64 = 2.0 * CYCLE_TIME;
+const REMEMBERED: f64 = 2.0 * SETPOINT_TIME;
 
 /// Samples checked between two questions whether anybody still waits for the plan.
 const ASK: u64 = 4096;
@@ -75,7 +75,7 @@ const MOST_SETPOINTS: usize = 4096;
 /// The rest before the first motion [s]: whole cycles, so that a source that is told ahead of the first
 /// light is told at rest.
 fn first_rest(machine: &Machine) -> f64 {
-    BEFORE + (machine.laser.on_delay / CYCLE_TIME).ceil() * CYCLE_TIME
+    BEFORE + (machine.laser.on_delay / SETPOINT_TIME).ceil() * SETPOINT_TIME
 }
 
 /// What a job does, read and understood.
@@ -249,7 +249,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             let is_early = begins_after(violation.time - REMEMBERED);
             let is_the_same = is_early && before.as_ref() == Some(violation);
             // Nothing of this window has a part in it, or nothing that it does mends it.
-            if begins_after(violation.time + CYCLE_TIME / 2.0)
+            if begins_after(violation.time + SETPOINT_TIME / 2.0)
                 || (is_the_same && trials.has_been_slowed())
             {
                 return Err(Failure::Before(error));
@@ -406,7 +406,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
                 return Err(self.limit(violation));
             }
             if let Some(interpolation) = &mut front.interpolation {
-                let time = setpoint.sequence as f64 * CYCLE_TIME;
+                let time = setpoint.sequence as f64 * SETPOINT_TIME;
                 match interpolation.check(setpoint, &front.sampler) {
                     Ok(None) => {}
                     Ok(Some(violation)) => return Err(self.limit(violation)),

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use machine::kinematics::ToolMotion;
 use messages::Nanoseconds;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 
 use crate::geometry::attitude::AttitudeLaw;
 use crate::geometry::path::{Path, PathCursor};
@@ -17,7 +17,7 @@ use crate::law::flight::Flight;
 use crate::law::time_law::TimeLaw;
 
 /// Rest at the start of a stream [s], so that its first samples are at rest.
-pub const BEFORE: f64 = 2.0 * CYCLE_TIME;
+pub const BEFORE: f64 = 2.0 * SETPOINT_TIME;
 
 /// A stretch of motion of one kind.
 #[derive(Debug, Clone, PartialEq)]

@@ -21,6 +21,12 @@ pub struct LatencyArguments {
     /// How long to measure [s].
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     pub seconds: f64,
+    /// Period of the control cycle, such as "250 us", in place of the machine file's.
+    #[arg(long, value_name = "TIME", conflicts_with = "rates")]
+    pub period: Option<String>,
+    /// Measure 250 Hz, 500 Hz, 1, 2, 4 and 8 kHz, one after the other, for that long each.
+    #[arg(long, conflicts_with = "periods")]
+    pub rates: bool,
     /// Print each period of the drives' clock [ns], one a line, and nothing else on stdout.
     #[arg(long)]
     pub periods: bool,

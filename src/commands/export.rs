@@ -51,7 +51,7 @@ fn export(
     writer: impl Write,
     written: impl Fn(io::Error) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
-    let mut table = match TableWriter::new(writer, actuators) {
+    let mut table = match TableWriter::new(writer, actuators, reader.period()) {
         Ok(table) => table,
         Err(error) => return written(error),
     };

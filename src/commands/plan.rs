@@ -10,7 +10,7 @@ use crate::{inputs, output};
 use machine::Machine;
 use messages::Setpoint;
 use messages::plan::InterpolationFacts;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use planner::paper::{PaperFacts, Profile, SpeedTime};
 use planner::{Job, Plan, PlanError, PlanFacts};
 use runtime::message;
@@ -295,7 +295,7 @@ fn write_samples(
 
 fn write_row(file: &mut impl Write, machine: &Machine, setpoint: &Setpoint) -> io::Result<()> {
     let [x, y, z] = setpoint.tool;
-    write!(file, "{},{x},{y},{z}", setpoint.sequence as f64 * CYCLE_TIME)?;
+    write!(file, "{},{x},{y},{z}", setpoint.sequence as f64 * SETPOINT_TIME)?;
     for (index, axis) in machine.axes.iter().enumerate() {
         let Setpoint { position, velocity, acceleration, .. } = setpoint;
         write!(file, ",{},{},{}", position[index], velocity[index], acceleration[index])?;

@@ -7,7 +7,7 @@ mod train;
 use crate::exit::Failure;
 use machine::{Machine, Mechanism, MechanismVisitor};
 use messages::Setpoint;
-use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use messages::time::{SETPOINT_PERIOD, SETPOINT_TIME};
 use path::PulsePath;
 use planner::Plan;
 use planner::trajectory::{Cursor, Reference};
@@ -141,7 +141,7 @@ impl Follower<'_> {
         let mut trains: Vec<Train> =
             actuators.filter_map(|(index, actuator)| Train::new(index, actuator, &first)).collect();
         let mut path = PulsePath::new(mechanism, &mut self.motion.planned, &trains, &first)
-            .map_err(|error| path::unclosed(first.sequence as f64 * CYCLE_TIME, &error))?;
+            .map_err(|error| path::unclosed(first.sequence as f64 * SETPOINT_TIME, &error))?;
         let mut due: Vec<Due> = Vec::new();
         // The rate of the lead is the difference across both neighbours, as in the controller.
         let mut before = first;
@@ -149,7 +149,7 @@ impl Follower<'_> {
         while let Some(now) = next {
             next = self.motion.setpoints.next();
             let after = next.as_ref().unwrap_or(&now);
-            let start = now.sequence.saturating_sub(1) as f64 * CYCLE_TIME;
+            let start = now.sequence.saturating_sub(1) as f64 * SETPOINT_TIME;
             due.clear();
             for (index, train) in trains.iter_mut().enumerate() {
                 train.follow(index, &before, &now, after, &mut due);
@@ -162,7 +162,7 @@ impl Follower<'_> {
                     let (name, count) = (&trains[pulse.train].name, pulse.count);
                     list.put(|file| writeln!(file, "{time:.9},{name},{count}"))?;
                 }
-                let share = pulse.offset as f64 / CYCLE_PERIOD.0 as f64;
+                let share = pulse.offset as f64 / SETPOINT_PERIOD.0 as f64;
                 let unclosed = |error| path::unclosed(time, &error);
                 // Just before it, and from it on.
                 path.look(share, &trains).map_err(unclosed)?;
@@ -174,7 +174,7 @@ impl Follower<'_> {
                     table.put(|file| writeln!(file, "{time:.9},{x},{y},{z},{off},{lit}"))?;
                 }
             }
-            let unclosed = |error| path::unclosed(start + CYCLE_TIME, &error);
+            let unclosed = |error| path::unclosed(start + SETPOINT_TIME, &error);
             path.look(1.0, &trains).map_err(unclosed)?;
             path.end().map_err(unclosed)?;
             before = now;

@@ -4,6 +4,7 @@
 use crate::arguments::ServiceArguments;
 use crate::exit::{Exit, Failure};
 use crate::pipeline::configuration::Configuration;
+use machine::Machine;
 use runtime::domain::Role;
 use runtime::thread::{CONTROLLER_PRIORITY, DRIVES_PRIORITY};
 use runtime::{Domain, Instance, signal};
@@ -26,8 +27,9 @@ pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
         }
         Role::Drives => {
             let machine = configuration.machine()?;
-            let port = drives::ports::build(&machine, &configuration.source.plant()?)
-                .map_err(Failure::bad_input)?;
+            // Whatever the plant's file says: drives is the one clock.
+            let plant = Machine { realtime: machine.realtime, ..configuration.source.plant()? };
+            let port = drives::ports::build(&machine, &plant).map_err(Failure::bad_input)?;
             let options = drives::service::ServiceOptions {
                 deadlines: configuration.deadlines(&machine),
                 realtime: configuration.realtime_options(DRIVES_PRIORITY),

@@ -6,7 +6,7 @@ use crate::files::Claim;
 use crate::{inputs, output};
 use drives::PlantOptions;
 use messages::run_folder;
-use messages::time::CYCLE_TIME;
+use messages::time::Period;
 use monitor::conclusion::{self, RunOutcome};
 use monitor::marks::StreamEnd;
 use monitor::recording::CycleRecord;
@@ -39,8 +39,9 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     let folder = folder.map_err(Failure::bad_input)?;
     let _claim = folder.as_ref().map(Claim::of).transpose()?;
     folder.as_ref().map_or(Ok(()), RunFolder::clear).map_err(Failure::bad_input)?;
-    let mut recording = folder.as_ref().map(Recording::begin);
-    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual);
+    let period = input.machine.realtime.period;
+    let mut recording = folder.as_ref().map(|folder| Recording::begin(folder, period));
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, period);
     let options = PlantOptions { seed: arguments.seed, ..PlantOptions::default() };
     let simulated = simulate(&input.machine, &input.plant, &plan, options, |records| {
         records.iter().for_each(|record| analysis.push(record));
@@ -67,7 +68,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
 
     let examining = Instant::now();
     let results = analysis.finish(StreamEnd::Reported(&simulated.controller));
-    let time = simulated.controller.cycles as f64 * CYCLE_TIME;
+    let time = period.of(simulated.controller.cycles).seconds();
     let run_outcome = RunOutcome {
         controller: Some(simulated.controller),
         drives: Some(simulated.drives),
@@ -97,9 +98,9 @@ struct Recording {
 }
 
 impl Recording {
-    fn begin(folder: &RunFolder) -> Self {
+    fn begin(folder: &RunFolder, period: Period) -> Self {
         let path = folder.file(run_folder::SAMPLES);
-        Self { writer: RecordingWriter::create(&path), path }
+        Self { writer: RecordingWriter::create(&path, period), path }
     }
 
     fn write(&mut self, records: &[CycleRecord]) {

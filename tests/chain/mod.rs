@@ -7,7 +7,7 @@
 use controller::{Controller, Inputs, Outputs, Peers};
 use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, SimulatedPlant};
 use machine::Machine;
-use messages::time::CYCLE_PERIOD;
+use messages::time::Period;
 use messages::{Feedback, Nanoseconds, OperatorRequest, OperatorVerb, Setpoint};
 use planner::Plan;
 
@@ -27,6 +27,7 @@ pub(crate) struct Chain<'a> {
     pub(crate) is_fed: bool,
     /// The number of the cycle, from 1.
     pub(crate) cycle: u64,
+    period: Period,
     deadline: Nanoseconds,
     setpoints: Box<dyn Iterator<Item = Setpoint> + 'a>,
 }
@@ -44,14 +45,15 @@ impl<'a> Chain<'a> {
 
     fn of(machine: &Machine, setpoints: impl Iterator<Item = Setpoint> + 'a) -> Self {
         let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
-        let stall = machine.stall;
-        let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall };
+        let timing = machine.realtime;
+        let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, timing };
         Self {
             controller: Controller::new(machine),
             bridge: Bridge::new(port, options),
             outputs: Outputs::default(),
             is_fed: true,
             cycle: 0,
+            period: timing.period,
             deadline: Nanoseconds(0),
             setpoints: Box::new(setpoints),
         }
@@ -60,7 +62,7 @@ impl<'a> Chain<'a> {
     /// Begins the next cycle and gives what was measured.
     pub(crate) fn begin(&mut self) -> Feedback {
         self.cycle += 1;
-        self.deadline = self.deadline + CYCLE_PERIOD;
+        self.deadline = self.deadline + self.period.time();
         self.bridge.begin(self.deadline, self.deadline);
         *self.bridge.feedback()
     }
@@ -96,6 +98,6 @@ impl<'a> Chain<'a> {
 
     /// Lets drives skip `cycles`.
     pub(crate) fn skip(&mut self, cycles: u64) {
-        self.deadline = self.deadline + Nanoseconds::of_cycles(cycles);
+        self.deadline = self.deadline + self.period.of(cycles);
     }
 }

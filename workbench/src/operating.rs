@@ -3,7 +3,7 @@
 use machine::transmission::gear::Efficiency;
 use machine::{Actuator, Friction, Machine, Motor};
 use messages::Setpoint;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use planner::Plan;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -91,7 +91,7 @@ fn lead(actuator: &Actuator, points: &mut [OperatingPoint]) {
         let next = points[index + 1].speed;
         let point = &mut points[index];
         let torque = point.load + point.rotor;
-        point.acceleration = (next - point.speed) / CYCLE_TIME;
+        point.acceleration = (next - point.speed) / SETPOINT_TIME;
         point.rotor = actuator.motor.rotor_inertia() * point.acceleration;
         point.load = torque - point.rotor;
         point.by_efficiency =
@@ -115,7 +115,7 @@ fn operate(
     before: Option<Shaft>,
 ) -> (OperatingPoint, Shaft) {
     let angle = (setpoint.position[actuator.axis] + setpoint.lead[index]) / actuator.ratio;
-    let speed = before.map_or(0.0, |before| (angle - before.angle) / CYCLE_TIME);
+    let speed = before.map_or(0.0, |before| (angle - before.angle) / SETPOINT_TIME);
     let acceleration = setpoint.acceleration[actuator.axis] / actuator.ratio;
     let rotor = actuator.motor.rotor_inertia() * acceleration;
     let load = setpoint.effort[index] - rotor;
@@ -125,14 +125,14 @@ fn operate(
         Motor::Dc(motor) => {
             let current = torque / motor.torque_constant;
             let earlier = before.map_or(current, |before| before.current);
-            let rate = (current - earlier) / CYCLE_TIME;
+            let rate = (current - earlier) / SETPOINT_TIME;
             let voltage = motor.voltage((current + earlier) / 2.0, rate, speed);
             (current, voltage, voltage * current)
         }
         Motor::Stepper(_) => (0.0, 0.0, torque * speed),
     };
     let point = OperatingPoint {
-        time: setpoint.sequence as f64 * CYCLE_TIME,
+        time: setpoint.sequence as f64 * SETPOINT_TIME,
         is_lit: setpoint.laser.is_lit(),
         stroke: setpoint.stroke,
         speed,
@@ -207,7 +207,7 @@ impl Demand {
         };
         let (torque_peak, speed_peak) = (most(OperatingPoint::torque), most(|point| point.speed));
         Self {
-            time: course.points.len() as f64 * CYCLE_TIME,
+            time: course.points.len() as f64 * SETPOINT_TIME,
             torque_peak,
             torque_rms: mean(|point| point.torque() * point.torque()).sqrt(),
             load_peak: most(|point| point.load),
@@ -219,8 +219,8 @@ impl Demand {
             speed_rms: mean(|point| point.speed * point.speed).sqrt(),
             power_peak: most(OperatingPoint::power),
             power_product: torque_peak * speed_peak,
-            energy: mean(|point| point.supplied.max(0.0)) * count * CYCLE_TIME,
-            regenerated: mean(|point| (-point.supplied).max(0.0)) * count * CYCLE_TIME,
+            energy: mean(|point| point.supplied.max(0.0)) * count * SETPOINT_TIME,
+            regenerated: mean(|point| (-point.supplied).max(0.0)) * count * SETPOINT_TIME,
             duty: mean(|point| f64::from(u8::from(point.speed.abs() > STANDING))),
             current_rms: mean(|point| point.current * point.current).sqrt(),
             current_peak: most(|point| point.current),
@@ -288,7 +288,7 @@ mod tests {
         };
         let torque = effort + 5e-3 + 1e-6 * speed / axis.ratio;
         let before = Shaft {
-            angle: 0.01 / axis.ratio - speed / axis.ratio * CYCLE_TIME,
+            angle: 0.01 / axis.ratio - speed / axis.ratio * SETPOINT_TIME,
             current: torque / 0.021,
         };
         let (point, _) = operate(axis, 0, &setpoint, Some(before));

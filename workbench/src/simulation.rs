@@ -7,7 +7,6 @@ use controller::{Controller, Inputs, Outputs, Peers};
 use drives::bridge::BridgeOptions;
 use drives::{Bridge, Deadlines, PlantOptions, SimulatedPlant};
 use machine::Machine;
-use messages::time::CYCLE_PERIOD;
 use messages::{
     ControllerReport, ControllerState, DrivesReport, Fault, Nanoseconds, OperatorRequest,
     OperatorVerb, RealtimeFacts, Setpoint,
@@ -30,8 +29,8 @@ const CHUNK: usize = 256;
 /// Cycles after the stream's end in which its last light is still told.
 const LIGHT_LAG: usize = monitor::conclusion::LIGHT_LAG as usize + 1;
 
-/// Cycles that enabling may take: the controller gives up before, with a fault that says why.
-const ENABLE_PATIENCE: u64 = 3000;
+/// How long enabling may take: the controller gives up before, with a fault that says why.
+const ENABLE_PATIENCE: Nanoseconds = Nanoseconds(3_000_000_000);
 
 /// What a simulation gives besides its records.
 #[derive(Debug, Clone)]
@@ -69,6 +68,7 @@ pub enum SimulationError {
 struct Pipeline {
     controller: Controller,
     bridge: Bridge,
+    period: Nanoseconds,
     now: Nanoseconds,
     outputs: Outputs,
 }
@@ -79,12 +79,15 @@ impl Pipeline {
         plant: &Machine,
         plant_options: PlantOptions,
     ) -> Result<Self, SimulationError> {
-        let port = SimulatedPlant::new(plant, plant_options)?;
+        // Whatever the plant's file says: drives is the one clock.
+        let plant = Machine { realtime: machine.realtime, ..plant.clone() };
+        let port = SimulatedPlant::new(&plant, plant_options)?;
         let options =
-            BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, stall: machine.stall };
+            BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, timing: machine.realtime };
         Ok(Self {
             controller: Controller::new(machine),
             bridge: Bridge::new(port, options),
+            period: machine.realtime.period.time(),
             now: Nanoseconds(0),
             outputs: Outputs::default(),
         })
@@ -92,7 +95,7 @@ impl Pipeline {
 
     /// One cycle, in the order of the real one; no time passes in it.
     fn cycle(&mut self, setpoints: &[Setpoint], request: Option<OperatorRequest>) {
-        self.now = self.now + CYCLE_PERIOD;
+        self.now = self.now + self.period;
         self.bridge.begin(self.now, self.now);
         let feedback = self.bridge.feedback();
         let peers = Peers::default();
@@ -110,7 +113,7 @@ impl Pipeline {
         // Drives powers nothing before it has been greeted by an unpowered command.
         self.cycle(&[], None);
         self.cycle(&[], Some(request(OperatorVerb::Enable, 0.0)));
-        for _ in 0..ENABLE_PATIENCE {
+        for _ in 0..machine.realtime.period.cycles_for(ENABLE_PATIENCE) {
             match self.outputs.command.state() {
                 ControllerState::Idle => return Ok(()),
                 ControllerState::Faulted => break,

@@ -53,7 +53,7 @@ fn racking(machine: &Machine, record: &CycleRecord) -> f64 {
 
 fn run(machine: &Machine, plant: &Machine, text: &str) -> Result<Simulated, SimulationError> {
     let plan = letter(machine, text);
-    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual);
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, machine.realtime.period);
     let (mut most, mut first): (f64, Option<f64>) = (0.0, None);
     let options = PlantOptions { seed: 3, ..PlantOptions::default() };
     let simulated = simulate(machine, plant, &plan, options, |records| {

@@ -11,8 +11,8 @@ use messages::{
     Nanoseconds, Progress,
 };
 
-/// Cycles between two progress samples.
-pub(super) const PROGRESS_INTERVAL: u64 = 5;
+/// Time between two progress samples.
+pub(super) const PROGRESS_INTERVAL: Nanoseconds = Nanoseconds(5_000_000);
 
 impl Controller {
     /// Writes the command.

@@ -7,17 +7,34 @@ use crate::standing::Strayed;
 use crate::state::{AfterRest, State};
 use crate::supervision::{Finding, Tracking};
 use messages::feedback::status;
+use messages::time::Period;
 use messages::{Cycle, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds};
 
-/// Cycles of standing still before an axis counts as at rest without a plan, and as enabled.
-const STANDING: u32 = 20;
+/// How long an axis stands still before it counts as at rest without a plan, and as enabled.
+const STANDING: Nanoseconds = Nanoseconds(20_000_000);
 
-/// Cycles that enabling, brakes left out, or a quick stop may take.
-const PATIENCE: u32 = 1000;
+/// How long enabling, brakes left out, or a quick stop may take.
+const PATIENCE: Nanoseconds = Nanoseconds(1_000_000_000);
 
-/// Cycles for which a planner that lives may send nothing: a minute, longer than any computer is
-/// merely busy.
-const SUPPLY_PATIENCE: u32 = 60_000;
+/// How long a planner that lives may send nothing: a minute, longer than any computer is merely busy.
+const SUPPLY_PATIENCE: Nanoseconds = Nanoseconds(60_000_000_000);
+
+/// These times in cycles.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Waits {
+    standing: u64,
+    patience: u64,
+    supply: u64,
+}
+
+impl Waits {
+    /// At this period of the cycle.
+    pub(super) fn new(period: Period) -> Self {
+        let [standing, patience, supply] =
+            [STANDING, PATIENCE, SUPPLY_PATIENCE].map(|time| period.cycles_for(time));
+        Self { standing, patience, supply }
+    }
+}
 
 impl Controller {
     /// Changes the state where time or the feedback asks for it.
@@ -51,10 +68,10 @@ impl Controller {
             State::Failing { tracking, waited } => {
                 let at_rest = match tracking {
                     Tracking::Sound => self.stands_on_plan() && self.alignment.is_done(),
-                    Tracking::Lost => self.supervision.standing() >= STANDING,
+                    Tracking::Lost => self.supervision.standing() >= self.waits.standing,
                 };
                 self.state = State::Failing { tracking, waited: waited + 1 };
-                if at_rest || waited >= PATIENCE {
+                if at_rest || waited >= self.waits.patience {
                     self.end_in_fault(feedback.cycle);
                 }
             }
@@ -66,7 +83,7 @@ impl Controller {
     /// Waits for the power and for standstill, while what nothing holds must not sink; then holds the axes
     /// where they stand, against their weight, until the brakes are open and all have stood there for a
     /// moment.
-    fn enable(&mut self, now: Nanoseconds, feedback: &Feedback, cycles: [u32; 3]) {
+    fn enable(&mut self, now: Nanoseconds, feedback: &Feedback, cycles: [u64; 3]) {
         let [waited, held, settled] = cycles;
         if waited == 0 {
             self.enabled_at = feedback.position;
@@ -85,7 +102,7 @@ impl Controller {
         let ready = held > 0 || is_borne && feedback.has(status::POWERED) && is_sound && stands;
         let rests = held > self.standing.release() && stands && strayed.is_none();
         let settled = if rests { settled + 1 } else { 0 };
-        if settled >= STANDING {
+        if settled >= self.waits.standing {
             self.squaring = Squaring::new(&self.machine, self.feedforward.after());
             self.state = if self.squaring.is_done() {
                 State::Idle
@@ -96,7 +113,7 @@ impl Controller {
         }
         self.state =
             State::Enabling { waited: waited + 1, held: if ready { held + 1 } else { 0 }, settled };
-        if sinks || waited >= PATIENCE + self.standing.release() {
+        if sinks || waited >= self.waits.patience + self.standing.release() {
             self.fail(Finding::lost(self.restless(feedback, strayed, waited)), now);
             // A quick stop would power what is not powered yet.
             if !feedback.has(status::POWERED) {
@@ -107,26 +124,26 @@ impl Controller {
 
     /// Goes to where the actuators of each axis are together, and waits until all have stood there for a
     /// moment.
-    fn square(&mut self, now: Nanoseconds, feedback: &Feedback, [waited, settled]: [u32; 2]) {
+    fn square(&mut self, now: Nanoseconds, feedback: &Feedback, [waited, settled]: [u64; 2]) {
         if !self.squaring.is_done() {
             return;
         }
         let strayed = self.standing.strayed(&self.feedforward.now().angle, &feedback.position);
         let rests = self.supervision.standing() > 0 && strayed.is_none();
         let settled = if rests { settled + 1 } else { 0 };
-        if settled >= STANDING {
+        if settled >= self.waits.standing {
             self.state = State::Idle;
             return;
         }
         self.state = State::Squaring { waited: waited + 1, settled };
-        if waited >= PATIENCE {
+        if waited >= self.waits.patience {
             self.fail(Finding::lost(self.restless(feedback, strayed, waited)), now);
         }
     }
 
     /// Why the axes cannot be enabled after `waited` cycles: one has `strayed` from its place by so much,
     /// or still moves, or the power does not come.
-    fn restless(&self, feedback: &Feedback, strayed: Option<Strayed>, waited: u32) -> Fault {
+    fn restless(&self, feedback: &Feedback, strayed: Option<Strayed>, waited: u64) -> Fault {
         if feedback.fault.is_some() {
             return feedback.fault;
         }
@@ -136,21 +153,21 @@ impl Controller {
             let quantity = FaultQuantity::HoldDistance;
             return fault.on_actuator(index).beyond(quantity, distance * ratio, limit * ratio);
         }
-        if let Some((index, speed, limit)) = self.supervision.moving(feedback) {
+        if let Some((index, speed, limit)) = self.supervision.moving() {
             return fault.on_actuator(index).beyond(FaultQuantity::Velocity, speed, limit);
         }
-        let limit = PATIENCE + self.standing.release();
-        fault.beyond(FaultQuantity::Cycles, f64::from(waited), f64::from(limit))
+        let limit = self.waits.patience + self.standing.release();
+        fault.beyond(FaultQuantity::Cycles, waited as f64, limit as f64)
     }
 
     /// Goes on as soon as there is enough to play, or gives up waiting.
-    fn await_supply(&mut self, now: Nanoseconds, waited: u32) {
+    fn await_supply(&mut self, now: Nanoseconds, waited: u64) {
         self.state = if self.intake.is_supplied(self.player.after().time) {
             State::Running
         } else {
             State::Holding(AfterRest::Supply { waited: waited + 1 })
         };
-        if waited >= SUPPLY_PATIENCE {
+        if waited >= self.waits.supply {
             let time = self.player.after().time.seconds();
             let fault = Fault::new(FaultCode::StreamStarved);
             self.fail(Finding::sound(fault.with(FaultQuantity::StreamTime, time)), now);

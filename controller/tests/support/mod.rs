@@ -7,7 +7,7 @@ use controller::{Controller, Inputs, Outputs, Peers};
 use machine::{Actuator, Machine, StallTolerance};
 use messages::feedback::status;
 use messages::setpoint::flags;
-use messages::time::CYCLE_PERIOD;
+use messages::time::SETPOINT_PERIOD as CYCLE_PERIOD;
 use messages::{
     Command, CommandMode, ControllerReport, ControllerState, Feedback, GateEdge, LaserCycle,
     Nanoseconds, OperatorReply, OperatorRequest, OperatorVerb, Progress, Setpoint,
@@ -237,7 +237,10 @@ pub fn two_marks(machine: &Machine, speed: f64, power: f64) -> Job {
 
 /// The built-in machine, bearing stalls of `tolerance`.
 pub fn stalling(tolerance: Nanoseconds) -> Machine {
-    Machine { stall: StallTolerance::new(tolerance).unwrap(), ..Machine::builtin() }
+    let mut machine = Machine::builtin();
+    let period = machine.realtime.period;
+    machine.realtime.stall = StallTolerance::new(tolerance, period).unwrap();
+    machine
 }
 
 /// Joints at home of a CoreXY, or of a Cartesian machine, whose motors are steppers here.

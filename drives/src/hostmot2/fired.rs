@@ -1,7 +1,7 @@
 //! What the laser did, for the feedback: what the board has shown to have done, later by its latency.
 
 use machine::LaserSource;
-use messages::time::CYCLE_PERIOD;
+use messages::time::SETPOINT_PERIOD;
 use messages::{GateEdge, LaserCycle, Nanoseconds};
 
 use crate::plant::source::Source;
@@ -19,7 +19,10 @@ impl Fired {
     pub fn new(source: &LaserSource, latency: Nanoseconds) -> Self {
         let later = |delay: f64| delay + latency.seconds();
         let (on_delay, off_delay) = (later(source.on_delay), later(source.off_delay));
-        let source = Source::new(&LaserSource { on_delay, off_delay, ..*source });
+        let source = Source::new(
+            &LaserSource { on_delay, off_delay, ..*source },
+            messages::time::Period::OF_SETPOINTS,
+        );
         Self { source, light: LaserCycle::OFF, cycles: 0 }
     }
 
@@ -27,7 +30,7 @@ impl Fired {
     /// out, the last ones first.
     pub fn pass(&mut self, laser: &LaserCycle) {
         let light = self.source.cycle(laser).unwrap_or(LaserCycle::OFF);
-        let start = self.cycles.saturating_mul(CYCLE_PERIOD.0 as u32);
+        let start = self.cycles.saturating_mul(SETPOINT_PERIOD.0 as u32);
         self.cycles += 1;
         if start == 0 {
             self.light = light;

@@ -4,7 +4,7 @@ use std::net::{SocketAddr, ToSocketAddrs};
 
 use machine::drives::{Hostmot2, Hostmot2Actuator};
 use machine::{ActuatorMode, DrivesKind, Machine};
-use messages::time::CYCLE_PERIOD;
+use messages::time::SETPOINT_PERIOD;
 use messages::{LinkCounters, Nanoseconds};
 
 use super::arming::{BoardClock, Pins, Watchdog};
@@ -155,11 +155,11 @@ impl Hostmot2Port {
     }
 
     fn period(&self) -> f64 {
-        CYCLE_PERIOD.seconds()
+        SETPOINT_PERIOD.seconds()
     }
 
     fn check_latencies(&self) -> Result<(), OpenError> {
-        let period = CYCLE_PERIOD;
+        let period = SETPOINT_PERIOD;
         let [least, most] = LATENCY.map(|share| Nanoseconds((share * period.0 as f64) as i64));
         let check = |what: String, latency: Nanoseconds, [least, most]: [Nanoseconds; 2]| {
             if (least..=most).contains(&latency) {
@@ -226,7 +226,7 @@ impl Hostmot2Port {
         for shot in &self.config.gate {
             let module = board.module(Kind::Oneshot, *shot)?;
             pins.gate(board.output(Kind::Oneshot, *shot, SECOND_TIMER)?);
-            gate = Some(Gate::new(module, &self.config.gate, CYCLE_PERIOD.0 as f64));
+            gate = Some(Gate::new(module, &self.config.gate, SETPOINT_PERIOD.0 as f64));
         }
         let power = self.config.power;
         if let Some(power) = power {
@@ -290,7 +290,7 @@ impl Hostmot2Port {
             inputs: inputs.collect(),
             gate_latency: self.config.gate_latency.seconds(),
             mirror_latency: mirror.seconds(),
-            period: CYCLE_PERIOD,
+            period: SETPOINT_PERIOD,
             link,
             watchdog,
             clock,

@@ -8,7 +8,7 @@
 //! the speed it had.
 
 use machine::{Actuator, ActuatorMode};
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use messages::{CommandMode, MAX_ACTUATORS};
 
 use crate::port::{Actuation, Freshness};
@@ -73,7 +73,7 @@ impl Servo {
         self.from = self.to;
         self.to = match actuation.freshness {
             Freshness::Fresh => [at(&actuation.position), at(&actuation.velocity)],
-            Freshness::Stale => [self.from[0] + self.from[1] * CYCLE_TIME, self.from[1]],
+            Freshness::Stale => [self.from[0] + self.from[1] * SETPOINT_TIME, self.from[1]],
         };
     }
 
@@ -127,12 +127,12 @@ impl Servo {
     fn reference(&self, share: f64) -> [f64; 2] {
         let ([from, from_speed], [to, to_speed]) = (self.from, self.to);
         let rise = to - from;
-        let (start, end) = (from_speed * CYCLE_TIME, to_speed * CYCLE_TIME);
+        let (start, end) = (from_speed * SETPOINT_TIME, to_speed * SETPOINT_TIME);
         let square = 3.0 * rise - 2.0 * start - end;
         let cube = start + end - 2.0 * rise;
         [
             from + share * (start + share * (square + share * cube)),
-            (start + share * (2.0 * square + share * 3.0 * cube)) / CYCLE_TIME,
+            (start + share * (2.0 * square + share * 3.0 * cube)) / SETPOINT_TIME,
         ]
     }
 }

@@ -1,7 +1,8 @@
 //! The laser source: light follows the gate, later by the source's delays.
 
 use machine::LaserSource;
-use messages::{GateEdge, LaserCycle, MAX_EDGES, Nanoseconds, time::CYCLE_PERIOD};
+use messages::time::Period;
+use messages::{GateEdge, LaserCycle, MAX_EDGES, Nanoseconds};
 
 /// A change of the light that is still to come.
 #[derive(Debug, Clone, Copy, Default)]
@@ -19,6 +20,8 @@ pub struct TooManyEdges;
 /// The source with what it has been told and not yet done.
 #[derive(Debug, Clone, Copy)]
 pub struct Source {
+    /// How long a cycle is.
+    period: Nanoseconds,
     on_delay: Nanoseconds,
     off_delay: Nanoseconds,
     asked: (u32, f64),
@@ -28,9 +31,10 @@ pub struct Source {
 }
 
 impl Source {
-    /// A dark source with the delays of the machine file.
-    pub fn new(laser: &LaserSource) -> Self {
+    /// A dark source with the delays of the machine file, in cycles of this `period`.
+    pub fn new(laser: &LaserSource, period: Period) -> Self {
         Self {
+            period: period.time(),
             on_delay: Nanoseconds::from_seconds(laser.on_delay),
             off_delay: Nanoseconds::from_seconds(laser.off_delay),
             asked: (0, 0.0),
@@ -64,7 +68,7 @@ impl Source {
         }
         self.asked = asked.last();
 
-        let due = self.pending[..self.count].iter().filter(|c| c.at < CYCLE_PERIOD).count();
+        let due = self.pending[..self.count].iter().filter(|c| c.at < self.period).count();
         let mut light = LaserCycle { gate: self.light.0, power: self.light.1, ..LaserCycle::OFF };
         for change in &self.pending[..due] {
             if change.at <= Nanoseconds(0) {
@@ -80,7 +84,7 @@ impl Source {
         self.pending.copy_within(due..self.count, 0);
         self.count -= due;
         for change in &mut self.pending[..self.count] {
-            change.at = change.at - CYCLE_PERIOD;
+            change.at = change.at - self.period;
         }
         Ok(light)
     }
@@ -103,7 +107,8 @@ mod tests {
     use super::*;
 
     fn source(on_delay: f64, off_delay: f64) -> Source {
-        Source::new(&LaserSource { on_delay, off_delay, ..LaserSource::IDEAL })
+        let laser = LaserSource { on_delay, off_delay, ..LaserSource::IDEAL };
+        Source::new(&laser, Period::OF_SETPOINTS)
     }
 
     fn pulse(on: u32, off: u32) -> LaserCycle {

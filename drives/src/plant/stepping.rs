@@ -87,12 +87,13 @@ pub(super) struct Stepping<const N: usize> {
 }
 
 impl<const N: usize> Stepping<N> {
-    /// The drivers of `actuators`, which drive `axes`, at home with the magnetic axes at `origin` [rad];
-    /// `None` where they have no steppers.
+    /// The drivers of `actuators`, which drive `axes`, at home with the magnetic axes at `origin` [rad],
+    /// in cycles of `cycle_time` [s]; `None` where they have no steppers.
     pub(super) fn of(
         axes: &[Axis],
         actuators: &[Actuator],
         origin: SVector<f64, N>,
+        cycle_time: f64,
     ) -> Option<Self> {
         let first = *actuators.first()?.motor.stepper()?;
         let (mut motors, mut deceleration) = ([first; N], [0.0; N]);
@@ -101,7 +102,13 @@ impl<const N: usize> Stepping<N> {
             deceleration[row] = brake::deceleration(axes.get(actuator.axis)?, actuator);
         }
         let count = actuators.len().min(N);
-        Some(Self { motors, count, deceleration, origin, segments: [Segment::rest(0.0); N] })
+        Some(Self {
+            motors,
+            count,
+            deceleration,
+            origin,
+            segments: [Segment::rest(0.0, cycle_time); N],
+        })
     }
 
     /// The unpowered field of rotors whose teeth stand on a full step at `rotor` [rad].
@@ -130,7 +137,9 @@ impl<const N: usize> Stepping<N> {
         for (row, segment) in segments.iter_mut().enumerate().take(self.count) {
             let motor = &self.motors[row];
             *segment = match (actuation.mode, actuation.freshness) {
-                (CommandMode::Disabled, _) => Segment::rest(state.angle[row] - self.origin[row]),
+                (CommandMode::Disabled, _) => {
+                    Segment::rest(state.angle[row] - self.origin[row], segment.time)
+                }
                 (CommandMode::Driven, Freshness::Fresh) => segment
                     .then(actuation.position[row] - self.origin[row], actuation.velocity[row]),
                 // Nobody said where to: on as before, for the few cycles that the bridge allows.

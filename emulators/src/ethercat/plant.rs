@@ -2,7 +2,7 @@
 
 use drives::{Actuation, Freshness, Measurement, PlantOptions, Port, SimulatedPlant};
 use machine::{ActuatorMode, Machine, Motor};
-use messages::{CommandMode, MAX_ACTUATORS, Nanoseconds, time::CYCLE_PERIOD};
+use messages::{CommandMode, MAX_ACTUATORS, Nanoseconds};
 
 use super::wires::{Bundle, Phases};
 
@@ -52,7 +52,7 @@ impl Plant {
             (actuator.mode, actuator.latency) = (ActuatorMode::Voltage, Nanoseconds(0));
         }
         let port = SimulatedPlant::new(&motors, options).map_err(PlantError::Plant)?;
-        let period = CYCLE_PERIOD;
+        let period = machine.realtime.period.time();
         let back_emf = machine.actuators.iter().map(|actuator| {
             let constant = actuator.motor.dc().map_or(0.0, |motor| motor.torque_constant);
             constant * actuator.encoder.resolution() / period.seconds()

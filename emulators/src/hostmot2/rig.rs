@@ -17,7 +17,7 @@ use super::layout::{Function, pin_of};
 use super::wiring::{Connection, Drive, Wiring};
 use drives::plant::{Plant, PlantError};
 use drives::{Actuation, Freshness, Measurement, PlantOptions, Port};
-use messages::time::CYCLE_PERIOD;
+use messages::time::Period;
 
 /// Below this a motor counts as standing [rad/s].
 const STANDING: f64 = 0.1;
@@ -50,10 +50,18 @@ impl MechanismVisitor for Build<'_> {
     type Output = Result<Box<dyn Motors>, PlantError>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let Self(Machine { axes, actuators, laser, home_joints, .. }, options) = self;
+        let Self(Machine { axes, actuators, laser, home_joints, realtime, .. }, options) = self;
+        let period = realtime.period;
         if actuators.len() == axes.len() {
-            let plant =
-                Plant::<N, M>::new(mechanism, axes, actuators, laser, home_joints, options)?;
+            let plant = Plant::<N, M>::new(
+                mechanism,
+                axes,
+                actuators,
+                laser,
+                home_joints,
+                period,
+                options,
+            )?;
             return Ok(Box::new(plant));
         }
         let plant = Plant::<N, M, MAX_ACTUATORS>::new(
@@ -62,6 +70,7 @@ impl MechanismVisitor for Build<'_> {
             actuators,
             laser,
             home_joints,
+            period,
             options,
         )?;
         Ok(Box::new(plant))
@@ -106,6 +115,8 @@ struct Axis {
 pub struct Rig {
     motors: Box<dyn Motors>,
     axes: Vec<Axis>,
+    /// How long its cycle is.
+    period: Period,
     /// When its cycle at hand started.
     started: Nanoseconds,
     measurement: Measurement,
@@ -146,18 +157,19 @@ impl Rig {
             powered: false,
         };
         let axes = wiring.actuators.iter().zip(&machine.actuators).enumerate().map(axis).collect();
-        Ok(Self { motors, axes, started: Nanoseconds(0), measurement, fault: Fault::default() })
+        let (period, started) = (machine.realtime.period, Nanoseconds(0));
+        Ok(Self { motors, axes, period, started, measurement, fault: Fault::default() })
     }
 
     /// When its next cycle starts.
     pub fn next(&self) -> Nanoseconds {
-        self.started + CYCLE_PERIOD
+        self.started + self.period.time()
     }
 
     /// A datagram has arrived at `now`. Until a motor has power, the next cycle starts a little after it.
     pub fn align(&mut self, now: Nanoseconds) {
         if !self.axes.iter().any(|axis| axis.powered) {
-            self.started = now + MARGIN - CYCLE_PERIOD;
+            self.started = now + MARGIN - self.period.time();
         }
     }
 
@@ -197,7 +209,7 @@ impl Rig {
     /// What the motors shall do in the cycle that starts.
     fn actuation(&mut self, modules: &Modules) -> Actuation {
         let mut actuation = Actuation { freshness: Freshness::Fresh, ..Actuation::DISABLED };
-        let duration = CYCLE_PERIOD.seconds();
+        let duration = self.period.seconds();
         let (mut powered, mut released) = (false, false);
         for (row, axis) in self.axes.iter_mut().enumerate() {
             match axis.connection.drive {

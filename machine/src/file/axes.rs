@@ -5,12 +5,13 @@ use super::motors::{counts, mode, motor};
 use super::tables::{AxisActuatorTable, AxisTable, LimitsTable, LoopsTable};
 use crate::actuator::{Actuator, Friction, HoldingBrake, LoopGains};
 use crate::axis::Axis;
-use crate::document::{Decode, Diagnostics, Either, ProblemKind, Quantity, Range, Spanned};
+use crate::document::{Decode, Diagnostics, Either, ProblemKind, Quantity, Range, Span, Spanned};
 use crate::limits::AxisLimits;
 use crate::motor::Motor;
 use crate::quantity::Kind;
 use crate::transmission::gear::Efficiency;
 use messages::Nanoseconds;
+use messages::time::{Period, SETPOINT_TIME};
 
 pub(super) use crate::axis::JointUnit;
 
@@ -162,12 +163,13 @@ fn refuse_name(name: &Spanned<String>, diagnostics: &mut Diagnostics) {
 }
 
 /// The axis that `table` describes, moving `joint`, and its actuators, each with what is said of it in the
-/// file; their indices begin with those after the `before` that there are, of axes before the `index`th.
+/// file, its loops in cycles of this `period`; their indices begin with those after the `before` that there are, of axes before the `index`th.
 /// `None` where an actuator has no motor.
 pub(super) fn axis(
     table: &AxisTable,
     joint: &Joint,
     [index, before]: [usize; 2],
+    period: Period,
     diagnostics: &mut Diagnostics,
 ) -> Option<(Axis, Vec<(Drive, Actuator)>)> {
     let drives = drives(table, joint, diagnostics);
@@ -205,7 +207,7 @@ pub(super) fn axis(
             },
             encoder: counts(table, &motor, diagnostics)?,
             gains: match motor {
-                Motor::Dc(_) => gains(table, inertia, diagnostics)?,
+                Motor::Dc(_) => gains(table, inertia, period, diagnostics)?,
                 Motor::Stepper(_) => {
                     LoopGains { position: 0.0, velocity: 0.0, current: 0.0, inertia }
                 }
@@ -265,7 +267,15 @@ fn backlash(
     backlash.value
 }
 
-fn gains(table: &AxisTable, inertia: f64, diagnostics: &mut Diagnostics) -> Option<LoopGains> {
+/// The gains of the loops in cycles of `period`. Defaults suit 1 ms; where it is longer they are slower
+/// by as much, with what is written of them as it is. A command acts a cycle after its measurement, so a
+/// loop with a bandwidth of 1/period swings without end: it is refused.
+fn gains(
+    table: &AxisTable,
+    inertia: f64,
+    period: Period,
+    diagnostics: &mut Diagnostics,
+) -> Option<LoopGains> {
     let defaults;
     let loops = match &table.loops {
         Some(loops) => loops,
@@ -274,9 +284,33 @@ fn gains(table: &AxisTable, inertia: f64, diagnostics: &mut Diagnostics) -> Opti
             &defaults
         }
     };
+    let slower = (SETPOINT_TIME / period.seconds()).min(1.0);
+    // The place of a default is that of its table.
+    let in_period = |value: f64, span: Span| Spanned {
+        value: if span == loops.span { value * slower } else { value },
+        span,
+    };
+    let position = in_period(loops.position.value, loops.position.span);
+    let velocity = in_period(loops.velocity.value, loops.velocity.span);
+    let current = in_period(loops.current.value, loops.current.span);
+    for (bandwidth, word) in [(velocity, "velocity"), (current, "current")] {
+        if bandwidth.value * period.seconds() >= 1.0 {
+            diagnostics.contradict(
+                bandwidth.span,
+                format!(
+                    "a {word} loop of {} rad/s swings without end in a control cycle of {} ms",
+                    bandwidth.value,
+                    period.seconds() * 1e3
+                ),
+                &format!(
+                    "lower `loops.{word}`: a third of 1/period is safe; or shorten the period"
+                ),
+            );
+        }
+    }
     for (inner, outer, words) in [
-        (loops.velocity, loops.position, ["velocity", "position"]),
-        (loops.current, loops.velocity, ["current", "velocity"]),
+        (velocity, position, ["velocity", "position"]),
+        (current, velocity, ["current", "velocity"]),
     ] {
         if outer.value >= inner.value {
             // The place of a default is that of its table: what was written is what is wrong.
@@ -292,9 +326,9 @@ fn gains(table: &AxisTable, inertia: f64, diagnostics: &mut Diagnostics) -> Opti
         }
     }
     Some(LoopGains {
-        position: loops.position.value,
-        velocity: loops.velocity.value,
-        current: loops.current.value,
+        position: position.value,
+        velocity: velocity.value,
+        current: current.value,
         inertia,
     })
 }

@@ -19,8 +19,8 @@ const fn row(
 }
 
 /// The bounds of every number of a machine file, but for the delays of the laser, whose one limit
-/// stands at [`crate::LaserSource::LONGEST_DELAY`], and for the stall that is tolerated, whose range
-/// stands at [`crate::StallTolerance`].
+/// stands at [`crate::LaserSource::LONGEST_DELAY`], and for the period of the cycle and the stall that is
+/// tolerated, whose ranges stand at [`messages::time::Period`] and [`crate::StallTolerance`].
 #[rustfmt::skip]
 pub const BOUNDS: &[Bounds] = &[
     // Where things are, and how large they are.

@@ -4,7 +4,7 @@
 //! The arithmetic is that of the machine at home. It warns and proves nothing: the planner holds every
 //! job to the machine's limits, and the controller every motion.
 
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use nalgebra::{DMatrix, SMatrix};
 
 use super::axes::{Drive, Joint};
@@ -306,7 +306,7 @@ impl Subject<'_> {
         }
         // The jerk of a join, once more for what the mechanism adds to it.
         let jerk = 2.0 * path.jerk.value * self.worst_speed;
-        let jump = jerk * CYCLE_TIME * CYCLE_TIME * CYCLE_TIME / 12.0 / DISCONTINUITY;
+        let jump = jerk * SETPOINT_TIME * SETPOINT_TIME * SETPOINT_TIME / 12.0 / DISCONTINUITY;
         // Springs give way by the load's acceleration over ω², the field of a stepper by what all that
         // it turns takes of its stiffness.
         let springs = resonance.map_or(0.0, |resonance| 1.0 / (resonance * resonance));
@@ -314,7 +314,7 @@ impl Subject<'_> {
             .motor
             .stepper()
             .map_or(0.0, |motor| actuator.gains.inertia / motor.stiffness());
-        let lead = jerk * CYCLE_TIME * (springs + field) / LEAD_STEP;
+        let lead = jerk * SETPOINT_TIME * (springs + field) / LEAD_STEP;
         let least = jump.max(lead);
         if limit < least {
             let text = format!(
@@ -445,7 +445,7 @@ impl Subject<'_> {
         if !(ELECTRICAL[0]..=ELECTRICAL[1]).contains(&electrical) {
             let text = format!(
                 "{inductance:.3e} H over {resistance:.3e} Ω{} are a time constant of {electrical:.3e} \
-                 s; windings have {:.0e} to {:.1} s, and the current loop a cycle of {CYCLE_TIME} s",
+                 s; windings have {:.0e} to {:.1} s, and the current loop a cycle of {SETPOINT_TIME} s",
                 at_line(data.resistance.span, diagnostics),
                 ELECTRICAL[0],
                 ELECTRICAL[1]

@@ -305,7 +305,8 @@ table! {
 // and for the outer loops what a pilot of both machines found (100 1/s in the velocity loop and
 // 25 1/s in the position loop fail).
 table! {
-    /// Bandwidths of the control loops; the gains follow from motor and load.
+    /// Bandwidths of the control loops; the gains follow from motor and load. What is not written is
+    /// slower in proportion where the control cycle is longer than 1 ms.
     pub struct LoopsTable {
         /// Position loop.
         pub position: Above<unit::Bandwidth> = "40 1/s",
@@ -320,10 +321,13 @@ table! {
 // its reference: half the default following error. A control computer with a real-time kernel stays
 // below 1 ms; a virtual machine was seen to stand still for 8 ms every few seconds.
 table! {
-    /// What the machine bears of a computer that is late.
+    /// When the control cycle comes, and what the machine bears of a computer that is late.
     pub struct RealtimeTable {
+        /// The period of the control cycle: a whole multiple of 125 us, from 125 us (8 kHz) to 4 ms
+        /// (250 Hz). Jobs are planned with a setpoint every 1 ms whatever it is.
+        pub period: Above<unit::Duration> = "1 ms",
         /// How long the axes may go on with their last command, in the dark, before they are stopped:
-        /// 1 ms to 50 ms, of which whole cycles of 1 ms count. The gate is closed in the first cycle
+        /// one `period` to 50 ms, of which whole cycles count. The gate is closed in the first cycle
         /// without a fresh command.
         pub stall: Above<unit::Duration> = "10 ms",
     }

@@ -20,10 +20,11 @@ use crate::document::{
 };
 use crate::gcode_settings::{Dialect, GcodeSettings, ZMeaning};
 use crate::laser::LaserSource;
-use crate::limits::{PathLimits, StallTolerance, WorkArea};
+use crate::limits::{PathLimits, StallTolerance, Timing, WorkArea};
 use crate::machine::Machine;
 use crate::mechanisms::MechanismKind;
 use crate::operating::Operating;
+use messages::time::Period;
 use messages::{MAX_ACTUATORS, Nanoseconds};
 
 pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
@@ -39,7 +40,8 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let Some(tables) = axes_in_order(&table.axis, &joints, &mut diagnostics) else {
         return diagnostics.fail();
     };
-    let (axes, driven) = axes(&table, &tables, &joints, &mut diagnostics);
+    let realtime = realtime(&table.realtime, &mut diagnostics);
+    let (axes, driven) = axes(&table, &tables, &joints, realtime.period, &mut diagnostics);
     if diagnostics.is_empty() {
         relations::check(&table, &mechanism, &joints, &axes, &driven, &mut diagnostics);
     }
@@ -48,7 +50,6 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     refuse_many(&table.axis, &driven, &mut diagnostics);
     check_z(&table, &mechanism, &mut diagnostics);
     let laser = laser(&table.laser, &mut diagnostics);
-    let stall = stall(&table.realtime, &mut diagnostics);
     let mut actuators: Vec<Actuator> = driven.into_iter().map(|(_, actuator)| actuator).collect();
     let drives = drives::build(&table.drives, &mut actuators, &mut diagnostics);
     let operating = if axes.len() == joints.len() {
@@ -77,7 +78,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
             tolerance: tolerance.value,
         },
         corners: corners.value,
-        stall,
+        realtime,
         operating,
         drives,
         laser,
@@ -100,13 +101,14 @@ fn axes(
     table: &MachineTable,
     tables: &[&AxisTable],
     joints: &[Joint],
+    period: Period,
     diagnostics: &mut Diagnostics,
 ) -> (Vec<Axis>, Vec<(Drive, Actuator)>) {
     let mut axes = Vec::with_capacity(joints.len());
     let mut driven = Vec::with_capacity(joints.len());
     for (axis_table, joint) in tables.iter().copied().zip(joints) {
         let before = [axes.len(), driven.len()];
-        let Some((axis, actuators)) = axis(axis_table, joint, before, diagnostics) else {
+        let Some((axis, actuators)) = axis(axis_table, joint, before, period, diagnostics) else {
             continue;
         };
         for (index, (drive, actuator)) in actuators.iter().enumerate() {
@@ -247,11 +249,26 @@ fn laser(table: &LaserTable, diagnostics: &mut Diagnostics) -> LaserSource {
     }
 }
 
-/// Refuses a tolerance shorter than a cycle, or longer than any axis could bear.
-fn stall(table: &RealtimeTable, diagnostics: &mut Diagnostics) -> StallTolerance {
+/// Refuses a period that the cycle cannot have, and a tolerance shorter than it, or longer than any
+/// axis could bear.
+fn realtime(table: &RealtimeTable, diagnostics: &mut Diagnostics) -> Timing {
+    let period = Period::new(Nanoseconds::from_seconds(table.period.value)).unwrap_or_else(|| {
+        let [step, shortest, longest] =
+            [Period::STEP, Period::SHORTEST.time(), Period::LONGEST.time()]
+                .map(|time| time.seconds() * 1e6);
+        diagnostics.refuse(
+            ProblemKind::OutOfRange,
+            table.period.span,
+            format!("a control cycle cannot have a `period` of {} s", table.period.value),
+            Some(format!(
+                "write a whole multiple of {step} us, from {shortest} us (8 kHz) to {longest} us (250 Hz)"
+            )),
+        );
+        Timing::DEFAULT.period
+    });
     let time = Nanoseconds::from_seconds(table.stall.value);
-    StallTolerance::new(time).unwrap_or_else(|| {
-        let [shortest, longest] = [StallTolerance::SHORTEST, StallTolerance::LONGEST]
+    let stall = StallTolerance::new(time, period).unwrap_or_else(|| {
+        let [shortest, longest] = [StallTolerance::shortest(period), StallTolerance::LONGEST]
             .map(|bound| bound.time().seconds() * 1e3);
         diagnostics.refuse(
             ProblemKind::OutOfRange,
@@ -259,8 +276,9 @@ fn stall(table: &RealtimeTable, diagnostics: &mut Diagnostics) -> StallTolerance
             format!("a `stall` of {} s cannot be tolerated", table.stall.value),
             Some(format!("write a time from {shortest} ms, one cycle, to {longest} ms")),
         );
-        StallTolerance::SHORTEST
-    })
+        StallTolerance::shortest(period)
+    });
+    Timing { period, stall }
 }
 
 /// The area as a box; z is from 0 to 0 where it has no range.

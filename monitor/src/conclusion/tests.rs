@@ -8,6 +8,7 @@ use messages::artwork::Stroke;
 use messages::feedback::status;
 use messages::plan::Note;
 use messages::report::refused;
+use messages::time::SETPOINT_TIME as CYCLE_TIME;
 use messages::{
     Command, ControllerState, Cycle, Fault, FaultCode, Feedback, LaserCycle, Nanoseconds,
 };
@@ -59,7 +60,8 @@ fn record(cycle: u64) -> CycleRecord {
 
 fn examined(cycles: impl Iterator<Item = u64>) -> RunResults {
     let artwork = artwork();
-    let mut analysis = RunAnalysis::new(&artwork, Clock::Virtual).with_fastest(0.25);
+    let mut analysis =
+        RunAnalysis::new(&artwork, Clock::Virtual, Period::OF_SETPOINTS).with_fastest(0.25);
     cycles.for_each(|cycle| analysis.push(&record(cycle)));
     analysis.finish(StreamEnd::Reported(&report()))
 }
@@ -196,7 +198,7 @@ fn what_was_not_recorded_is_told_and_the_rest_is_judged() {
 fn nothing_recorded_or_an_end_that_nobody_knows_is_said() {
     let summary = |run_outcome: &RunOutcome, cycles: std::ops::Range<u64>| {
         let artwork = artwork();
-        let mut analysis = RunAnalysis::new(&artwork, Clock::Virtual);
+        let mut analysis = RunAnalysis::new(&artwork, Clock::Virtual, Period::OF_SETPOINTS);
         cycles.for_each(|cycle| analysis.push(&record(cycle)));
         summary_of(
             run_outcome,
@@ -286,7 +288,7 @@ fn folder(below: &tempfile::TempDir, records: &[CycleRecord]) -> RunFolder {
     let notes = vec![Note { line: 7, text: "here".into() }];
     let plan = serde_json::to_vec(&PlanFacts { notes, ..plan() }).unwrap();
     folder.write(run_folder::PLAN, plan).unwrap();
-    let mut writer = RecordingWriter::new(Vec::new()).unwrap();
+    let mut writer = RecordingWriter::new(Vec::new(), Period::OF_SETPOINTS).unwrap();
     writer.write(records).unwrap();
     folder.write(run_folder::SAMPLES, writer.finish().unwrap()).unwrap();
     folder

@@ -6,7 +6,6 @@ use super::line::{Foot, Passage};
 use super::tool_path::{Interval, Moment};
 use super::{FIRST_REACH, Followed, MarkEvaluator, REACH, StreamEnd};
 use crate::conclusion::LIGHT_LAG;
-use messages::time::CYCLE_TIME;
 
 /// How far from the line of a stroke a point that the plan has on it may be found, after a gap [m].
 const ON_PLAN: f64 = 5e-6;
@@ -169,7 +168,7 @@ impl MarkEvaluator<'_> {
     fn farthest(&self, from: Place, cycles: Option<u64>) -> Place {
         match cycles.zip(self.fastest) {
             Some((cycles, speed)) => {
-                let time = cycles as f64 * CYCLE_TIME;
+                let time = self.period.of(cycles).seconds();
                 from.after(speed * FASTEST_RATE * time, self.artwork)
             }
             None => Place::end(self.artwork),

@@ -6,13 +6,14 @@ mod gaps;
 use super::*;
 use messages::artwork::Stroke;
 use messages::feedback::status;
+use messages::time::SETPOINT_TIME as CYCLE_TIME;
 use messages::{Command, ControllerState, Cycle, Feedback, GateEdge, LaserCycle, Nanoseconds};
 
 type Point = [f64; 3];
 
 /// Evaluates the marks of a recording of a job that was completed.
 fn evaluation(artwork: &Artwork, records: &[CycleRecord]) -> Result<MarkEvaluation, Unevaluated> {
-    let mut evaluator = MarkEvaluator::new(artwork);
+    let mut evaluator = MarkEvaluator::new(artwork, Period::OF_SETPOINTS);
     records.iter().for_each(|record| evaluator.push(record));
     let last_cycle = Cycle(FIRST);
     let completed = ControllerReport { completed: 1, last_cycle, ..ControllerReport::default() };

@@ -8,8 +8,8 @@
 use crate::recording::CycleRecord;
 use crate::recording::continuity::{Stamp, Succession};
 use messages::feedback::status;
-use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
-use messages::{ControllerState, LaserCycle, MAX_EDGES};
+use messages::time::Period;
+use messages::{ControllerState, LaserCycle, MAX_EDGES, Nanoseconds};
 use nalgebra::Vector3;
 
 /// Bits of a feedback's status that say: the cycle which begins with it is dark, whatever the
@@ -21,6 +21,8 @@ const KEPT_DARK: u32 = status::COMMAND_MISSED | status::WATCHDOG_TRIPPED | statu
 pub struct Moment {
     /// `k`, in the run of drives, and the cycles since the moment before.
     pub stamp: Stamp,
+    /// The period of the cycle.
+    pub period: Period,
     /// The tool at `t[k]` [m].
     pub tool: Vector3<f64>,
     /// Whether `tool` is known.
@@ -60,11 +62,11 @@ impl Asked {
 }
 
 impl Moment {
-    /// The moment of a record, with the tool as drives reported it.
-    pub fn of(record: &CycleRecord) -> Self {
+    /// The moment of a record, with the tool as drives reported it, of cycles of this `period`.
+    pub fn of(record: &CycleRecord, period: Period) -> Self {
         let CycleRecord { feedback, command } = record;
         let asked = || {
-            let light = LitSpans::of(&command.laser, 1);
+            let light = LitSpans::of(&command.laser, period.time());
             let light = light.as_slice();
             Asked {
                 stream: command.stream,
@@ -77,6 +79,7 @@ impl Moment {
         let answered = record.is_answered();
         Self {
             stamp: Stamp::of(feedback),
+            period,
             tool: Vector3::from(feedback.tool),
             tool_known: feedback.has(status::TOOL_KNOWN),
             planned: answered.then(|| Vector3::from(command.tool)),
@@ -156,7 +159,11 @@ pub struct Interval {
 impl Interval {
     /// How long it is [s].
     pub fn time(&self) -> f64 {
-        self.end.stamp.elapsed as f64 * CYCLE_TIME
+        self.span().seconds()
+    }
+
+    fn span(&self) -> Nanoseconds {
+        self.end.period.of(self.end.stamp.elapsed)
     }
 
     /// The tool at `part` of the interval, 0 at its start and 1 at its end [m].
@@ -232,7 +239,7 @@ impl Interval {
             }
             _ => near,
         };
-        difference.norm() / (2.0 * CYCLE_TIME)
+        difference.norm() / (2.0 * self.end.period.seconds())
     }
 
     /// Whether the tool is known at both ends.
@@ -255,7 +262,7 @@ impl Interval {
 
     /// The parts of the interval with light.
     pub fn lit(&self) -> LitSpans {
-        LitSpans::of(&self.end.laser, self.end.stamp.elapsed)
+        LitSpans::of(&self.end.laser, self.span())
     }
 }
 
@@ -278,14 +285,14 @@ pub struct LitSpans {
 }
 
 impl LitSpans {
-    /// The lit parts of so many cycles of the laser; light takes an open gate and power.
-    pub fn of(laser: &LaserCycle, cycles: u64) -> Self {
-        let period = CYCLE_PERIOD.0 as f64 * cycles as f64;
+    /// The lit parts of what the laser does in `time`; light takes an open gate and power.
+    pub fn of(laser: &LaserCycle, time: Nanoseconds) -> Self {
+        let whole = time.0 as f64;
         let light = |gate: u32, power: f64| if power > 0.0 { u64::from(gate) } else { 0 };
         let mut spans = Self::default();
         let (mut from, mut stroke) = (0.0, light(laser.gate, laser.power));
         for edge in laser.edges() {
-            let to = (f64::from(edge.offset) / period).min(1.0);
+            let to = (f64::from(edge.offset) / whole).min(1.0);
             spans.add(LitSpan { from, to, stroke });
             (from, stroke) = (to, light(edge.gate, edge.power));
         }
@@ -359,11 +366,13 @@ fn hermite(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use messages::time::SETPOINT_TIME as CYCLE_TIME;
     use messages::{Cycle, Feedback, GateEdge};
 
     fn moment(cycle: u64, tool: Vector3<f64>) -> Moment {
         let feedback = Feedback { cycle: Cycle(cycle), ..Feedback::default() };
         Moment {
+            period: Period::OF_SETPOINTS,
             stamp: Stamp::of(&feedback),
             tool,
             tool_known: true,
@@ -484,7 +493,7 @@ mod tests {
             for &(offset, gate, power) in edges {
                 assert!(laser.push(GateEdge { offset, gate, power }));
             }
-            let spans = LitSpans::of(&laser, 1);
+            let spans = LitSpans::of(&laser, Period::OF_SETPOINTS.time());
             let found: Vec<_> =
                 spans.as_slice().iter().map(|span| (span.from, span.to, span.stroke)).collect();
             assert_eq!(found, expect, "{gate} {edges:?}");
@@ -510,7 +519,7 @@ mod tests {
             for &(offset, gate) in edges {
                 assert!(laser.push(GateEdge { offset, gate, power: 0.8 }));
             }
-            LitSpans::of(&laser, 1)
+            LitSpans::of(&laser, Period::OF_SETPOINTS.time())
         };
         let first = LitSpan { from: 0.0, to: 0.4, stroke: 7 };
         let second = LitSpan { from: 0.4, to: 1.0, stroke: 8 };

@@ -3,8 +3,8 @@
 //! Everybody who walks along a recording asks [`Succession::between`] whether two records follow
 //! each other: what counts as a gap is said here alone.
 
-use messages::time::CYCLE_PERIOD;
-use messages::{Feedback, Nanoseconds};
+use messages::Feedback;
+use messages::time::Period;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -110,13 +110,13 @@ impl Continuity {
         }
     }
 
-    /// As a summary tells it.
-    pub fn summary(&self) -> RecordingSummary {
+    /// As a summary tells it, of cycles of this `period`.
+    pub fn summary(&self, period: Period) -> RecordingSummary {
         RecordingSummary {
             cycles: self.records,
             gaps: self.gaps,
             missing: self.missing,
-            longest: Nanoseconds(self.longest as i64 * CYCLE_PERIOD.0).seconds(),
+            longest: period.of(self.longest).seconds(),
         }
     }
 }
@@ -174,6 +174,6 @@ mod tests {
         assert_eq!((continuity.records, continuity.gaps, continuity.longest), (501, 251, 3));
         assert_eq!((continuity.missing, continuity.list.len()), (84 + 2 * 83 + 3 * 83, LISTED));
         let told = RecordingSummary { cycles: 501, gaps: 251, missing: 499, longest: 0.003 };
-        assert_eq!(continuity.summary(), told);
+        assert_eq!(continuity.summary(Period::OF_SETPOINTS), told);
     }
 }

@@ -1,7 +1,8 @@
 //! `samples.bin`: the records as they stand in memory, behind a header that says what they are.
 
 use super::CycleRecord;
-use messages::{Command, Feedback, Sample, sample};
+use messages::time::Period;
+use messages::{Command, Feedback, Nanoseconds, Sample, sample};
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -12,13 +13,15 @@ const NAME_LENGTH: usize = 32;
 
 sample! {
     /// The header of `samples.bin`; numbers are little-endian, as in the records.
-    Header = "graver.Recording.v1" {
+    Header = "graver.Recording.v2" {
         /// [`Header::MAGIC`].
         magic: u64,
         /// Hash over this header's own layout.
         layout: u64,
         /// Bytes of one record.
         record_size: u64,
+        /// The period of the cycle.
+        period: Nanoseconds,
         /// Layout hash of the feedback.
         feedback_layout: u64,
         /// Layout hash of the command.
@@ -34,12 +37,13 @@ impl Header {
     /// The file's first eight bytes: `GRAVERec`.
     pub const MAGIC: u64 = u64::from_le_bytes(*b"GRAVERec");
 
-    /// The header that this build writes.
-    pub fn current() -> Self {
+    /// The header that this build writes, for cycles of this `period`.
+    pub fn of(period: Period) -> Self {
         Self {
             magic: Self::MAGIC,
             layout: Self::LAYOUT,
             record_size: size_of::<CycleRecord>() as u64,
+            period: period.time(),
             feedback_layout: Feedback::LAYOUT,
             command_layout: Command::LAYOUT,
             feedback: name_bytes(Feedback::NAME),
@@ -99,13 +103,13 @@ pub struct RecordingWriter<W: Write> {
 }
 
 impl<W: Write> RecordingWriter<W> {
-    /// Writes the header to `writer`, which should be buffered, and flushes it: a recording that
-    /// is still empty can be told from no recording.
+    /// Writes the header to `writer`, which should be buffered, for cycles of this `period`, and flushes it:
+    /// a recording that is still empty can be told from no recording.
     ///
     /// # Errors
     /// Whatever the writer reports.
-    pub fn new(mut writer: W) -> io::Result<Self> {
-        writer.write_all(Header::current().as_bytes())?;
+    pub fn new(mut writer: W, period: Period) -> io::Result<Self> {
+        writer.write_all(Header::of(period).as_bytes())?;
         writer.flush()?;
         Ok(Self { writer })
     }
@@ -153,24 +157,24 @@ pub struct Resumed {
 }
 
 impl RecordingWriter<BufWriter<File>> {
-    /// Begins a recording in a file, in place of what may be there.
+    /// Begins a recording in a file, in place of what may be there, of cycles of this `period`.
     ///
     /// # Errors
     /// Whatever the operating system reports.
-    pub fn create(path: &Path) -> io::Result<Self> {
-        Self::new(BufWriter::new(File::create(path)?))
+    pub fn create(path: &Path, period: Period) -> io::Result<Self> {
+        Self::new(BufWriter::new(File::create(path)?), period)
     }
 
     /// Opens a recording to append to it. A last record that its writer did not complete is cut
-    /// off; one that does not even have its header begins anew.
+    /// off; one that does not even have its header begins anew, of cycles of this `period`.
     ///
     /// # Errors
     /// [`RecordingError`] when the file is no recording of this build, or cannot be opened.
-    pub fn resume(path: &Path) -> Result<Resumed, RecordingError> {
+    pub fn resume(path: &Path, period: Period) -> Result<Resumed, RecordingError> {
         let mut file = OpenOptions::new().read(true).write(true).open(path)?;
         let (header, record) = (size_of::<Header>() as u64, size_of::<CycleRecord>() as u64);
         let Some(bytes) = file.metadata()?.len().checked_sub(header) else {
-            return Ok(Resumed { writer: Self::create(path)?, last: None, records: 0 });
+            return Ok(Resumed { writer: Self::create(path, period)?, last: None, records: 0 });
         };
         RecordingReader::new(BufReader::new(&file))?;
         let records = bytes / record;
@@ -191,6 +195,7 @@ impl RecordingWriter<BufWriter<File>> {
 #[derive(Debug)]
 pub struct RecordingReader<R: Read> {
     reader: R,
+    period: Period,
     count: u64,
     ended: bool,
 }
@@ -208,7 +213,7 @@ impl<R: Read> RecordingReader<R> {
             }
             other => other?,
         }
-        let expected = Header::current();
+        let expected = Header::of(Period::OF_SETPOINTS);
         if header.magic != expected.magic {
             return Err(RecordingError::NotARecording);
         }
@@ -232,7 +237,13 @@ impl<R: Read> RecordingReader<R> {
                 });
             }
         }
-        Ok(Self { reader, count: 0, ended: false })
+        let period = Period::new(header.period).ok_or(RecordingError::NotARecording)?;
+        Ok(Self { reader, period, count: 0, ended: false })
+    }
+
+    /// The period of the recorded cycles.
+    pub fn period(&self) -> Period {
+        self.period
     }
 
     fn read(&mut self) -> Result<Option<CycleRecord>, RecordingError> {
@@ -272,7 +283,7 @@ mod tests {
     use messages::Cycle;
 
     fn written(count: u64) -> Vec<u8> {
-        let mut writer = RecordingWriter::new(Vec::new()).unwrap();
+        let mut writer = RecordingWriter::new(Vec::new(), Period::OF_SETPOINTS).unwrap();
         for cycle in 0..count {
             let mut record = CycleRecord::new_zeroed();
             record.feedback.cycle = Cycle(cycle);
@@ -319,7 +330,8 @@ mod tests {
             (0, 0),
         ] {
             std::fs::write(&path, &bytes[..kept]).unwrap();
-            let Resumed { mut writer, last, records } = RecordingWriter::resume(&path).unwrap();
+            let Resumed { mut writer, last, records } =
+                RecordingWriter::resume(&path, Period::OF_SETPOINTS).unwrap();
             assert_eq!(records, whole, "{kept}");
             assert_eq!(last.map(|last| last.feedback.cycle.0 + 1).unwrap_or(0), whole, "{kept}");
             let mut next = CycleRecord::new_zeroed();
@@ -331,10 +343,11 @@ mod tests {
             assert_eq!(cycles, (0..whole).chain([100]).collect::<Vec<_>>(), "{kept}");
         }
         std::fs::write(&path, vec![b'x'; 4000]).unwrap();
-        let error = RecordingWriter::resume(&path).unwrap_err();
+        let error = RecordingWriter::resume(&path, Period::OF_SETPOINTS).unwrap_err();
         assert!(matches!(error, RecordingError::NotARecording), "{error}");
         assert_eq!(std::fs::read(&path).unwrap(), vec![b'x'; 4000], "left alone");
-        let error = RecordingWriter::resume(&below.path().join("none")).unwrap_err();
+        let error =
+            RecordingWriter::resume(&below.path().join("none"), Period::OF_SETPOINTS).unwrap_err();
         assert!(matches!(error, RecordingError::Io(_)), "{error}");
     }
 
@@ -342,7 +355,7 @@ mod tests {
     fn strangers_are_refused() {
         let mut bytes = written(1);
         assert!(matches!(RecordingReader::new(&bytes[..5]), Err(RecordingError::NotARecording)));
-        bytes[24] ^= 1; // the feedback's layout hash
+        bytes[32] ^= 1; // the feedback's layout hash
         let error = RecordingReader::new(&bytes[..]).unwrap_err();
         assert!(error.to_string().contains(Feedback::NAME), "{error}");
         bytes[0] = b'X';

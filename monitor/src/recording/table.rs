@@ -5,6 +5,7 @@ use super::CycleRecord;
 use crate::trace::lit_share;
 use messages::MAX_ACTUATORS;
 use messages::feedback::status;
+use messages::time::Period;
 use std::io::{self, Write};
 
 /// Writes one line a record under a line of column names.
@@ -20,22 +21,23 @@ use std::io::{self, Write};
 pub struct TableWriter<W: Write> {
     writer: W,
     actuators: usize,
+    period: Period,
 }
 
 impl<W: Write> TableWriter<W> {
-    /// Writes the column names to `writer`, which should be buffered. `actuators` are the names of the
+    /// Writes the column names to `writer`, which should be buffered, for cycles of this `period`. `actuators` are the names of the
     /// machine's actuators; those beyond [`MAX_ACTUATORS`], which samples do not carry, are left out.
     ///
     /// # Errors
     /// Whatever the writer reports.
-    pub fn new(mut writer: W, actuators: &[String]) -> io::Result<Self> {
+    pub fn new(mut writer: W, actuators: &[String], period: Period) -> io::Result<Self> {
         write!(writer, "cycle,stream_time,rate,stroke,lit,tool_x,tool_y,tool_z")?;
         write!(writer, ",planned_x,planned_y,planned_z")?;
         for name in actuators.iter().take(MAX_ACTUATORS) {
             write!(writer, ",{name}_reference,{name}_position,{name}_current,{name}_voltage")?;
         }
         writeln!(writer)?;
-        Ok(Self { writer, actuators: actuators.len().min(MAX_ACTUATORS) })
+        Ok(Self { writer, actuators: actuators.len().min(MAX_ACTUATORS), period })
     }
 
     /// Appends a record.
@@ -49,7 +51,7 @@ impl<W: Write> TableWriter<W> {
         self.field(answered, command.stream_time)?;
         self.field(answered, command.rate)?;
         self.field(answered, command.stroke)?;
-        self.field(true, lit_share(&feedback.laser, feedback.elapsed()))?;
+        self.field(true, lit_share(&feedback.laser, self.period.of(feedback.elapsed())))?;
         for value in feedback.tool {
             self.field(feedback.has(status::TOOL_KNOWN), value)?;
         }
@@ -92,7 +94,8 @@ mod tests {
 
     fn table(records: &[CycleRecord]) -> Vec<Vec<String>> {
         let mut text = Vec::new();
-        let mut table = TableWriter::new(&mut text, &["x".into(), "y".into()]).unwrap();
+        let mut table =
+            TableWriter::new(&mut text, &["x".into(), "y".into()], Period::OF_SETPOINTS).unwrap();
         records.iter().for_each(|record| table.write(record).unwrap());
         table.finish().unwrap();
         let text = String::from_utf8(text).unwrap();

@@ -67,16 +67,19 @@ impl Report<'_> {
             "tool deviation [µm]",
             (0.0, 0.0),
             vec![
-                curve("in the dark", CURVES[7], &trace.deviation_dark, 1e6),
-                curve("lit", CURVES[0], &trace.deviation_lit, 1e6),
+                self.curve("in the dark", CURVES[7], &trace.deviation_dark, 1e6),
+                self.curve("lit", CURVES[0], &trace.deviation_lit, 1e6),
             ],
         );
-        let speed =
-            over_time("speed [m/s]", (0.0, 0.0), vec![curve("", CURVES[2], &trace.speed, 1.0)]);
+        let speed = over_time(
+            "speed [m/s]",
+            (0.0, 0.0),
+            vec![self.curve("", CURVES[2], &trace.speed, 1.0)],
+        );
         let mut gate = over_time(
             "laser power [%]",
             (0.0, 100.0),
-            vec![curve("", CURVES[4], &trace.power, 100.0)],
+            vec![self.curve("", CURVES[4], &trace.power, 100.0)],
         );
         gate.height = HEIGHT * 2 / 3;
         Ok(figure(
@@ -111,9 +114,16 @@ impl Report<'_> {
         .concat())
     }
 
+    fn curve(&self, name: &str, colour: RGBColor, envelope: &Envelope, scale: f64) -> Curve {
+        let lines = envelope.lines(scale, self.trace.period);
+        Curve { name: name.to_owned(), colour, lines }
+    }
+
     fn per_actuator(&self, envelopes: &[Envelope], scales: &ActuatorArray) -> Vec<Curve> {
         (self.summary.machine.actuators.iter().zip(envelopes).zip(scales).enumerate())
-            .map(|(index, ((name, envelope), scale))| curve(name, colour(index), envelope, *scale))
+            .map(|(index, ((name, envelope), scale))| {
+                self.curve(name, colour(index), envelope, *scale)
+            })
             .collect()
     }
 
@@ -165,7 +175,7 @@ impl Report<'_> {
         let over = over_time(
             "latency [µs]",
             (0.0, 0.0),
-            hops.map(|(hop, envelope)| curve(hop.name(), colour(hop as usize), envelope, 1e6))
+            hops.map(|(hop, envelope)| self.curve(hop.name(), colour(hop as usize), envelope, 1e6))
                 .collect(),
         );
         Ok(table
@@ -175,10 +185,6 @@ impl Report<'_> {
             )
             + &figure(over.draw()?, "The hops inside a cycle, over the run."))
     }
-}
-
-fn curve(name: &str, colour: RGBColor, envelope: &Envelope, scale: f64) -> Curve {
-    Curve { name: name.to_owned(), colour, lines: envelope.lines(scale) }
 }
 
 fn over_time(up: &str, at_least: (f64, f64), curves: Vec<Curve>) -> Chart<'_> {

@@ -9,7 +9,7 @@ use crate::stage::{Inputs, MonitorStage, Outputs};
 use crate::summary::{JobSummary, MachineSummary, Outcome};
 use messages::artwork::Stroke;
 use messages::feedback::status;
-use messages::time::CYCLE_TIME;
+use messages::time::{Period, SETPOINT_TIME as CYCLE_TIME};
 use messages::{Command, Cycle, Feedback, LaserCycle, Nanoseconds, math};
 use std::time::{Duration, SystemTime};
 
@@ -95,7 +95,7 @@ fn the_page_shows_the_run_and_needs_no_network() {
     let mut stage = MonitorStage::new();
     let mut outputs = Outputs::default();
     let artwork = artwork();
-    let mut analysis = RunAnalysis::new(&artwork, Clock::Real);
+    let mut analysis = RunAnalysis::new(&artwork, Clock::Real, Period::OF_SETPOINTS);
     let mut count = 0;
     for (feedbacks, commands) in feedbacks.chunks(100).zip(commands.chunks(100)) {
         stage.step(&Inputs { feedbacks, commands }, &mut outputs);
@@ -158,7 +158,8 @@ fn the_page_shows_the_run_and_needs_no_network() {
 fn a_run_without_marks_has_a_report_too() {
     let summary = Summary::new(Outcome::Aborted, JobSummary::default(), MachineSummary::default());
     let artwork = Artwork::default();
-    let results = RunAnalysis::new(&artwork, Clock::Virtual).finish(StreamEnd::Unknown);
+    let results =
+        RunAnalysis::new(&artwork, Clock::Virtual, Period::OF_SETPOINTS).finish(StreamEnd::Unknown);
     let report = Report {
         summary: &summary,
         artwork: &artwork,

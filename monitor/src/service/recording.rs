@@ -8,6 +8,7 @@ use crate::recording::file::{RecordingError, RecordingWriter, Resumed};
 use crate::recording::info::{Progress, RecordingInfo};
 use crate::run_folder::{FileError, RunFolder};
 use crate::stage::{Inputs, MonitorStage, Outputs};
+use messages::time::Period;
 use messages::{ControllerReport, run_folder};
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -42,7 +43,8 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// Begins the recording of a job, or goes on with the one that a dead monitor has left.
+    /// Begins the recording of a job, in cycles of this `period`, or goes on with the one that a dead monitor
+    /// has left.
     ///
     /// # Errors
     /// A file that cannot be opened or written, with its path.
@@ -50,17 +52,23 @@ impl Recording {
         stream: u64,
         folder: RunFolder,
         overruns_before: u64,
+        period: Period,
     ) -> Result<Self, FileError> {
         let left =
             RecordingInfo::of(&folder, stream).filter(|info| info.progress == Progress::Open);
         let samples = folder.file(run_folder::SAMPLES);
         match left {
-            Some(info) if samples.exists() => Self::resume(folder, info),
-            _ => Self::create(stream, folder, overruns_before),
+            Some(info) if samples.exists() => Self::resume(folder, info, period),
+            _ => Self::create(stream, folder, overruns_before, period),
         }
     }
 
-    fn create(stream: u64, folder: RunFolder, overruns_before: u64) -> Result<Self, FileError> {
+    fn create(
+        stream: u64,
+        folder: RunFolder,
+        overruns_before: u64,
+        period: Period,
+    ) -> Result<Self, FileError> {
         // The note first: a recording without one is nobody's.
         RecordingInfo {
             stream,
@@ -70,20 +78,20 @@ impl Recording {
         }
         .write(&folder)?;
         let samples = folder.file(run_folder::SAMPLES);
-        let writer = RecordingWriter::create(&samples).map_err(FileError::at(&samples))?;
+        let writer = RecordingWriter::create(&samples, period).map_err(FileError::at(&samples))?;
         let latency = folder.file(run_folder::LATENCY);
         let log = IntervalLog::create(&latency).map_err(FileError::at(&latency))?;
         let stage = MonitorStage::new();
         Ok(Self::new(stream, folder, stage, writer, (log, Duration::ZERO), overruns_before))
     }
 
-    fn resume(folder: RunFolder, info: RecordingInfo) -> Result<Self, FileError> {
+    fn resume(folder: RunFolder, info: RecordingInfo, period: Period) -> Result<Self, FileError> {
         let samples = folder.file(run_folder::SAMPLES);
         let refused = |error: RecordingError| match error {
             RecordingError::Io(error) => error,
             other => io::Error::other(other),
         };
-        let Resumed { writer, last, records } = RecordingWriter::resume(&samples)
+        let Resumed { writer, last, records } = RecordingWriter::resume(&samples, period)
             .map_err(|error| FileError::at(&samples)(refused(error)))?;
         let latency = folder.file(run_folder::LATENCY);
         let log = IntervalLog::resume(&latency).map_err(FileError::at(&latency))?;

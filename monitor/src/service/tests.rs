@@ -46,7 +46,7 @@ impl Bench {
 
     /// A monitor, as one that was just started.
     fn service(&self) -> Service {
-        Service::open(&self.monitor).unwrap()
+        Service::open(&self.monitor, Period::OF_SETPOINTS).unwrap()
     }
 
     fn folder(&self) -> RunFolder {

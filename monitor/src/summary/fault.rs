@@ -3,7 +3,7 @@
 use super::StallSummary;
 use machine::{JointUnit, Machine};
 use messages::fault::FaultUnit;
-use messages::time::CYCLE_TIME;
+use messages::time::Period;
 use messages::{Fault, FaultCode, FaultQuantity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,7 @@ impl FaultSummary {
         fault.is_some().then(|| Self {
             code: fault.code().name().to_owned(),
             axis: name.cloned(),
-            detail: detail(fault, driven.or(axis).map(|axis| axis.unit)),
+            detail: detail(fault, driven.or(axis).map(|axis| axis.unit), machine.realtime.period),
         })
     }
 
@@ -50,7 +50,7 @@ impl std::fmt::Display for FaultSummary {
     }
 }
 
-fn detail(fault: &Fault, joint: Option<JointUnit>) -> String {
+fn detail(fault: &Fault, joint: Option<JointUnit>, period: Period) -> String {
     let quantity = fault.quantity();
     match (fault.code(), quantity) {
         (code, FaultQuantity::None) => without_value(code).to_owned(),
@@ -64,7 +64,7 @@ fn detail(fault: &Fault, joint: Option<JointUnit>) -> String {
         _ => {
             let (name, unit) = quantity.name();
             let amount = |value: f64| match quantity {
-                FaultQuantity::Cycles | FaultQuantity::Overruns => in_time(value),
+                FaultQuantity::Cycles | FaultQuantity::Overruns => in_time(value, period),
                 _ => amount(value, unit, joint),
             };
             let found = format!("{name} {}", amount(fault.value));
@@ -90,8 +90,8 @@ fn without_value(code: FaultCode) -> &'static str {
 }
 
 /// A number of cycles, and the time that they take.
-fn in_time(cycles: f64) -> String {
-    format!("{cycles} ({} ms)", cycles * (CYCLE_TIME * 1e3))
+fn in_time(cycles: f64, period: Period) -> String {
+    format!("{cycles} ({} ms)", cycles * (period.seconds() * 1e3))
 }
 
 /// A value in the unit that people read it in: millimetres for places along a line.

@@ -1,6 +1,6 @@
 //! The stalls of a run as summaries tell them.
 
-use messages::time::CYCLE_TIME;
+use messages::time::Period;
 use messages::{ControllerReport, StallCause, Stalls};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,8 +28,9 @@ pub struct StallSummary {
 }
 
 impl StallSummary {
-    /// Of the stream that the controller reports of; drives may still speak of another one.
-    pub fn of(stalls: &Stalls, stream: &ControllerReport) -> Self {
+    /// Of the stream that the controller reports of, in cycles of this `period`; drives may still speak of
+    /// another one.
+    pub fn of(stalls: &Stalls, stream: &ControllerReport, period: Period) -> Self {
         if stalls.count == 0 || stalls.stream != stream.stream {
             return Self::default();
         }
@@ -40,7 +41,7 @@ impl StallSummary {
             count: stalls.count,
             total: stalls.total.seconds(),
             longest: stalls.longest.seconds(),
-            longest_at: Some(cycles as f64 * CYCLE_TIME),
+            longest_at: Some(period.of(cycles).seconds()),
             longest_causes: StallCause::of(stalls.longest_causes)
                 .map(|cause| cause.name().to_owned())
                 .collect(),
@@ -101,7 +102,7 @@ mod tests {
 
     #[test]
     fn the_longest_is_told_with_its_time_and_causes() {
-        let summary = StallSummary::of(&stalls(), &stream(3));
+        let summary = StallSummary::of(&stalls(), &stream(3), Period::OF_SETPOINTS);
         assert_eq!((summary.count, summary.total, summary.longest), (4, 12e-3, 8e-3));
         assert_eq!(summary.longest_at, Some(1.0));
         assert_eq!(summary.longest_causes, ["steal", "page_fault"]);
@@ -119,7 +120,7 @@ mod tests {
     fn what_the_kernel_does_not_say_is_not_made_up() {
         let unknown = Stalls { count: 1, longest_causes: 0, ..stalls() };
         assert_eq!(
-            StallSummary::of(&unknown, &stream(3)).warning().unwrap(),
+            StallSummary::of(&unknown, &stream(3), Period::OF_SETPOINTS).warning().unwrap(),
             "the axes went on without a fresh command once, in the dark; the longest stall was 8.0 \
              ms, the kernel does not say why"
         );
@@ -127,7 +128,7 @@ mod tests {
 
     #[test]
     fn another_streams_stalls_are_not_this_ones() {
-        let summary = StallSummary::of(&stalls(), &stream(4));
+        let summary = StallSummary::of(&stalls(), &stream(4), Period::OF_SETPOINTS);
         assert_eq!((summary.warning(), summary), (None, StallSummary::default()));
     }
 }

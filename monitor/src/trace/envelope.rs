@@ -1,5 +1,7 @@
 //! A curve over the cycles as lowest and highest value per bucket; buckets widen as it grows.
 
+use messages::time::Period;
+
 /// A curve of bounded size that keeps every extreme.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Envelope {
@@ -61,9 +63,10 @@ impl Envelope {
         self.buckets.iter().fold(None, |a, b| join(a, *b))
     }
 
-    /// The curve as lines without gaps: `(time [s], value × scale)`, one or two points a bucket.
-    pub fn lines(&self, scale: f64) -> Vec<Vec<(f64, f64)>> {
-        let width = self.stride as f64 * messages::time::CYCLE_TIME;
+    /// The curve over cycles of `period` as lines without gaps: `(time [s], value × scale)`, one or two points
+    /// a bucket.
+    pub fn lines(&self, scale: f64, period: Period) -> Vec<Vec<(f64, f64)>> {
+        let width = self.stride as f64 * period.seconds();
         let mut lines = vec![Vec::new()];
         for (index, bucket) in self.buckets.iter().enumerate() {
             let time = index as f64 * width;
@@ -102,7 +105,7 @@ mod tests {
         }
         assert!(envelope.buckets.len() <= Envelope::CAPACITY);
         assert_eq!(envelope.range(), Some((1.0, 7.0)));
-        let lines = envelope.lines(1.0);
+        let lines = envelope.lines(1.0, Period::OF_SETPOINTS);
         let spike = lines[0].iter().find(|point| point.1 == 7.0).expect("the spike");
         let width = envelope.stride as f64 * 1e-3;
         assert!((spike.0 - 654.321).abs() <= width, "{spike:?}");
@@ -134,6 +137,9 @@ mod tests {
         for value in [None, Some(1.0), Some(2.0), None, None, Some(f64::NAN), Some(3.0)] {
             envelope.push(value);
         }
-        assert_eq!(envelope.lines(2.0), [vec![(0.001, 2.0), (0.002, 4.0)], vec![(0.006, 6.0)]]);
+        assert_eq!(
+            envelope.lines(2.0, Period::OF_SETPOINTS),
+            [vec![(0.001, 2.0), (0.002, 4.0)], vec![(0.006, 6.0)]]
+        );
     }
 }

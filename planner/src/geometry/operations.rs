@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use machine::surface::Surface;
 use machine::{CornerMode, LaserSource, PathLimits};
+use messages::time::Period;
 use nalgebra::Vector3;
 
 use dark_ends::without_dark_ends;
@@ -51,6 +52,8 @@ pub(crate) struct Operations<'a> {
     /// How corners are passed where the job says nothing.
     machine: CornerMode,
     source: LaserSource,
+    /// The period of the control cycle.
+    period: Period,
     marking: Marking,
     /// How far the path may be from the drawn line [m]; 0 where corners are exact.
     tolerance: f64,
@@ -82,6 +85,7 @@ impl<'a> Operations<'a> {
             surface,
             machine,
             source: LaserSource::IDEAL,
+            period: Period::OF_SETPOINTS,
             marking: Marking::default(),
             tolerance: Corners::AsMachine.tolerance(machine, limits.tolerance),
             place: start,
@@ -96,9 +100,9 @@ impl<'a> Operations<'a> {
         }
     }
 
-    /// Lit by `source`, as `marking` has it.
-    pub(crate) fn lit_by(self, source: LaserSource, marking: Marking) -> Self {
-        Self { source, marking, ..self }
+    /// Lit by `source` in control cycles of `period`, as `marking` has it.
+    pub(crate) fn lit_by(self, source: LaserSource, period: Period, marking: Marking) -> Self {
+        Self { source, period, marking, ..self }
     }
 
     /// The next operation that nothing to come changes; after [`Self::finish`] whatever is left.
@@ -442,11 +446,13 @@ impl<'a> Operations<'a> {
             Some(MarkingSpeed::Constant(speed)) => speed.min(top),
             _ => demand.speed.unwrap_or(top).min(top),
         };
-        let mut slowed = contour.demands().iter().zip(change_speeds(contour));
+        let mut slowed = contour.demands().iter().zip(change_speeds(contour, self.period));
         if let Some((Demand { line, .. }, _)) = slowed.find(|(demand, most)| *most < asked(demand))
         {
-            let text =
-                "slowed here: the power changes more often than a 1 ms cycle can carry".to_owned();
+            let cycle = self.period.max(Period::OF_SETPOINTS).seconds() * 1e3;
+            let text = format!(
+                "slowed here: the power changes more often than a {cycle} ms cycle can carry"
+            );
             if !self.notes.iter().any(|note| note.text == text) {
                 self.notes.push(Note { line: *line, text });
             }

@@ -1,7 +1,7 @@
 //! When the laser changes along a path, and to which power.
 
 use machine::LaserSource;
-use messages::time::CYCLE_TIME;
+use messages::time::{Period, SETPOINT_TIME};
 use messages::{MAX_EDGES, Nanoseconds};
 
 use crate::geometry::contour::{Contour, Demand, GAP};
@@ -136,7 +136,7 @@ impl Light {
     ) {
         let mut from = begin;
         while from < until {
-            let border = ((from / CYCLE_TIME + 1e-6).floor() + 1.0) * CYCLE_TIME;
+            let border = ((from / SETPOINT_TIME + 1e-6).floor() + 1.0) * SETPOINT_TIME;
             let to = border.min(until);
             let [here, there] = [from, to].map(|time| law.at(time - start).position);
             let speed = (there - here) / (to - from);
@@ -233,18 +233,25 @@ pub(crate) fn source_speeds(contour: &Contour, source: &LaserSource) -> Vec<f64>
         .collect()
 }
 
-/// Changes of the light that a cycle has room for beside those that follow the speed.
-const CHANGES: usize = MAX_EDGES - 2;
+/// How many changes of the light a control cycle of this `period` has room for beside the two in every
+/// setpoint that follow the speed, and in what time [s]: in that of a setpoint, or of the cycle where
+/// that is longer.
+fn room_for_changes(period: Period) -> (usize, f64) {
+    let setpoints = Period::OF_SETPOINTS.cycles_for(period.time());
+    let following = usize::try_from(setpoints).unwrap_or(MAX_EDGES).saturating_mul(2);
+    (MAX_EDGES.saturating_sub(following).max(1), Period::OF_SETPOINTS.of(setpoints).seconds())
+}
 
-/// The speed at which the light changes no more often than a cycle can say [m/s]: by stretch, infinite
-/// where there is no such need.
-pub(crate) fn change_speeds(contour: &Contour) -> Vec<f64> {
+/// The speed at which the light changes no more often than a control cycle of `period` can say [m/s]: by
+/// stretch, infinite where there is no such need.
+pub(crate) fn change_speeds(contour: &Contour, period: Period) -> Vec<f64> {
+    let (changes, time) = room_for_changes(period);
     let demands = contour.demands();
     let mut speeds = vec![f64::INFINITY; demands.len()];
-    for first in 0..demands.len().saturating_sub(CHANGES) {
-        let room = demands[first + CHANGES].from - demands[first].from;
-        for speed in &mut speeds[first..first + CHANGES] {
-            *speed = speed.min(room / CYCLE_TIME);
+    for first in 0..demands.len().saturating_sub(changes) {
+        let room = demands[first + changes].from - demands[first].from;
+        for speed in &mut speeds[first..first + changes] {
+            *speed = speed.min(room / time);
         }
     }
     speeds

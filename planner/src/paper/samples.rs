@@ -5,7 +5,7 @@ use machine::kinematics::{Joints, KinematicsError};
 use machine::{Actuator, Machine, Mechanism, MechanismVisitor};
 use messages::Setpoint;
 use messages::setpoint::flags;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 
 use super::Paper;
 use crate::error::{Place, PlanError};
@@ -33,7 +33,7 @@ impl Paper {
 
     /// How many milliseconds it takes, the last one perhaps in part.
     fn cycles(&self) -> u64 {
-        (self.facts.time / CYCLE_TIME).ceil() as u64
+        (self.facts.time / SETPOINT_TIME).ceil() as u64
     }
 }
 
@@ -53,7 +53,7 @@ impl<'a> MechanismVisitor for Sampling<'a> {
         let (mut branch, mut joints, mut near) = (0, home, None);
         let last = paper.cycles();
         Box::new((0..=last).map(move |sequence| {
-            let time = (sequence as f64 * CYCLE_TIME).min(paper.facts.time);
+            let time = (sequence as f64 * SETPOINT_TIME).min(paper.facts.time);
             let (tool, stroke, is_lit) = paper.at(time);
             let unreachable = |cause: KinematicsError| PlanError::Unreachable {
                 line: 0,

@@ -42,8 +42,11 @@ pub(crate) fn plan_windows(
         ..machine.path
     };
     let operations = || {
-        Operations::new(drawing.start, &limits, machine.corners, job.surface.as_ref())
-            .lit_by(machine.laser, job.marking)
+        Operations::new(drawing.start, &limits, machine.corners, job.surface.as_ref()).lit_by(
+            machine.laser,
+            machine.realtime.period,
+            job.marking,
+        )
     };
     let mut notes = drawing.notes.clone();
     let open = if leaves_speeds_open(job) {

@@ -24,7 +24,8 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     pub(super) fn speed_limits(&self, contour: &Contour) -> Vec<SpeedLimit> {
         let path = &self.limits.path;
         let by_source = source_speeds(contour, &self.task.machine.laser);
-        let by_light = by_source.into_iter().zip(change_speeds(contour));
+        let by_light =
+            by_source.into_iter().zip(change_speeds(contour, self.task.machine.realtime.period));
         let by_light = by_light.map(|(source, changes)| source.min(changes));
         let mut limits: Vec<SpeedLimit> = Vec::new();
         for (demand, least) in contour.demands().iter().zip(by_light) {

@@ -1,7 +1,7 @@
 //! The next thing that a job does.
 
 use machine::Mechanism;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use nalgebra::Vector3;
 
 use super::refusals::too_short;
@@ -13,9 +13,6 @@ use crate::joint_space::route::{Router, still};
 use crate::limits::limit_id::LimitId;
 use crate::limits::tightening::Tightening;
 use crate::trajectory::{Motion, Piece};
-
-/// Rest before and after an output changes [s]: a cycle each.
-const OUTPUT_REST: f64 = CYCLE_TIME;
 
 /// Rest before a pause [s], so that the springs of the transmission have settled.
 const PAUSE_REST: f64 = 0.1;
@@ -83,14 +80,15 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
                 let mask = 1_u64.checked_shl(*bit).unwrap_or(0);
                 let outputs = self.front.outputs;
                 self.front.outputs = if *on { outputs | mask } else { outputs & !mask };
-                let change = (self.front.time + OUTPUT_REST, self.front.outputs);
-                draft.trajectory.outputs.push(change);
-                self.stand(2.0 * OUTPUT_REST, draft);
+                // Rest before and after the change: a control cycle each, so that each of several is seen.
+                let rest = self.task.machine.realtime.period.seconds().max(SETPOINT_TIME);
+                draft.trajectory.outputs.push((self.front.time + rest, self.front.outputs));
+                self.stand(2.0 * rest, draft);
             }
             OperationKind::Pause => {
                 self.halt(draft)?;
                 // One cycle before the end, so that the sample that pauses is at rest.
-                draft.trajectory.pauses.push(self.front.time + PAUSE_REST - CYCLE_TIME);
+                draft.trajectory.pauses.push(self.front.time + PAUSE_REST - SETPOINT_TIME);
                 self.stand(PAUSE_REST, draft);
             }
         }

@@ -1,7 +1,7 @@
 //! The end of a stretch, held to the limits before the next is known.
 
 use machine::Mechanism;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 
 use super::Planning;
 use super::path_run::PathRun;
@@ -14,7 +14,7 @@ use crate::limits::tightening::Tightening;
 
 /// The last [`TAIL`] seconds of a stretch are sampled with the next stretch, when they can no longer be
 /// changed. They are therefore checked when the stretch is planned, at [`TAIL_SAMPLES`] instants.
-const TAIL: f64 = 4.0 * CYCLE_TIME;
+const TAIL: f64 = 4.0 * SETPOINT_TIME;
 const TAIL_SAMPLES: u32 = 32;
 /// The fraction that the tail may use of a joint's limit, and of a limit of the tool.
 const TAIL_JOINTS: f64 = 0.9997;

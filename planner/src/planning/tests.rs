@@ -5,6 +5,7 @@
 use machine::{Machine, Override};
 use messages::Setpoint;
 use messages::math::hypot;
+use messages::time::SETPOINT_PERIOD;
 
 use super::outlet::Outlet;
 use super::run::plan_windows;
@@ -221,7 +222,10 @@ fn no_speed_power_and_override_ask_for_more_power_than_there_is() {
         let program =
             format!("G0 X90 Y100\n{mode} S{:.3} F{feed:.3}\nG1 X95\nG1 Y105\n", 1e3 * level);
         let planned = planned_at(&machine, &job(&program, &[], &machine), &|_| rate).unwrap();
-        assert!(planned.setpoints.iter().all(|it| it.laser.is_valid()), "{program} at {rate}");
+        assert!(
+            planned.setpoints.iter().all(|it| it.laser.is_valid(SETPOINT_PERIOD)),
+            "{program} at {rate}"
+        );
     }
 }
 

@@ -14,7 +14,7 @@ use machine::kinematics::Joints;
 use machine::transmission::equilibrium;
 use machine::{Actuator, Axis};
 use messages::math;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 
 /// Fastest rate of a crossing [rad/s]: with the voltage of a cycle held, quicker ones cannot be
 /// followed.
@@ -54,7 +54,7 @@ impl<const N: usize> BacklashCompensation<N> {
         let rate = Joints::from_fn(|index, _| {
             let drive = &actuators[actuator[index]];
             let [torque, slew] = torque_and_slew(&drive.motor);
-            let torque = (SHARES[0] * torque).min(SHARES[1] * slew * CYCLE_TIME);
+            let torque = (SHARES[0] * torque).min(SHARES[1] * slew * SETPOINT_TIME);
             // A step of the whole backlash b starts with an acceleration of b·ω².
             let acceleration = torque / drive.motor.rotor_inertia() * drive.ratio.abs();
             (acceleration / axes[index].backlash).sqrt().min(FASTEST)

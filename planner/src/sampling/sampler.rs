@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use machine::kinematics::{JointMotion, Joints, KinematicsError, Pose, ToolMotion};
 use machine::{Actuator, Axis, Friction, Mechanism, StepperMotor};
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use messages::{AxisArray, GateEdge, Setpoint, setpoint::flags};
 
 use crate::geometry::attitude::AttitudeLaw;
@@ -23,16 +23,16 @@ use crate::trajectory::{Cursor, Piece, Reference, Trajectory};
 const STEPS: usize = 4;
 
 /// Time between two looks [s].
-const STEP: f64 = CYCLE_TIME / STEPS as f64;
+const STEP: f64 = SETPOINT_TIME / STEPS as f64;
 
 /// A stream ends once no motor is farther than this from where it will stay [joint units].
 const SETTLED: f64 = 1e-9;
 
 /// Nanoseconds in a cycle.
-const CYCLE: i64 = messages::time::CYCLE_PERIOD.0;
+const CYCLE: i64 = messages::time::SETPOINT_PERIOD.0;
 
 /// How long a piece is kept after its end [s].
-const KEPT: f64 = 10.0 * CYCLE_TIME;
+const KEPT: f64 = 10.0 * SETPOINT_TIME;
 
 /// Setpoints of a motion that becomes known piece by piece, in order.
 #[derive(Clone)]
@@ -196,7 +196,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     /// Waits with each sample until the motion is known for `time` [s] more, since the laser source is
     /// told so long before.
     pub(crate) fn tell_ahead(&mut self, time: f64) {
-        self.told_ahead = time / CYCLE_TIME;
+        self.told_ahead = time / SETPOINT_TIME;
     }
 
     /// Goes on with `more`, which begins where the motion known so far ends; `is_last` says that nothing
@@ -205,12 +205,12 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         self.forget();
         self.trajectory.append(more);
         self.is_complete = is_last;
-        self.end = (self.trajectory.end() / CYCLE_TIME).ceil() as i64;
+        self.end = (self.trajectory.end() / SETPOINT_TIME).ceil() as i64;
     }
 
     /// Lets go what was sampled.
     fn forget(&mut self) {
-        let before = self.sequence as f64 * CYCLE_TIME - KEPT;
+        let before = self.sequence as f64 * SETPOINT_TIME - KEPT;
         let past = |piece: &Piece| piece.start + piece.duration < before;
         let count = self.trajectory.pieces.iter().take_while(|piece| past(piece)).count();
         let count = count.min(self.trajectory.pieces.len().saturating_sub(1));
@@ -228,7 +228,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     /// told ahead of time, so its changes lie before the motion that they belong to.
     fn is_known(&self) -> bool {
         let ahead = self.sequence as f64 + 1.0 + self.told_ahead;
-        self.is_complete || self.trajectory.end() >= ahead * CYCLE_TIME
+        self.is_complete || self.trajectory.end() >= ahead * SETPOINT_TIME
     }
 
     /// Whether the laser changes more often in the cycle of the last sample than a setpoint can say.
@@ -238,7 +238,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
 
     /// When the next sample is [s].
     pub(crate) fn time(&self) -> f64 {
-        self.sequence as f64 * CYCLE_TIME
+        self.sequence as f64 * SETPOINT_TIME
     }
 
     /// Whether nothing comes after what is known of the motion.
@@ -277,7 +277,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
     pub(crate) fn broken(&self) -> Option<Unreachable> {
         match self.state {
             Stream::Broken(cause) => {
-                Some(Unreachable { time: self.sequence as f64 * CYCLE_TIME, cause })
+                Some(Unreachable { time: self.sequence as f64 * SETPOINT_TIME, cause })
             }
             Stream::Running | Stream::Ended => None,
         }
@@ -350,7 +350,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             }
         }
         mean /= STEPS as f64;
-        let acceleration = (self.motor_velocity - before) / CYCLE_TIME;
+        let acceleration = (self.motor_velocity - before) / SETPOINT_TIME;
         for (index, drive) in self.drives.iter().enumerate() {
             let Drive { axis, ratio, share, inertia, .. } = *drive;
             setpoint.effort[index] =
@@ -477,7 +477,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
 
     /// About how many setpoints can be made of the motion that is known.
     pub(crate) fn due(&self) -> usize {
-        let known = (self.trajectory.end() / CYCLE_TIME - self.told_ahead).ceil();
+        let known = (self.trajectory.end() / SETPOINT_TIME - self.told_ahead).ceil();
         (known as u64).saturating_sub(self.sequence) as usize
     }
 
@@ -494,7 +494,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         setpoint.stream = self.stream;
         setpoint.sequence = self.sequence;
         self.light(setpoint);
-        self.switch(setpoint, self.sequence as f64 * CYCLE_TIME);
+        self.switch(setpoint, self.sequence as f64 * SETPOINT_TIME);
         if self.is_settled() {
             setpoint.flags |= flags::LAST;
             self.state = Stream::Ended;

@@ -3,7 +3,7 @@
 use machine::trip::Limit;
 use machine::trip::following::DISCONTINUITY;
 use machine::{Actuator, Axis, DcMotor, Friction, Machine, Motor, PathLimits, WorkArea};
-use messages::time::CYCLE_TIME;
+use messages::time::{Period, SETPOINT_PERIOD, SETPOINT_TIME};
 use messages::{ActuatorArray, AxisArray, MAX_ACTUATORS, MAX_AXES, MAX_EDGES, Setpoint};
 
 use messages::plan::LimitUtilization;
@@ -82,7 +82,7 @@ impl Quantity {
             Self::MotorTorque => "motor torque",
             Self::PulseRate => "pulse rate",
             Self::LaserPower => "power of the laser",
-            Self::LaserChanges => "changes of the laser in a millisecond",
+            Self::LaserChanges => "changes of the laser in a control cycle",
         }
     }
 
@@ -124,7 +124,7 @@ impl LimitViolation {
     /// More changes of the laser in the cycle of `setpoint` than it has room for.
     pub(crate) fn too_many_changes(setpoint: &Setpoint) -> Self {
         Self {
-            time: setpoint.sequence as f64 * CYCLE_TIME,
+            time: setpoint.sequence as f64 * SETPOINT_TIME,
             axis: None,
             quantity: Quantity::LaserChanges,
             value: (MAX_EDGES + 1) as f64,
@@ -211,6 +211,8 @@ pub(crate) struct Checker {
     most: [Most; 4],
     axes: [AxisMost; MAX_AXES],
     motors: [MotorMost; MAX_ACTUATORS],
+    /// The gate's newest edges, where a control cycle plays several setpoints.
+    edges: Option<EdgeTimes>,
     uses: LimitUtilization,
 }
 
@@ -230,6 +232,7 @@ impl Checker {
             most: [Most::default(); 4],
             axes: [AxisMost::default(); MAX_AXES],
             motors: [MotorMost::default(); MAX_ACTUATORS],
+            edges: EdgeTimes::new(machine.realtime.period),
             uses: LimitUtilization {
                 velocity: none(),
                 acceleration: none(),
@@ -255,8 +258,11 @@ impl Checker {
         (axes, actuators): (&[Axis], &[Actuator]),
         area: &WorkArea,
     ) -> Result<(), LimitViolation> {
-        let time = setpoint.sequence as f64 * CYCLE_TIME;
+        let time = setpoint.sequence as f64 * SETPOINT_TIME;
         light(setpoint, time)?;
+        if self.edges.as_mut().is_some_and(|edges| !edges.take(setpoint)) {
+            return Err(LimitViolation::too_many_changes(setpoint));
+        }
         self.path(setpoint, time)?;
         if self.scope == Scope::PathAlone {
             return Ok(());
@@ -307,10 +313,10 @@ impl Checker {
             within(position, nearest, named(Quantity::JointPosition, place))?;
             if let Some((positions, velocities)) = &self.joints_before {
                 let mean = (velocities[index] + setpoint.velocity[index]) / 2.0;
-                let jump = (position - positions[index] - mean * CYCLE_TIME).abs();
+                let jump = (position - positions[index] - mean * SETPOINT_TIME).abs();
                 // What supervision forgives, and what a change of acceleration in the cycle makes.
                 let most = DISCONTINUITY * limits.following_error
-                    + setpoint.acceleration[index].abs() * CYCLE_TIME * CYCLE_TIME;
+                    + setpoint.acceleration[index].abs() * SETPOINT_TIME * SETPOINT_TIME;
                 named(Quantity::JointJump, place).below(jump, most, 1.0)?;
             }
             let most = &mut self.axes[index];
@@ -352,7 +358,7 @@ impl Checker {
             let axis = actuator.axis;
             let angle = (setpoint.position[axis] + setpoint.lead[index]) / actuator.ratio;
             let before = self.before.as_ref().map(|motors| motors[index]);
-            let speed = before.map_or(0.0, |before| (angle - before.angle) / CYCLE_TIME);
+            let speed = before.map_or(0.0, |before| (angle - before.angle) / SETPOINT_TIME);
             let effort = setpoint.effort[index];
             let torque = effort + actuator.friction.torque(speed);
             let sizing = sizing(actuator, effort, setpoint.acceleration[axis], speed);
@@ -382,7 +388,7 @@ impl Checker {
             let current = torque / motor.torque_constant;
             let earlier = before.map_or(current, |before| before.current);
             let voltage = motor.resistance * (current + earlier) / 2.0
-                + motor.inductance * (current - earlier) / CYCLE_TIME
+                + motor.inductance * (current - earlier) / SETPOINT_TIME
                 + motor.torque_constant * speed;
             let limit = [motor.current_limit().plan, 1.0];
             let name = named(Quantity::MotorCurrent, "A");
@@ -392,7 +398,7 @@ impl Checker {
             most.voltage.hold(voltage.abs(), limit, &mut uses.voltage[index], name)?;
             if let Some(limit) = motor.heating_limit() {
                 let heating = &mut self.heating[index];
-                *heating = DcMotor::heated(*heating, current, CYCLE_TIME, DcMotor::HEATING_TIME);
+                *heating = DcMotor::heated(*heating, current, SETPOINT_TIME, DcMotor::HEATING_TIME);
                 let heating = *heating;
                 // The root grows with what it is taken of, so that it is needed for the largest only.
                 if heating > most.heating.0 || heating.is_nan() {
@@ -422,11 +428,43 @@ fn standing(speed: f64) -> f64 {
     if Friction::is_standing(speed) { 0.0 } else { speed }
 }
 
+/// When the gate's newest edges are, [`MAX_EDGES`] of them, for control cycles longer than a setpoint: wherever
+/// such a cycle begins, it has room for no more.
+#[derive(Debug, Clone, Copy)]
+struct EdgeTimes {
+    /// How long a control cycle is [ns].
+    period: i64,
+    /// Times [ns] in a ring, and where the oldest is.
+    times: [i64; MAX_EDGES],
+    oldest: usize,
+}
+
+impl EdgeTimes {
+    /// `None` where a cycle is no longer than a setpoint, whose own edges are counted.
+    fn new(period: Period) -> Option<Self> {
+        let before = i64::MIN / 2;
+        let is_long = period > Period::OF_SETPOINTS;
+        is_long.then_some(Self { period: period.time().0, times: [before; MAX_EDGES], oldest: 0 })
+    }
+
+    /// Takes the edges of the next setpoint; whether any control cycle can hold them and those before.
+    fn take(&mut self, setpoint: &Setpoint) -> bool {
+        let start = Period::OF_SETPOINTS.of(setpoint.sequence).0;
+        setpoint.laser.edges().iter().all(|edge| {
+            let time = start + i64::from(edge.offset);
+            let Some(oldest) = self.times.get_mut(self.oldest) else { return false };
+            let apart = time - core::mem::replace(oldest, time);
+            self.oldest = (self.oldest + 1) % MAX_EDGES;
+            apart >= self.period
+        })
+    }
+}
+
 /// Whether drives can do what is asked of the laser.
 #[inline]
 fn light(setpoint: &Setpoint, time: f64) -> Result<(), LimitViolation> {
     let laser = &setpoint.laser;
-    if laser.is_valid() {
+    if laser.is_valid(SETPOINT_PERIOD) {
         return Ok(());
     }
     let mut powers = laser.edges().iter().map(|edge| edge.power).chain([laser.power]);

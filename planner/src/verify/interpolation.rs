@@ -12,7 +12,7 @@ use machine::path_check::Aim;
 use machine::surface::Surface;
 use messages::Setpoint;
 use messages::plan::InterpolationFacts;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 
 use crate::sampling::sampler::Sampler;
 use crate::trajectory::{Motion, Piece};
@@ -54,7 +54,7 @@ impl InterpolationCheck {
         sampler: &Sampler<N, M>,
     ) -> Result<Option<LimitViolation>, KinematicsError> {
         let Some(before) = self.before.replace(*setpoint) else { return Ok(None) };
-        let time = (before.sequence as f64 + 0.5) * CYCLE_TIME;
+        let time = (before.sequence as f64 + 0.5) * SETPOINT_TIME;
         // Where light falls, and not where the source is told to begin and to end.
         let marks = |piece: &Piece| matches!(piece.motion, Motion::Path { is_lit: true, .. });
         let Some(piece) = sampler.piece_at(time).filter(|piece| marks(piece)) else {
@@ -86,7 +86,8 @@ impl InterpolationCheck {
 pub(crate) fn between<const N: usize>(from: &Setpoint, to: &Setpoint, share: f64) -> Joints<N> {
     let rest = 1.0 - share;
     let (before, after) = (rest * rest * (1.0 + 2.0 * share), share * share * (1.0 + 2.0 * rest));
-    let (leaving, coming) = (rest * rest * share * CYCLE_TIME, share * share * rest * CYCLE_TIME);
+    let (leaving, coming) =
+        (rest * rest * share * SETPOINT_TIME, share * share * rest * SETPOINT_TIME);
     Joints::from_fn(|axis, _| {
         from.position[axis] * before + to.position[axis] * after + from.velocity[axis] * leaving
             - to.velocity[axis] * coming

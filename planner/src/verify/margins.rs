@@ -2,7 +2,7 @@
 
 use machine::kinematics::Joints;
 use machine::{Mechanism, MechanismVisitor};
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 
 use crate::error::{Place, PlanError};
 use crate::plan::{Plan, sampler};
@@ -63,7 +63,7 @@ impl MechanismVisitor for Walk<'_> {
                 continue;
             }
             let joints = Joints::<N>::from_fn(|axis, _| setpoint.position[axis]);
-            let time = setpoint.sequence as f64 * CYCLE_TIME;
+            let time = setpoint.sequence as f64 * SETPOINT_TIME;
             let assembly = sampler.solve(&joints).map_err(|cause| {
                 let (line, place) = place(trajectory, time);
                 PlanError::Unreachable { line, place, cause }

@@ -8,7 +8,7 @@ use machine::path_check::{Aim, Curve, Deviation, Interpolation};
 use machine::surface::Surface;
 use machine::{Mechanism, MechanismVisitor};
 use messages::Setpoint;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use nalgebra::Vector3;
 
 use crate::geometry::attitude::AttitudeLaw;
@@ -87,7 +87,7 @@ impl MechanismVisitor for Checking<'_> {
             let Some(from) = before.replace(now) else { continue };
             for part in 1..PARTS {
                 let share = f64::from(part) / f64::from(PARTS);
-                let time = (from.sequence as f64 + share) * CYCLE_TIME;
+                let time = (from.sequence as f64 + share) * SETPOINT_TIME;
                 let Some(piece) = trajectory.piece_at(time) else { continue };
                 let Motion::Path { path, law, is_lit: true } = &piece.motion else { continue };
                 if !open.as_mut().is_some_and(|stroke| stroke.goes_on(piece, path, law)) {

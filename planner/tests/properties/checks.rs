@@ -4,7 +4,7 @@
 use machine::{Actuator, Axis, DcMotor, Machine, Motor, StepperMotor};
 use messages::Setpoint;
 use messages::setpoint::flags;
-use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use messages::time::{SETPOINT_PERIOD, SETPOINT_TIME};
 use nalgebra::{DVector, Vector3};
 use planner::drawing::{Action, Step};
 use planner::verify::checker::Quantity;
@@ -71,7 +71,7 @@ fn is_finite(setpoint: &Setpoint) -> Found {
         .chain(motors.into_iter().flatten())
         .chain(powers)
         .chain([setpoint.laser.power]);
-    if all.all(f64::is_finite) && setpoint.laser.is_valid() {
+    if all.all(f64::is_finite) && setpoint.laser.is_valid(SETPOINT_PERIOD) {
         return Ok(());
     }
     Err(format!("no number, or no sound laser: {setpoint:?}"))
@@ -96,7 +96,7 @@ fn is_inside(setpoint: &Setpoint, machine: &Machine) -> Found {
 /// First, second and third differences over time, by the sample that each begins at.
 fn differences(places: &[DVector<f64>]) -> [Vec<DVector<f64>>; 3] {
     let step = |values: &[DVector<f64>]| -> Vec<DVector<f64>> {
-        values.windows(2).map(|pair| (&pair[1] - &pair[0]) / CYCLE_TIME).collect()
+        values.windows(2).map(|pair| (&pair[1] - &pair[0]) / SETPOINT_TIME).collect()
     };
     let first = step(places);
     let second = step(&first);
@@ -118,7 +118,7 @@ fn keeps(differences: &[DVector<f64>], limit: f64, noise: f64, what: &str) -> Fo
 /// What rounding makes of the differences of places at most `far` from 0.
 fn noise(far: f64) -> [f64; 3] {
     let rounding = 4.0 * f64::EPSILON * far.max(1e-3);
-    let rate = 2.0 / CYCLE_TIME;
+    let rate = 2.0 / SETPOINT_TIME;
     [rounding * rate, rounding * rate * rate, rounding * rate * rate * rate]
 }
 
@@ -168,7 +168,7 @@ fn shafts(setpoints: &[Setpoint], index: usize, actuator: &Actuator) -> Vec<Shaf
     let Actuator { axis, ratio, friction, .. } = *actuator;
     let angle = |setpoint: &Setpoint| (setpoint.position[axis] + setpoint.lead[index]) / ratio;
     let turns = setpoints.windows(2).map(|pair| {
-        let speed = (angle(&pair[1]) - angle(&pair[0])) / CYCLE_TIME;
+        let speed = (angle(&pair[1]) - angle(&pair[0])) / SETPOINT_TIME;
         let stands = speed.abs() < STANDING_SHAFT;
         let coulomb = if stands { 0.0 } else { friction.coulomb.copysign(speed) };
         let torque = pair[1].effort[index] + coulomb + friction.viscous * speed;
@@ -193,7 +193,7 @@ fn keeps_dc_limits(shafts: &[Shaft], motor: &DcMotor) -> Found {
     for (cycle, shaft) in shafts.iter().enumerate() {
         let current = shaft.torque / constant;
         let voltage = motor.resistance * (current + before) / 2.0
-            + motor.inductance * (current - before) / CYCLE_TIME
+            + motor.inductance * (current - before) / SETPOINT_TIME
             + constant * shaft.speed;
         let (most_current, most_voltage) = (motor.current_limit().plan, motor.voltage_limit().plan);
         if current.abs() > most_current * ALLOWANCE || voltage.abs() > most_voltage * ALLOWANCE {
@@ -230,7 +230,7 @@ fn open_time(setpoint: &Setpoint) -> i64 {
         open += if now.1 != 0 { offset - now.0 } else { 0 };
         now = (offset, edge.gate);
     }
-    open + if now.1 != 0 { CYCLE_PERIOD.0 - now.0 } else { 0 }
+    open + if now.1 != 0 { SETPOINT_PERIOD.0 - now.0 } else { 0 }
 }
 
 fn keeps_dark(setpoints: &[Setpoint], job: &Job, machine: &Machine) -> Found {
@@ -287,13 +287,13 @@ pub fn marks_all(setpoints: &[Setpoint], job: &Job, machine: &Machine) -> Found 
     let mut edges = 0.0;
     for pair in setpoints.windows(2) {
         let way = (Vector3::from(pair[1].tool) - Vector3::from(pair[0].tool)).norm();
-        lit += way * open_time(&pair[0]) as f64 / CYCLE_PERIOD.0 as f64;
+        lit += way * open_time(&pair[0]) as f64 / SETPOINT_PERIOD.0 as f64;
         // The speed within a cycle is not even, and the gate leads the light.
-        let changes = open_time(&pair[0]) % CYCLE_PERIOD.0 != 0;
+        let changes = open_time(&pair[0]) % SETPOINT_PERIOD.0 != 0;
         edges += if changes { way } else { 0.0 };
     }
     let delays = machine.laser.on_delay.max(machine.laser.off_delay);
-    let slack = 0.01 * drawn + cut + edges + 1e-6 + delays / CYCLE_TIME * 2.0 * edges;
+    let slack = 0.01 * drawn + cut + edges + 1e-6 + delays / SETPOINT_TIME * 2.0 * edges;
     if (lit - drawn).abs() <= slack {
         return Ok(());
     }

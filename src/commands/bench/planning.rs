@@ -6,7 +6,7 @@ use crate::output::say;
 use crate::{inputs, output};
 use machine::Machine;
 use messages::math::{TURN, sin_cos};
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use planner::job::gcode::survey;
 use planner::{Job, plan_through};
 use serde::Serialize;
@@ -172,7 +172,7 @@ fn measured(name: &str, path: &Path, machine: &Machine) -> Result<PlannedProgram
         lines_read_per_second: survey.lines as f64 / reading,
         lines_per_second: survey.lines as f64 / planning,
         setpoints_per_second: setpoints as f64 / planning,
-        realtime_factor: setpoints as f64 * CYCLE_TIME / planning,
+        realtime_factor: setpoints as f64 * SETPOINT_TIME / planning,
     })
 }
 

@@ -11,7 +11,7 @@ use machine::Mechanism;
 use machine::kinematics::{Joints, KinematicsError};
 use machine::pulses::quantisation_bound;
 use messages::Setpoint;
-use messages::time::{CYCLE_PERIOD, CYCLE_TIME};
+use messages::time::{SETPOINT_PERIOD, SETPOINT_TIME};
 use nalgebra::Vector3;
 use planner::trajectory::Reference;
 
@@ -65,14 +65,14 @@ impl<'a, const N: usize, M: Mechanism<N>> PulsePath<'a, N, M> {
             mechanism,
             planned,
             chain,
-            joints: [Segment::default(); N],
+            joints: [Segment::rest(0.0, SETPOINT_TIME); N],
             before: *first,
             counts: vec![0; trains.len()],
             per_length,
             found: PulseFacts::default(),
             squares: 0.0,
             last: None,
-            start: first.sequence as f64 * CYCLE_TIME,
+            start: first.sequence as f64 * SETPOINT_TIME,
         })
     }
 
@@ -80,6 +80,7 @@ impl<'a, const N: usize, M: Mechanism<N>> PulsePath<'a, N, M> {
     pub(super) fn begin(&mut self, before: &Setpoint, now: &Setpoint) {
         self.before = *before;
         self.joints = core::array::from_fn(|axis| Segment {
+            time: SETPOINT_TIME,
             from: before.position[axis],
             from_speed: before.velocity[axis],
             to: now.position[axis],
@@ -99,7 +100,7 @@ impl<'a, const N: usize, M: Mechanism<N>> PulsePath<'a, N, M> {
             q[train.axis] += train.share * train.beyond(*count, share);
         }
         let tool = self.locate(&q)?;
-        let time = (self.before.sequence as f64 + share) * CYCLE_TIME;
+        let time = (self.before.sequence as f64 + share) * SETPOINT_TIME;
         let planned = match (self.planned)(time) {
             Reference::Tool(tool) => tool.position,
             Reference::Joints(at) => self.locate(&joints(&at.position))?,
@@ -151,7 +152,7 @@ impl<'a, const N: usize, M: Mechanism<N>> PulsePath<'a, N, M> {
 
 /// Whether the source is told to be on at a `share` of the cycle that begins with `setpoint`.
 fn is_lit(setpoint: &Setpoint, share: f64) -> bool {
-    let offset = share * CYCLE_PERIOD.0 as f64;
+    let offset = share * SETPOINT_PERIOD.0 as f64;
     let edges = setpoint.laser.edges().iter();
     let last = edges.take_while(|edge| f64::from(edge.offset) <= offset).last();
     last.map_or(setpoint.laser.gate, |edge| edge.gate) != 0

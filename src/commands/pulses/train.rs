@@ -3,7 +3,7 @@
 use drives::pulses::{Direction, Segment};
 use machine::Actuator;
 use messages::Setpoint;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 
 /// One stepper, counted from where it stands at the start of the plan.
 #[derive(Debug)]
@@ -49,7 +49,7 @@ impl Train {
             ratio,
             per_radian: motor.pulses_per_radian(),
             origin: (start.position[axis] + start.lead[index]) / ratio,
-            segment: Segment::rest(0.0),
+            segment: Segment::rest(0.0, SETPOINT_TIME),
             count: 0,
             largest_rate: 0.0,
         })
@@ -65,7 +65,7 @@ impl Train {
         due: &mut Vec<Due>,
     ) {
         let (axis, index) = (self.axis, self.actuator);
-        let lead_speed = (after.lead[index] - before.lead[index]) / (2.0 * CYCLE_TIME);
+        let lead_speed = (after.lead[index] - before.lead[index]) / (2.0 * SETPOINT_TIME);
         let angle = (now.position[axis] + now.lead[index]) / self.ratio - self.origin;
         self.segment = self.segment.then(angle, (now.velocity[axis] + lead_speed) / self.ratio);
         self.largest_rate = self.largest_rate.max(self.segment.fastest() * self.per_radian);

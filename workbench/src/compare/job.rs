@@ -4,7 +4,7 @@ use drives::PlantOptions;
 use machine::Machine;
 use messages::artwork::Artwork;
 use messages::plan::{Binding, LimitUtilization};
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use monitor::conclusion::{self, RunOutcome};
 use monitor::marks::StreamEnd;
 use monitor::run_analysis::{Clock, RunAnalysis};
@@ -69,7 +69,7 @@ pub(super) fn run(contender: &Contender, job: &JobRequest, seeds: u64) -> Result
             error_rms: marks.map(|marks| marks.error_rms),
         },
         tracking_max: marks.map(|marks| marks.tracking_max),
-        lit: lit as f64 * CYCLE_TIME,
+        lit: lit as f64 * SETPOINT_TIME,
         demands: courses.iter().map(Demand::of).collect(),
         points: courses.iter().map(drawn).collect(),
         uses: plan.facts.uses.clone(),
@@ -85,7 +85,7 @@ fn drawn(course: &AxisCourse) -> Vec<[f64; 2]> {
 }
 
 fn examine(machine: &Machine, plant: &Machine, plan: &Plan, seed: u64) -> Result<Summary, String> {
-    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual);
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, machine.realtime.period);
     let options = PlantOptions { seed, ..PlantOptions::default() };
     let simulated = simulate(machine, plant, plan, options, |records| {
         records.iter().for_each(|record| analysis.push(record));

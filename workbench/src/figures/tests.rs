@@ -6,7 +6,7 @@ use machine::analysis::Place;
 use machine::mechanisms::MechanismKind;
 use machine::{Machine, Motor};
 use messages::math;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use nalgebra::Vector2;
 use serde_json::Value;
 
@@ -130,7 +130,7 @@ fn torques_are_those_of_masses_rotors_and_friction() {
         assert!((all[index] - load[index] - rotor[index] - friction[index]).abs() < 1e-12);
         assert!((power[index] - all[index] * speed[index]).abs() < 1e-9);
         assert!((rpm[index] - speed[index] * 60.0 / TAU).abs() < 1e-9);
-        assert!((time[index] - setpoint.sequence as f64 * CYCLE_TIME).abs() < 1e-12);
+        assert!((time[index] - setpoint.sequence as f64 * SETPOINT_TIME).abs() < 1e-12);
         let expected = 5e-3 * if speed[index].abs() < 1e-6 { 0.0 } else { speed[index].signum() };
         assert!((friction[index] - expected - 1e-6 * speed[index]).abs() < 1e-12);
     }

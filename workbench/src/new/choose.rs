@@ -39,7 +39,7 @@ fn course(worst: &Worst) -> Vec<NeedPoint> {
                 acceleration: way * acceleration * worst.acceleration,
                 effort: gravity + way * acceleration * moving,
             });
-            time += messages::time::CYCLE_TIME;
+            time += messages::time::SETPOINT_TIME;
         };
         let mut speed = 0.0;
         for step in 0..COUNT {

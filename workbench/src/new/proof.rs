@@ -31,7 +31,7 @@ pub(super) fn prove(text: &str, sample: &str) -> Result<Proof, Short> {
         .map_err(|error| failed(format!("the sample: {error}")))?;
     let plan = planner::plan(&machine, &job)
         .map_err(|error| failed(format!("the sample cannot be planned: {error}")))?;
-    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual);
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, machine.realtime.period);
     let simulated = simulate(&machine, &machine, &plan, PlantOptions::default(), |records| {
         records.iter().for_each(|record| analysis.push(record));
     })

@@ -5,7 +5,7 @@ use crate::catalogue::{CatalogueGear, CatalogueMotor, Thermal};
 use crate::operating::{AxisCourse, OperatingPoint};
 use machine::transmission::gear::Efficiency;
 use machine::{Friction, Motor};
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 
 /// A motor on an axis, with its gear.
 #[derive(Debug, Clone, PartialEq)]
@@ -161,7 +161,7 @@ impl Candidate {
                 for point in points {
                     point.current = point.torque() / motor.torque_constant;
                     let earlier = before.unwrap_or(point.current);
-                    let rate = (point.current - earlier) / CYCLE_TIME;
+                    let rate = (point.current - earlier) / SETPOINT_TIME;
                     let mean = (point.current + earlier) / 2.0;
                     point.voltage = motor.voltage(mean, rate, point.speed);
                     point.supplied = point.voltage * point.current;

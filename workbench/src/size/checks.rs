@@ -7,7 +7,7 @@ use crate::catalogue::Catalogue;
 use crate::operating::{AxisCourse, OperatingPoint};
 use core::f64::consts::TAU;
 use machine::{DcMotor, JointUnit, Motor, StepperMotor};
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -185,7 +185,7 @@ fn voltage(motor: &DcMotor, points: &[OperatingPoint], ways: &[Vec<f64>; 2], mar
         for (index, point) in points.iter().enumerate() {
             let now = currents[index];
             let before = currents[index.saturating_sub(1)];
-            let rate = (now - before) / CYCLE_TIME;
+            let rate = (now - before) / SETPOINT_TIME;
             let voltage = motor.voltage((now + before) / 2.0, rate, point.speed).abs();
             if voltage > most.0 {
                 most = (voltage, Some(point.time));
@@ -201,7 +201,7 @@ fn hottest(ways: &[Vec<f64>; 2], points: &[OperatingPoint]) -> (f64, Option<f64>
     for currents in ways {
         let mut heat = 0.0;
         for (current, point) in currents.iter().zip(points) {
-            heat = DcMotor::heated(heat, *current, CYCLE_TIME, DcMotor::HEATING_TIME);
+            heat = DcMotor::heated(heat, *current, SETPOINT_TIME, DcMotor::HEATING_TIME);
             if heat > most.0 {
                 most = (heat, Some(point.time));
             }

@@ -37,7 +37,7 @@ pub fn confirm(
         Ok(plan) => plan,
         Err(error) => return Ok(refused(error.to_string())),
     };
-    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual);
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, machine.realtime.period);
     let simulated = simulate(&machine, &machine, &plan, PlantOptions::default(), |records| {
         records.iter().for_each(|record| analysis.push(record));
     });

@@ -11,7 +11,7 @@ use machine::transmission::gear::Efficiency;
 use machine::{
     Actuator, DcMotor, Friction, JointUnit, Machine, Mechanism, MechanismVisitor, Motor,
 };
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use planner::{Job, Plan};
 
 /// What a joint does at one instant, on the motor's side of its spring.
@@ -118,11 +118,12 @@ pub fn needs(
                 let lead = |at: usize| setpoints[at].lead[index];
                 let bending = lead(after) - 2.0 * lead(at) + lead(before);
                 NeedPoint {
-                    time: setpoint.sequence as f64 * CYCLE_TIME,
+                    time: setpoint.sequence as f64 * SETPOINT_TIME,
                     is_lit: setpoint.laser.is_lit(),
                     stroke: setpoint.stroke,
-                    speed: (motor_side(at) - motor_side(before)) / CYCLE_TIME,
-                    acceleration: setpoint.acceleration[axis] + bending / (CYCLE_TIME * CYCLE_TIME),
+                    speed: (motor_side(at) - motor_side(before)) / SETPOINT_TIME,
+                    acceleration: setpoint.acceleration[axis]
+                        + bending / (SETPOINT_TIME * SETPOINT_TIME),
                     effort: setpoint.effort[index] / ratio,
                 }
             })

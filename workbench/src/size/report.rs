@@ -9,7 +9,7 @@ use crate::catalogue::{Catalogue, Screw};
 use crate::operating::{AxisCourse, Demand};
 use machine::transmission::gear::LoadClass;
 use machine::{Machine, Motor};
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use planner::Plan;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -263,7 +263,7 @@ pub fn bus(needs: &[AxisNeed], axes: &[AxisSize], catalogue: &Catalogue) -> Supp
     let (mut surplus, mut most): (f64, f64) = (0.0, 0.0);
     for at in 0..count {
         let taken: f64 = courses.iter().map(|course| course.points[at].supplied).sum();
-        surplus = (surplus - taken * CYCLE_TIME).max(0.0);
+        surplus = (surplus - taken * SETPOINT_TIME).max(0.0);
         most = most.max(surplus);
     }
     let nominal = needs.iter().zip(axes).fold(0.0, |most: f64, (need, axis)| {

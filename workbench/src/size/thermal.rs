@@ -1,7 +1,7 @@
 //! How warm a winding gets: two bodies, winding and housing, with a resistance that grows with warmth.
 
 use crate::catalogue::Thermal;
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 
 /// How much copper's resistance grows per kelvin, as a share of that at 25 °C.
 pub const COPPER: f64 = 0.00393;
@@ -32,10 +32,12 @@ pub fn warmest(thermal: &Thermal, squares: &[f64], resistance: f64, ambient: f64
     if squares.is_empty() {
         return Some(ambient);
     }
-    let cycles = ((winding_time / STEPS / CYCLE_TIME) as usize).clamp(1, squares.len());
+    let cycles = ((winding_time / STEPS / SETPOINT_TIME) as usize).clamp(1, squares.len());
     let means: Vec<(f64, f64)> = squares
         .chunks(cycles)
-        .map(|part| (part.iter().sum::<f64>() / part.len() as f64, part.len() as f64 * CYCLE_TIME))
+        .map(|part| {
+            (part.iter().sum::<f64>() / part.len() as f64, part.len() as f64 * SETPOINT_TIME)
+        })
         .collect();
     let mut bodies = Bodies::new(thermal, [winding_time, motor_time], ambient);
     let mut time = 0.0;

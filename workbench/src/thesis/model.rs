@@ -2,7 +2,7 @@
 
 use machine::kinematics::{Joints, KinematicsError};
 use machine::{DocumentError, Machine, Mechanism, MechanismVisitor};
-use messages::time::CYCLE_TIME;
+use messages::time::SETPOINT_TIME;
 use planner::Plan;
 use planner::law::profile::Ramp;
 
@@ -147,7 +147,7 @@ impl MechanismVisitor for Loads<'_> {
 
 /// `loads` are the load's torques [N·m], `run_in` is how long a run-in takes [s].
 fn motor(course: &AxisCourse, loads: &[f64], run_in: f64) -> MotorMarks {
-    let around = (run_in / CYCLE_TIME).ceil() as usize;
+    let around = (run_in / SETPOINT_TIME).ceil() as usize;
     let mut marks = MotorMarks { demand: Demand::of(course), ..MotorMarks::default() };
     let is_lit = |point: Option<&OperatingPoint>| point.is_some_and(|point| point.is_lit);
     let (mut since, mut until) = (None, vec![usize::MAX; course.points.len()]);

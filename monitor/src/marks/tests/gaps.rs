@@ -28,7 +28,7 @@ fn judged(
     records: &[CycleRecord],
     gaps: &[std::ops::Range<i64>],
 ) -> Result<MarkEvaluation, Unevaluated> {
-    let mut evaluator = MarkEvaluator::new(art).with_fastest(SPEED);
+    let mut evaluator = MarkEvaluator::new(art, Period::OF_SETPOINTS).with_fastest(SPEED);
     cut(records, gaps).iter().for_each(|record| evaluator.push(record));
     let last_cycle = Cycle(records.last().unwrap().feedback.cycle.0 - LIGHT_LAG);
     let completed = ControllerReport { completed: 1, last_cycle, ..ControllerReport::default() };
@@ -181,7 +181,7 @@ fn a_tool_that_was_not_known_is_as_good_as_not_recorded() {
 fn where_the_job_was_broken_off_only_what_may_have_been_marked_is_hidden() {
     let (art, records) = three();
     let evaluate = |kept: &[CycleRecord], last: i64, fastest: f64| {
-        let mut evaluator = MarkEvaluator::new(&art).with_fastest(fastest);
+        let mut evaluator = MarkEvaluator::new(&art, Period::OF_SETPOINTS).with_fastest(fastest);
         kept.iter().for_each(|record| evaluator.push(record));
         let zero = FIRST as i64 + (START / CYCLE_TIME).round() as i64;
         let last_cycle = Cycle((zero + last) as u64);
@@ -217,7 +217,7 @@ fn without_a_report_the_watchdog_says_that_no_light_follows() {
     let (art, records) = three();
     let mut kept = cut(&records, &[31..500]);
     let evaluate = |kept: &[CycleRecord], end: StreamEnd<'_>| {
-        let mut evaluator = MarkEvaluator::new(&art).with_fastest(SPEED);
+        let mut evaluator = MarkEvaluator::new(&art, Period::OF_SETPOINTS).with_fastest(SPEED);
         kept.iter().for_each(|record| evaluator.push(record));
         let evaluation = evaluator.finish(end).unwrap();
         let steps = (evaluation.marks.unrecorded / STEP).round();

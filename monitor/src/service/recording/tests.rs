@@ -40,7 +40,7 @@ fn folder(below: &tempfile::TempDir) -> RunFolder {
 }
 
 fn begin(below: &tempfile::TempDir) -> Recording {
-    Recording::begin(STREAM, folder(below), 0).unwrap()
+    Recording::begin(STREAM, folder(below), 0, Period::OF_SETPOINTS).unwrap()
 }
 
 fn cycles(folder: &RunFolder) -> Vec<u64> {
@@ -112,7 +112,7 @@ fn a_successor_goes_on_with_the_recording_and_counts_the_gap() {
     for torn in [0, 1, size_of::<CycleRecord>() as u64 - 1] {
         let below = tempfile::tempdir().unwrap();
         let folder = folder(&below);
-        let mut first = Recording::begin(STREAM, folder.clone(), 7).unwrap();
+        let mut first = Recording::begin(STREAM, folder.clone(), 7, Period::OF_SETPOINTS).unwrap();
         take(&mut first, 0, 100, STREAM);
         take(&mut first, 110, 200, STREAM);
         first.writer.flush().unwrap();
@@ -121,7 +121,8 @@ fn a_successor_goes_on_with_the_recording_and_counts_the_gap() {
         samples.set_len(samples.metadata().unwrap().len() - torn).unwrap();
         let kept = if torn == 0 { 200 } else { 199 };
 
-        let mut second = Recording::begin(STREAM, folder.clone(), 99).unwrap();
+        let mut second =
+            Recording::begin(STREAM, folder.clone(), 99, Period::OF_SETPOINTS).unwrap();
         assert_eq!((second.overruns_before, second.played), (7, true));
         take(&mut second, 300, 400, STREAM);
         second.finish().unwrap();
@@ -140,7 +141,7 @@ fn a_successor_goes_on_with_the_recording_and_counts_the_gap() {
 fn a_recording_of_another_job_is_not_gone_on_with() {
     let below = tempfile::tempdir().unwrap();
     let folder = folder(&below);
-    let mut first = Recording::begin(STREAM - 1, folder.clone(), 0).unwrap();
+    let mut first = Recording::begin(STREAM - 1, folder.clone(), 0, Period::OF_SETPOINTS).unwrap();
     take(&mut first, 0, 100, STREAM - 1);
     first.writer.flush().unwrap();
     let mut second = begin(&below);
@@ -168,7 +169,10 @@ fn a_file_that_is_no_recording_is_refused_by_its_name() {
     drop(begin(&below));
     let samples = folder(&below).file(run_folder::SAMPLES);
     std::fs::write(&samples, vec![7; 5000]).unwrap();
-    let error = Recording::begin(STREAM, folder(&below), 0).err().unwrap().to_string();
+    let error = Recording::begin(STREAM, folder(&below), 0, Period::OF_SETPOINTS)
+        .err()
+        .unwrap()
+        .to_string();
     assert!(error.contains("samples.bin: not a recording"), "{error}");
 }
 
@@ -211,7 +215,7 @@ fn a_full_disk_ends_the_recording_with_a_reason_and_not_the_monitor() {
 fn a_vanished_folder_ends_the_recording_and_nobody_waits_for_it() {
     let below = tempfile::tempdir().unwrap();
     let place = RunFolder::create_at(&below.path().join("run")).unwrap();
-    let mut recording = Recording::begin(STREAM, place.clone(), 0).unwrap();
+    let mut recording = Recording::begin(STREAM, place.clone(), 0, Period::OF_SETPOINTS).unwrap();
     take(&mut recording, 0, 100, STREAM);
     std::fs::remove_dir_all(place.path()).unwrap();
     let error = recording.finish().unwrap_err();
@@ -219,7 +223,7 @@ fn a_vanished_folder_ends_the_recording_and_nobody_waits_for_it() {
     give_up(&place, STREAM, &error).unwrap();
     assert_eq!(RecordingState::of(&place, STREAM), RecordingState::Absent);
     assert!(!place.path().exists());
-    let error = Recording::begin(STREAM, place, 0).err().unwrap();
+    let error = Recording::begin(STREAM, place, 0, Period::OF_SETPOINTS).err().unwrap();
     assert!(error.to_string().contains("run/monitor.json: No such file"), "{error}");
 }
 
