@@ -23,7 +23,8 @@ fn plant(mode: ActuatorMode) -> Plant<1, Shaft> {
     actuator.mode = mode;
     let shaft = Shaft { load: 0.0, spread: 0.0 };
     let options = PlantOptions::default();
-    Plant::new(shaft, &[shaft::axis()], &[actuator], &LaserSource::IDEAL, &[0.0], options).unwrap()
+    let (laser, period) = (LaserSource::IDEAL, messages::time::Period::OF_SETPOINTS);
+    Plant::new(shaft, &[shaft::axis()], &[actuator], &laser, &[0.0], period, options).unwrap()
 }
 
 /// From rest to rest over one turn in [`CYCLES`]: angle and speed [rad, rad/s] at the end of `cycle`.
