@@ -1,7 +1,7 @@
 //! What the laser did, for the feedback: what the board has shown to have done, later by its latency.
 
 use machine::LaserSource;
-use messages::time::SETPOINT_PERIOD;
+use messages::time::Period;
 use messages::{GateEdge, LaserCycle, Nanoseconds};
 
 use crate::plant::source::Source;
@@ -10,27 +10,25 @@ use crate::plant::source::Source;
 #[derive(Debug, Clone, Copy)]
 pub struct Fired {
     source: Source,
+    period: Period,
     light: LaserCycle,
     cycles: u32,
 }
 
 impl Fired {
     /// A dark gate whose offsets count from `latency` after the deadline of its cycle, before `source`.
-    pub fn new(source: &LaserSource, latency: Nanoseconds) -> Self {
+    pub fn new(source: &LaserSource, latency: Nanoseconds, period: Period) -> Self {
         let later = |delay: f64| delay + latency.seconds();
         let (on_delay, off_delay) = (later(source.on_delay), later(source.off_delay));
-        let source = Source::new(
-            &LaserSource { on_delay, off_delay, ..*source },
-            messages::time::Period::OF_SETPOINTS,
-        );
-        Self { source, light: LaserCycle::OFF, cycles: 0 }
+        let source = Source::new(&LaserSource { on_delay, off_delay, ..*source }, period);
+        Self { source, period, light: LaserCycle::OFF, cycles: 0 }
     }
 
     /// A cycle has passed in which the gate did as `laser` says. Changes beyond what a sample holds are left
     /// out, the last ones first.
     pub fn pass(&mut self, laser: &LaserCycle) {
         let light = self.source.cycle(laser).unwrap_or(LaserCycle::OFF);
-        let start = self.cycles.saturating_mul(SETPOINT_PERIOD.0 as u32);
+        let start = self.cycles.saturating_mul(self.period.time().0 as u32);
         self.cycles += 1;
         if start == 0 {
             self.light = light;

@@ -4,7 +4,6 @@ use std::net::{SocketAddr, ToSocketAddrs};
 
 use machine::drives::{Hostmot2, Hostmot2Actuator};
 use machine::{ActuatorMode, DrivesKind, Machine};
-use messages::time::SETPOINT_PERIOD;
 use messages::{LinkCounters, Nanoseconds};
 
 use super::arming::{BoardClock, Pins, Watchdog};
@@ -155,11 +154,11 @@ impl Hostmot2Port {
     }
 
     fn period(&self) -> f64 {
-        SETPOINT_PERIOD.seconds()
+        self.machine.realtime.period.seconds()
     }
 
     fn check_latencies(&self) -> Result<(), OpenError> {
-        let period = SETPOINT_PERIOD;
+        let period = self.machine.realtime.period.time();
         let [least, most] = LATENCY.map(|share| Nanoseconds((share * period.0 as f64) as i64));
         let check = |what: String, latency: Nanoseconds, [least, most]: [Nanoseconds; 2]| {
             if (least..=most).contains(&latency) {
@@ -205,7 +204,7 @@ impl Hostmot2Port {
     /// Finds the board and sets it up.
     fn set_up(&self, mut link: Box<dyn Link>) -> Result<Session, BoardError> {
         let board = Board::read(link.as_mut())?;
-        let Machine { actuators, axes, laser, .. } = &self.machine;
+        let Machine { actuators, axes, laser, realtime, .. } = &self.machine;
         let period = self.period();
         let mut drives = Vec::with_capacity(actuators.len());
         for (on, actuator) in self.config.actuators.iter().zip(actuators) {
@@ -226,7 +225,7 @@ impl Hostmot2Port {
         for shot in &self.config.gate {
             let module = board.module(Kind::Oneshot, *shot)?;
             pins.gate(board.output(Kind::Oneshot, *shot, SECOND_TIMER)?);
-            gate = Some(Gate::new(module, &self.config.gate, SETPOINT_PERIOD.0 as f64));
+            gate = Some(Gate::new(module, &self.config.gate, realtime.period.time().0 as f64));
         }
         let power = self.config.power;
         if let Some(power) = power {
@@ -286,11 +285,11 @@ impl Hostmot2Port {
         });
         let mirror = mirrors.into_iter().max().unwrap_or_default();
         Ok(Session::new(Parts {
-            fired: Fired::new(laser, self.config.gate_latency),
+            fired: Fired::new(laser, self.config.gate_latency, realtime.period),
             inputs: inputs.collect(),
             gate_latency: self.config.gate_latency.seconds(),
             mirror_latency: mirror.seconds(),
-            period: SETPOINT_PERIOD,
+            period: realtime.period.time(),
             link,
             watchdog,
             clock,

@@ -266,7 +266,7 @@ impl Session {
                 None => {}
             }
         }
-        if !actuation.laser.is_valid(messages::time::SETPOINT_PERIOD) {
+        if !actuation.laser.is_valid(self.parts.period) {
             return Some(impossible_light(&actuation.laser));
         }
         let light = Light::of(&actuation.laser, self.parts.period.0 as f64);
