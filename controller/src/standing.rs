@@ -160,8 +160,12 @@ fn release(actuators: &[Actuator], period: Period) -> u64 {
     let brakes =
         actuators.iter().map(|actuator| &actuator.brake).filter(|brake| brake.torque > 0.0);
     let slowest = brakes.map(|brake| brake.release).reduce(f64::max);
-    slowest
-        .map_or(0, |release| period.cycles_for(Nanoseconds::from_seconds(release)) + RELEASE_MARGIN)
+    // None is no time at all, and lasts for no cycle.
+    let cycles = |release: f64| match Nanoseconds::from_seconds(release) {
+        Nanoseconds(0) => 0,
+        time => period.cycles_for(time),
+    };
+    slowest.map_or(0, |release| cycles(release) + RELEASE_MARGIN)
 }
 
 /// A mechanism of any kind, asked for its weight.
