@@ -420,7 +420,6 @@ fn hold_every(setpoints: f64, planned: &Planned) {
             bench.until_rate(1.0);
         }
     }
-    println!("{}: {:?}, {longest} cycles to rest at most", planned.name, bench.uses);
     let most = 250 * planned.per_setpoint();
     assert!(longest < most, "{}: {longest} cycles to rest", planned.name);
     bench.finish(&marks, "holds");
