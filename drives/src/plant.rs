@@ -285,7 +285,10 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
         Ok(Self {
             period,
             brake: Brake::of(axes, actuators),
-            servos: core::array::from_fn(|row| actuators.get(row).and_then(Servo::of)),
+            servos: core::array::from_fn(|row| {
+                let actuator = actuators.get(row)?;
+                Servo::of(actuator, period.seconds())
+            }),
             motors: actuators.len(),
             source: Source::new(laser, period),
             weights: motors.windings.weights(period.seconds() / f64::from(substeps)),

@@ -8,7 +8,6 @@
 //! the speed it had.
 
 use machine::{Actuator, ActuatorMode};
-use messages::time::SETPOINT_TIME;
 use messages::{CommandMode, MAX_ACTUATORS};
 
 use crate::port::{Actuation, Freshness};
@@ -37,6 +36,8 @@ pub(super) struct MotorState {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Servo {
     mode: ActuatorMode,
+    /// Time of a cycle [s].
+    cycle_time: f64,
     motor: machine::DcMotor,
     position_gain: f64,
     velocity_gain: f64,
@@ -49,10 +50,11 @@ pub(super) struct Servo {
 }
 
 impl Servo {
-    /// The drive of `actuator`; `None` of a stepper.
-    pub(super) fn of(actuator: &Actuator) -> Option<Self> {
+    /// The drive of `actuator` in cycles of `cycle_time` [s]; `None` of a stepper.
+    pub(super) fn of(actuator: &Actuator, cycle_time: f64) -> Option<Self> {
         Some(Self {
             mode: actuator.mode,
+            cycle_time,
             motor: *actuator.motor.dc()?,
             position_gain: QUICKER * actuator.gains.position,
             velocity_gain: QUICKER * actuator.gains.velocity,
@@ -73,7 +75,7 @@ impl Servo {
         self.from = self.to;
         self.to = match actuation.freshness {
             Freshness::Fresh => [at(&actuation.position), at(&actuation.velocity)],
-            Freshness::Stale => [self.from[0] + self.from[1] * SETPOINT_TIME, self.from[1]],
+            Freshness::Stale => [self.from[0] + self.from[1] * self.cycle_time, self.from[1]],
         };
     }
 
@@ -127,12 +129,47 @@ impl Servo {
     fn reference(&self, share: f64) -> [f64; 2] {
         let ([from, from_speed], [to, to_speed]) = (self.from, self.to);
         let rise = to - from;
-        let (start, end) = (from_speed * SETPOINT_TIME, to_speed * SETPOINT_TIME);
+        let (start, end) = (from_speed * self.cycle_time, to_speed * self.cycle_time);
         let square = 3.0 * rise - 2.0 * start - end;
         let cube = start + end - 2.0 * rise;
         [
             from + share * (start + share * (square + share * cube)),
-            (start + share * (2.0 * square + share * 3.0 * cube)) / SETPOINT_TIME,
+            (start + share * (2.0 * square + share * 3.0 * cube)) / self.cycle_time,
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use machine::Machine;
+
+    #[test]
+    fn a_position_is_gone_to_at_an_even_speed_in_a_cycle_of_any_length() {
+        let actuator = Machine::builtin().actuators[0].clone();
+        for cycle_time in [125e-6, 250e-6, 1e-3, 4e-3] {
+            let mut servo = Servo::of(&actuator, cycle_time).unwrap();
+            let speed = 7.0;
+            let state = MotorState { angle: 0.0, speed, current: 0.0 };
+            let mut actuation = Actuation {
+                freshness: Freshness::Fresh,
+                mode: CommandMode::Driven,
+                ..Actuation::DISABLED
+            };
+            for cycle in 0..3 {
+                actuation.position[0] = speed * cycle_time * f64::from(cycle);
+                actuation.velocity[0] = speed;
+                servo.engage(&actuation, 0, state);
+            }
+            // Nobody says where to in the next one.
+            for freshness in [Freshness::Fresh, Freshness::Stale] {
+                let [angle, now] = servo.reference(0.3);
+                let expected = servo.from[0] + 0.3 * speed * cycle_time;
+                assert!((angle - expected).abs() < 1e-12, "{angle} {expected}, {freshness:?}");
+                assert!((now - speed).abs() < 1e-9, "{now} in {cycle_time} s, {freshness:?}");
+                servo.engage(&Actuation { freshness: Freshness::Stale, ..actuation }, 0, state);
+            }
+        }
     }
 }
