@@ -156,7 +156,7 @@ fn a_tolerated_stall_is_a_time_of_which_whole_cycles_count() {
         let found = (timing.stalled_cycles(), timing.feedback_gap());
         assert_eq!(found, (cycles, cycles + 1), "{stall}");
     }
-    for (period, cycles) in [("125 us", 80), ("0.25 ms", 40), ("3 ms", 3), ("4 ms", 2)] {
+    for (period, cycles) in [("125 us", 80), ("0.25 ms", 40), ("1.5 ms", 6), ("2 ms", 5)] {
         let timing = read(&format!("period = \"{period}\"\nstall = \"10 ms\""));
         assert_eq!(timing.stalled_cycles(), cycles, "{period}");
     }
@@ -178,11 +178,33 @@ fn a_period_that_no_cycle_can_have_is_refused_and_a_stall_is_at_least_one() {
     }
     refused(
         "[laser]",
-        "[realtime]\nperiod = \"4 ms\"\nstall = \"3 ms\"\n[laser]",
+        "[realtime]\nperiod = \"2 ms\"\nstall = \"1 ms\"\n[laser]",
         &[
-            "102:9: a `stall` of 0.003 s cannot be tolerated; write a time from 4 ms, one cycle, to 50 ms",
+            "102:9: a `stall` of 0.001 s cannot be tolerated; write a time from 2 ms, one cycle, to 50 ms",
         ],
     );
+}
+
+#[test]
+fn loops_that_swing_in_a_long_cycle_are_refused_and_defaults_follow_it() {
+    let swings = |place: &str| {
+        format!(
+            "{place}: a current loop of 349 rad/s swings without end in a control cycle of 4 ms; lower \
+             `loops.current`: a third of 1/period is safe; or shorten the period"
+        )
+    };
+    let long = "[realtime]\nperiod = \"4 ms\"\n[laser]";
+    refused("[laser]", long, &[&swings("68:11"), &swings("97:11")]);
+    let written =
+        ["position = \"40 1/s\"\n", "velocity = \"160 rad/s\"\n", "current = \"349 rad/s\"\n"];
+    let silent = written.iter().fold(COREXY.to_owned(), |text, line| text.replace(line, ""));
+    for (period, slower) in [("0.25 ms", 1.0), ("1 ms", 1.0), ("2 ms", 2.0), ("4 ms", 4.0)] {
+        let table = format!("[realtime]\nperiod = \"{period}\"\n[laser]");
+        let text = silent.replacen("[laser]", &table, 1);
+        let gains = Machine::parse("machine.toml", &text, &[]).unwrap().actuators[0].gains;
+        let found = [gains.position, gains.velocity, gains.current].map(|it| it * slower);
+        assert_eq!(found, [40.0, 160.0, 349.0], "{period}");
+    }
 }
 
 #[test]
