@@ -170,6 +170,11 @@ impl Bridge {
         self.port.close()
     }
 
+    /// The first deadline from `from` on that suits the port.
+    pub fn first_deadline(&self, from: Nanoseconds) -> Nanoseconds {
+        self.port.first_deadline(from)
+    }
+
     /// Starts the cycle of `deadline` at `now`, not before it: puts the latched command in force,
     /// measures, and gives the feedback, whose `published` and `exchange` [`Self::stamp`] fills.
     ///

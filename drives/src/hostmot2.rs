@@ -4,7 +4,7 @@
 //! - [`idrom`]: what a board is; [`arming`]: its pins, its clock and its watchdog.
 //! - [`steps`], [`pwm`], [`galvo`], [`encoder`]: the modules that move and measure; [`axes`]: an actuator on
 //!   them; [`path`]: what it is told through a cycle.
-//! - [`grid`]: when requests reach the board; [`gate`]: the laser's edges by the board's clock; [`fired`]: the
+//! - [`grid`]: when requests reach the board; [`gate`]: the laser's edges by the board's clock; [`crate::fired`]: the
 //!   light that the board has shown to have given.
 //! - [`config`]: what is connected; [`session`]: a cycle; [`port`]: the port.
 //!
@@ -17,7 +17,6 @@ pub mod asking;
 pub mod axes;
 pub mod config;
 pub mod encoder;
-pub mod fired;
 pub mod galvo;
 pub mod gate;
 pub mod grid;

@@ -13,6 +13,9 @@
 #![allow(rustdoc::broken_intra_doc_links)]
 
 pub mod bridge;
+#[cfg(feature = "ethercat")]
+pub mod ethercat;
+pub mod fired;
 pub mod hostmot2;
 pub mod plant;
 pub mod port;

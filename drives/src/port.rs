@@ -268,6 +268,11 @@ pub trait Port: Send {
         Ok(())
     }
 
+    /// The first deadline from `from` on that suits the clock of the bus; any does where it has none.
+    fn first_deadline(&self, from: Nanoseconds) -> Nanoseconds {
+        from
+    }
+
     /// Hands `actuation` over, to act from now and its latency on, and returns at once.
     ///
     /// The first call starts the first cycle, so nothing has happened before it.

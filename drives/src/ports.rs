@@ -24,7 +24,7 @@ macro_rules! ports {
 ports! {
     Simulated => simulated;
     Hostmot2 => hostmot2;
-    Ethercat => absent;
+    Ethercat => ethercat;
 }
 
 /// The plant that `plant` describes.
@@ -47,10 +47,27 @@ pub fn hostmot2(machine: &Machine, _plant: &Machine) -> Result<Box<dyn Port>, Po
     Ok(Box::new(Hostmot2Port::of(machine)?))
 }
 
+/// The port to the bus that `machine` has.
+///
+/// # Errors
+/// A bus that the machine file cannot mean.
+#[cfg(feature = "ethercat")]
+pub fn ethercat(machine: &Machine, _plant: &Machine) -> Result<Box<dyn Port>, PortError> {
+    Ok(Box::new(crate::ethercat::EthercatPort::of(machine)?))
+}
+
+#[cfg(not(feature = "ethercat"))]
+fn ethercat(machine: &Machine, plant: &Machine) -> Result<Box<dyn Port>, PortError> {
+    absent(machine, plant)
+}
+
 /// The error of a port that is not part of this build.
+#[cfg(not(feature = "ethercat"))]
 fn absent(machine: &Machine, _plant: &Machine) -> Result<Box<dyn Port>, PortError> {
     Err(PortError::Unsupported {
         what: format!("this build has no port for [drives.{}]", machine.drives.kind.name()),
-        instead: "build it with that port, or run with `--drives sim`".to_owned(),
+        instead: "build it with that feature, as by `cargo build --release --features ethercat`, or run with \
+                  `--drives sim`"
+            .to_owned(),
     })
 }

@@ -165,7 +165,9 @@ impl ServiceCycle {
         let period = self.period.time();
         let margin = margin.min(Nanoseconds(period.0 / SPIN_PART));
         let report_interval = self.period.cycles_for(REPORT_INTERVAL);
-        let mut clock = PeriodicClock::new(period, margin);
+        let clock = PeriodicClock::new(period, margin);
+        let first = self.bridge.first_deadline(clock.deadline());
+        let mut clock = clock.starting_at(first);
         loop {
             clock.wait();
             let vitality = self.check_peers();

@@ -127,6 +127,8 @@ pub struct Ethercat {
     pub actuators: Vec<u16>,
     /// What opens the gate.
     pub gate: Option<EthercatGate>,
+    /// The position on the bus of the analogue output that sets the power.
+    pub power: Option<u16>,
 }
 
 /// How an EtherCAT bus is reached.

@@ -74,6 +74,12 @@ impl PeriodicClock {
         Self { period, margin, deadline: now() + period }
     }
 
+    /// The same with `first` as its first deadline.
+    #[must_use]
+    pub fn starting_at(self, first: Nanoseconds) -> Self {
+        Self { deadline: first, ..self }
+    }
+
     /// The deadline that is next, or at which [`Self::wait`] returned last until
     /// [`Self::advance`].
     pub fn deadline(&self) -> Nanoseconds {

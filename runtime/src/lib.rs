@@ -17,12 +17,15 @@ pub mod child;
 pub mod clock;
 pub mod core_lock;
 pub mod domain;
+#[cfg(feature = "embassy")]
+mod embassy_clock;
 pub mod instance;
 mod lock;
 mod membership;
 pub mod message;
 pub mod operator;
 pub mod peer;
+pub mod raw_frames;
 pub mod ready;
 pub mod room;
 pub mod service;

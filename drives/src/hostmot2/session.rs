@@ -4,13 +4,13 @@ use messages::{CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, Nanosec
 
 use super::arming::{BoardClock, MOST_PORTS, Pins, Watchdog};
 use super::axes::{Drive, Refusal};
-use super::fired::Fired;
 use super::gate::{Gate, LEAD, Light};
 use super::grid::Grid;
 use super::lbp16::{LONGEST, Reply, Request};
 use super::link::Link;
 use super::path::is_driven;
 use super::pwm::Pwms;
+use crate::fired::Fired;
 use crate::port::{Actuation, Freshness, Measurement, Power};
 use crate::watchdog::impossible_light;
 

@@ -61,6 +61,11 @@ pub struct Line {
 }
 
 impl Line {
+    /// Other `rates` from now on.
+    pub fn set_rates(&mut self, rates: Rates) {
+        self.rates = rates;
+    }
+
     /// A line of these `rates`, the same for the same `seed`.
     pub fn new(rates: Rates, seed: u64) -> Self {
         Self { rates, random: SplitMix64::new(seed), counts: Counts::default() }

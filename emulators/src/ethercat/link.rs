@@ -32,6 +32,11 @@ impl Link {
         Self { segment, line: Line::new(rates, seed), coming: VecDeque::new() }
     }
 
+    /// The line is as good or bad as `rates` from now on.
+    pub fn set_rates(&mut self, rates: Rates) {
+        self.line.set_rates(rates);
+    }
+
     /// What has happened to the frames so far.
     pub fn counts(&self) -> Counts {
         self.line.counts()

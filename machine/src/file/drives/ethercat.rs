@@ -31,11 +31,13 @@ table! {
         /// How long a drive goes on without process data before it stops by itself.
         pub watchdog: Quantity<Duration, Positive> = "20 ms",
         /// From the deadline at which a command is sent until a motor follows it.
-        pub latency: Latency = "2 ms",
+        pub latency: Latency = "500 us",
         /// The same of the laser's gate.
-        pub gate_latency: Latency = "2 ms",
+        pub gate_latency: Latency = "500 us",
         /// What opens the laser's gate.
         pub gate: Option<EthercatGateTable>,
+        /// What sets the laser's power.
+        pub power: Option<EthercatPowerTable>,
         /// The drive of each actuator, by the actuators' names.
         pub actuators: Named<EthercatActuatorTable>,
     }
@@ -50,6 +52,14 @@ table! {
         pub channel: Whole = 0.0,
         /// Samples in a cycle.
         pub oversampling: Whole = 100.0,
+    }
+}
+
+table! {
+    /// An analogue output of 16 bits that sets the laser's power, once a cycle.
+    pub struct EthercatPowerTable {
+        /// Its position on the bus, from 0.
+        pub slave: Whole,
     }
 }
 
@@ -87,6 +97,7 @@ pub(super) fn build(
         channel: number(&gate.channel, LAST_CHANNEL),
         oversampling: number(&gate.oversampling, MOST_SAMPLES),
     });
+    let power = table.power.as_ref().map(|power| number(&power.slave, LAST_SLAVE));
     let tables = each(&table.actuators, "ethercat", actuators, diagnostics)?;
     let slave = |own: &EthercatActuatorTable| whole(&own.slave, LAST_SLAVE, diagnostics) as u16;
     let slaves = tables.into_iter().map(slave).collect();
@@ -99,6 +110,7 @@ pub(super) fn build(
             watchdog: Nanoseconds::from_seconds(table.watchdog.value),
             actuators: slaves,
             gate,
+            power,
         }),
     })
 }

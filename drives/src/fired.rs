@@ -1,4 +1,4 @@
-//! What the laser did, for the feedback: what the board has shown to have done, later by its latency.
+//! What the laser did, for the feedback: what a port was shown to have done, later by the latency of its gate.
 
 use machine::LaserSource;
 use messages::time::Period;
