@@ -6,12 +6,13 @@ use std::sync::Arc as Shared;
 use kurbo::{Affine, Point};
 use messages::math;
 
-use super::Piece;
+use super::areas::Looks;
 use super::colours::{indexed, true_colour};
 use super::file::{File, is_dashed, key};
 use super::frame::{Frame, cross};
 use super::record::Record;
 use super::spline::{Spline, through};
+use super::{Area, Piece};
 use crate::ReadError;
 use crate::read::arcs::{bulged, circular};
 use crate::read::notes::Notes;
@@ -19,22 +20,26 @@ use crate::read::pen::{Budget, Pen};
 use crate::read::{MOST_DEPTH, is_finite};
 use crate::shape::{Arc, Colour, Contour};
 
-/// The contours of all objects that are seen.
+/// The contours of all objects that are seen, and what is filled or written.
 ///
 /// # Errors
 ///
 /// Where blocks are nested too deep or in a circle, or there are too many objects.
-pub(super) fn pieces(file: &File<'_, '_>, notes: &mut Notes) -> Result<Vec<Piece>, ReadError> {
-    let mut drawing = Drawing { file, notes, budget: Budget::default(), pieces: Vec::new() };
+pub(super) fn pieces(
+    file: &File<'_, '_>,
+    notes: &mut Notes,
+) -> Result<(Vec<Piece>, Vec<Area>), ReadError> {
+    let mut drawing =
+        Drawing { file, notes, budget: Budget::default(), pieces: Vec::new(), areas: Vec::new() };
     let within =
         Within { frame: Frame::scale(file.unit), layer: None, colour: Colour::BLACK, depth: 0 };
     drawing.records(&file.entities, &within)?;
-    Ok(drawing.pieces)
+    Ok((drawing.pieces, drawing.areas))
 }
 
 /// What the objects of a block get from where it is inserted.
 #[derive(Debug, Clone)]
-struct Within {
+pub(super) struct Within {
     frame: Frame,
     /// The layer of what is on layer 0 in a block.
     layer: Option<Shared<str>>,
@@ -42,11 +47,12 @@ struct Within {
     depth: usize,
 }
 
-struct Drawing<'f, 'p, 'a> {
-    file: &'f File<'p, 'a>,
-    notes: &'f mut Notes,
-    budget: Budget,
-    pieces: Vec<Piece>,
+pub(super) struct Drawing<'f, 'p, 'a> {
+    pub(super) file: &'f File<'p, 'a>,
+    pub(super) notes: &'f mut Notes,
+    pub(super) budget: Budget,
+    pub(super) pieces: Vec<Piece>,
+    pub(super) areas: Vec<Area>,
 }
 
 impl<'p, 'a> Drawing<'_, 'p, 'a> {
@@ -110,11 +116,14 @@ impl<'p, 'a> Drawing<'_, 'p, 'a> {
             _ => known.map_or(Colour::BLACK, |known| known.colour),
         };
         if record.kind == "INSERT" {
-            if !parts.is_empty() {
-                self.notes.add("ATTRIB (text of a block) is left out", line);
-            }
+            parts.iter().try_for_each(|part| self.record(part, &[], within))?;
             return self.insert(record, layer, colour, within);
         }
+        let looks = Looks { layer, colour };
+        if self.area(record, within, &looks)? {
+            return Ok(());
+        }
+        let Looks { layer, colour } = looks;
         let contours = self.contours(record, parts, within);
         self.budget.spend(&contours)?;
         let type_name = record.text(6).unwrap_or("BYLAYER");
@@ -211,7 +220,12 @@ impl<'p, 'a> Drawing<'_, 'p, 'a> {
     }
 
     /// The coordinates of a flat object.
-    fn plane(&mut self, record: &Record<'p, 'a>, within: &Within, height: f64) -> Affine {
+    pub(super) fn plane(
+        &mut self,
+        record: &Record<'p, 'a>,
+        within: &Within,
+        height: f64,
+    ) -> Affine {
         let frame = within.frame.then(&extruded(record));
         self.tell_depth(frame.is_tilted(), record.line);
         frame.plane(height)
@@ -355,7 +369,7 @@ fn extruded(record: &Record<'_, '_>) -> Frame {
 }
 
 /// An angle from above 0 to a whole turn.
-fn turn(angle: f64, whole: f64) -> f64 {
+pub(super) fn turn(angle: f64, whole: f64) -> f64 {
     let angle = angle.rem_euclid(whole);
     // What the file rounded to just below a turn or just above none is a turn.
     if angle < 1e-9 * whole { whole } else { angle }
@@ -396,10 +410,8 @@ fn draw_bulged(
 
 fn kind_name(kind: &str) -> String {
     match kind {
-        "TEXT" | "MTEXT" => format!("{kind} (text)"),
         "DIMENSION" | "LEADER" | "MULTILEADER" => format!("{kind} (a dimension or a leader)"),
-        "HATCH" => "HATCH (a fill; its outline is drawn where it is an object too)".to_owned(),
-        "SOLID" | "TRACE" | "3DFACE" => format!("{kind} (a filled face)"),
+        "3DFACE" => format!("{kind} (a filled face)"),
         "POINT" => "POINT (a point without a size)".to_owned(),
         kind => kind.chars().take(30).collect(),
     }

@@ -17,6 +17,8 @@ pub(super) struct File<'p, 'a> {
     pub(super) unit: f64,
     /// Layers by their names in capitals.
     pub(super) layers: HashMap<String, Layer>,
+    /// Files of fonts by the names of their styles in capitals.
+    pub(super) fonts: HashMap<String, String>,
     /// Blocks by their names in capitals.
     pub(super) blocks: HashMap<String, Block<'p, 'a>>,
     pub(super) entities: Vec<Record<'p, 'a>>,
@@ -56,6 +58,7 @@ impl<'p, 'a> File<'p, 'a> {
         let mut file = Self {
             unit: 1e-3,
             layers: HashMap::new(),
+            fonts: HashMap::new(),
             blocks: HashMap::new(),
             entities: Vec::new(),
         };
@@ -75,7 +78,10 @@ impl<'p, 'a> File<'p, 'a> {
                 own.push(record);
             }
             match name {
-                "TABLES" => file.layers = layers(&own),
+                "TABLES" => {
+                    file.layers = layers(&own);
+                    file.fonts = fonts(&own);
+                }
                 "BLOCKS" => file.blocks = blocks(own),
                 "ENTITIES" => {
                     has_entities = true;
@@ -156,6 +162,14 @@ fn layers(records: &[Record<'_, '_>]) -> HashMap<String, Layer> {
             Some((key(record.text(2)?), layer))
         })
         .collect()
+}
+
+fn fonts(records: &[Record<'_, '_>]) -> HashMap<String, String> {
+    let styles = records.iter().filter(|record| record.kind == "STYLE");
+    let font = |record: &Record<'_, '_>| {
+        Some((key(record.text(2)?), record.text(3).unwrap_or("").to_owned()))
+    };
+    styles.filter_map(font).collect()
 }
 
 fn blocks<'p, 'a>(records: Vec<Record<'p, 'a>>) -> HashMap<String, Block<'p, 'a>> {

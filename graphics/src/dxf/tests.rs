@@ -2,9 +2,10 @@
 
 use kurbo::{Affine, CubicBez, ParamCurveNearest as _, Point};
 
-use super::read;
+use super::{drawn, read, shapes};
 use crate::read::arcs::holds;
 use crate::read::bounds;
+use crate::read::notes::Notes;
 use crate::shape::{Contour, Graphic, Segment};
 
 /// A file with a header, tables and blocks, given as words: each pair is `code value`, separated by `|`.
@@ -161,13 +162,16 @@ fn pieces_are_joined_within_their_layer_and_lines_are_told() {
 #[test]
 fn what_is_left_out_is_named() {
     for (entities, note) in [
-        ("0 TEXT|10 0|20 0|1 hello", "TEXT (text) is left out"),
+        ("0 TEXT|10 0|20 0|1 hello", "TEXT with numbers that do not fit is left out"),
         (
             "0 POINT|10 0|20 0|0 POINT|10 1|20 0",
             "POINT (a point without a size) is left out (2 times)",
         ),
-        ("0 HATCH|70 1", "HATCH"),
-        ("0 SOLID|10 0|20 0", "SOLID"),
+        ("0 TEXT|10 0|20 0|40 2|1 \u{4e2d}", "TEXT is left out: the font has no glyph"),
+        ("0 TEXT|10 0|20 0|40 2|1 hello", "text is drawn in single strokes"),
+        ("0 HATCH|70 1", "HATCH without an outline"),
+        ("0 HATCH|91 1|92 0|93 1|72 9|75 0", "HATCH without an outline"),
+        ("0 3DFACE|10 0|20 0", "3DFACE (a filled face)"),
         ("0 FLUX|1 x", "FLUX is left out"),
         ("0 LINE|10 0|20 0|30 0|11 1|21 1|31 5", "seen from above"),
         ("0 LINE|10 0|20 0|11 0|21 0", "LINE without a length"),
@@ -181,6 +185,96 @@ fn what_is_left_out_is_named() {
         let notes = notes(&graphic);
         assert!(notes.iter().any(|found| found.contains(note)), "{notes:?} lacks {note}");
     }
+}
+
+/// Areas of the shapes that are filled, by Green's theorem over fine chords [mm²], holes counted as what is
+/// left when they are taken out of the largest outline.
+fn filled_area(graphic: &Graphic) -> f64 {
+    let area = |contour: &Contour| {
+        let points = contour.flattened(1e-8);
+        let ring = points.iter().zip(points.iter().cycle().skip(1));
+        (ring.map(|(one, other)| one.to_vec2().cross(other.to_vec2())).sum::<f64>() / 2.0).abs()
+    };
+    let shapes = graphic.shapes.iter().filter(|shape| shape.fill.is_some());
+    let areas = shapes.map(|shape| {
+        let mut areas: Vec<f64> = shape.contours.iter().map(area).collect();
+        areas.sort_by(|one, other| other.total_cmp(one));
+        areas.first().copied().unwrap_or(0.0) - areas.iter().skip(1).sum::<f64>()
+    });
+    areas.sum::<f64>() * 1e6
+}
+
+#[test]
+fn hatches_are_filled_with_their_holes() {
+    let pi = core::f64::consts::PI;
+    let outer = "0 HATCH|8 A|62 1|10 0|20 0|30 0|2 SOLID|70 1|71 0";
+    let square = "92 3|72 0|73 1|93 4|10 0|20 0|10 10|20 0|10 10|20 10|10 0|20 10|97 0";
+    // A circle as two arcs: one of them clockwise, whose angles are counted clockwise.
+    let circle = "92 16|93 2|72 2|10 5|20 5|40 2|50 0|51 180|73 1|72 2|10 5|20 5|40 2|50 180|51 360|73 1|97 0";
+    let clockwise = "92 16|93 2|72 2|10 5|20 5|40 2|50 180|51 360|73 0|72 2|10 5|20 5|40 2|50 0|51 180|73 0|97 0";
+    let ellipse = "92 16|93 1|72 3|10 5|20 5|11 0|21 4|40 0.5|50 0|51 360|73 1|97 0";
+    let segment = "92 1|93 2|72 2|10 0|20 0|40 2|50 90|51 180|73 1|72 1|10 -2|20 0|11 0|21 2|97 0";
+    let spline = "92 1|93 2|72 4|94 2|73 0|74 0|95 6|96 3|40 0|40 0|40 0|40 1|40 1|40 1|10 0|20 0|10 3|20 6|10 6|20 0|72 1|10 6|20 0|11 0|21 0|97 0";
+    for (paths, area) in [
+        (format!("91 1|{square}"), 100.0),
+        (format!("91 2|{square}|{circle}"), 100.0 - 4.0 * pi),
+        (format!("91 2|{square}|{clockwise}"), 100.0 - 4.0 * pi),
+        (format!("91 1|{ellipse}"), 8.0 * pi),
+        // A quarter of a disc less its triangle.
+        (format!("91 1|{segment}"), pi - 2.0),
+        (format!("91 1|{spline}"), 12.0),
+    ] {
+        let graphic = drawing(MILLIMETRES, &format!("{outer}|{paths}|75 0|76 1|98 1|10 5|20 5"));
+        let found = filled_area(&graphic);
+        assert!((found - area).abs() < 1e-3, "{found} instead of {area} mm² of {paths}");
+        assert!(notes(&graphic).is_empty(), "{:?}", notes(&graphic));
+        let shape = &graphic.shapes[0];
+        assert!(shape.stroke.is_none() && shape.contours.iter().all(|one| one.is_closed));
+        assert_eq!(shape.fill.map(|fill| fill.colour.to_string()).as_deref(), Some("#ff0000"));
+    }
+    let face = "0 SOLID|10 0|20 0|11 4|21 0|12 0|22 3|13 4|23 3";
+    assert!((filled_area(&drawing(MILLIMETRES, face)) - 12.0).abs() < 1e-6);
+    // Each outline by itself: what overlaps is filled all the same.
+    let apart = format!("{outer}|70 0|91 2|{square}|{circle}|75 2|76 1");
+    assert_eq!(drawing(MILLIMETRES, &apart).shapes.len(), 2);
+}
+
+#[test]
+fn texts_are_as_high_as_said_and_held_where_they_should_be() {
+    let text = |codes: &str| around(&drawing(MILLIMETRES, &format!("0 TEXT|40 7|1 HH|{codes}")));
+    // H is 4 mm wide at 7 mm, and 2 mm apart.
+    assert_eq!(text("10 1|20 2"), [1.0, 2.0, 11.0, 9.0]);
+    assert_eq!(text("10 0|20 0|11 1|21 2|72 4"), [-5.0, -1.5, 5.0, 5.5]);
+    assert_eq!(text("10 1|20 2|41 2"), [1.0, 2.0, 21.0, 9.0]);
+    assert_eq!(text("10 1|20 2|50 90"), [-6.0, 2.0, 1.0, 12.0]);
+    assert_eq!(text("10 0|20 0|11 0|21 0|73 3"), [0.0, -7.0, 10.0, 0.0]);
+    assert_eq!(text("10 0|20 0|11 20|21 0|72 5"), [0.0, 0.0, 20.0, 7.0]);
+    assert_eq!(text("10 0|20 0|11 20|21 0|72 3"), [0.0, 0.0, 20.0, 14.0]);
+    let lines = "0 MTEXT|10 0|20 0|40 7|71 1|1 {\\fArial;H}\\PH";
+    // Baselines are 5/3 of the height apart.
+    let found = around(&drawing(MILLIMETRES, lines));
+    assert!(
+        (found[3] - 0.0).abs() < 1e-6 && (found[1] + 7.0 + 35.0 / 3.0).abs() < 1e-5,
+        "{found:?}"
+    );
+    let wrapped = around(&drawing(MILLIMETRES, "0 MTEXT|10 0|20 0|40 7|41 12|71 1|1 HH HH"));
+    assert_eq!(wrapped[2], 10.0);
+    // In a block, with the block's scale; hidden ones are not drawn.
+    let before = blocks("0 BLOCK|2 B|10 0|20 0|0 LINE|10 0|20 0|11 1|21 0|0 ENDBLK");
+    let insert = "0 INSERT|2 B|66 1|10 0|20 0|0 ATTRIB|10 3|20 0|40 7|1 H|70 0|0 ATTRIB|10 30|20 0|40 7|1 H|70 1|0 SEQEND";
+    assert_eq!(around(&drawing(&before, insert)), [0.0, 0.0, 7.0, 7.0]);
+}
+
+#[cfg(feature = "text")]
+#[test]
+fn texts_of_outline_fonts_are_filled() {
+    let style =
+        "0 SECTION|2 TABLES|0 TABLE|2 STYLE|0 STYLE|2 Big|70 0|3 arial.ttf|0 ENDTAB|0 ENDSEC";
+    let before = format!("{MILLIMETRES}|{style}");
+    let graphic = drawing(&before, "0 TEXT|10 0|20 0|40 10|1 H|7 BIG");
+    assert!(graphic.shapes[0].fill.is_some());
+    assert!((around(&graphic)[3] - 10.0).abs() < 0.1, "{:?}", around(&graphic));
+    assert!(notes(&graphic)[0].contains("Ubuntu Light instead of the font arial.ttf"));
 }
 
 #[test]
@@ -254,8 +348,11 @@ fn length(contour: &Contour) -> f64 {
 
 /// Compares a file of ezdxf with what that computed: the total length, and points on the curves.
 fn compare(bytes: &[u8], points: &str) {
-    let graphic = read(bytes).expect("a drawing");
-    let contours: Vec<&Contour> = graphic.shapes.iter().flat_map(|it| &it.contours).collect();
+    let (pieces, areas) = drawn(bytes, &mut Notes::default()).expect("a drawing");
+    // Its texts and hatches are no curves of its own.
+    assert!(!areas.is_empty());
+    let shapes = shapes(pieces, Vec::new());
+    let contours: Vec<&Contour> = shapes.iter().flat_map(|it| &it.contours).collect();
     let mut lines = points.lines();
     let expected: f64 = lines.next().and_then(|line| line.parse().ok()).expect("a length");
     let found: f64 = contours.iter().map(|contour| length(contour) * 1e3).sum();

@@ -60,6 +60,14 @@ impl Pen {
         self.push(Segment::Arc(arc), to);
     }
 
+    /// Goes along all of a contour, which begins at the pen, to rounding.
+    pub(crate) fn extend(&mut self, contour: &Contour) {
+        self.has_begun = true;
+        for segment in &contour.segments {
+            self.push(*segment, segment.end());
+        }
+    }
+
     /// Goes back to where the contour began and ends it as a loop.
     pub(crate) fn close(&mut self) {
         self.has_begun = true;
