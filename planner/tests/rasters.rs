@@ -110,6 +110,22 @@ fn free_moves_one_after_the_other_keep_their_corner() {
     assert!(plan.setpoints(1).any(passes));
 }
 
+#[test]
+fn lit_steps_are_left_out_of_rasters_and_not_of_slots() {
+    let machine = machine(false, &[]);
+    let slot = "G21 G90\nF3000\nM3 S500\nG1 X10\nG1 Y0.3\nG1 X0\n";
+    let raster = format!("{slot}G1 Y0.6\nG1 X10\nG1 Y0.9\nG1 X0\n");
+    let comb = "G21 G90\nF3000\nM3 S500\nG1 X10\nG1 Y0.3\nG1 X0\nG1 Y2\nG1 X10\nG1 Y2.3\nG1 X0\n";
+    for (text, length, is_told) in
+        [(slot, 20.3, false), (raster.as_str(), 40.0, true), (comb, 42.3, false)]
+    {
+        let facts = planned(text, &[], &machine).facts;
+        assert!((facts.length - length * 1e-3).abs() < 1e-5, "{} m of {text}", facts.length);
+        let told = facts.notes.iter().any(|note| note.text.contains("rows of this raster"));
+        assert_eq!(told, is_told, "{text}");
+    }
+}
+
 /// What other controllers call scan offset: the delays shift light in time, so in the direction of each
 /// row, and what makes up for them does so at every speed.
 #[test]

@@ -12,7 +12,7 @@ use messages::time::Period;
 use nalgebra::Vector3;
 
 use dark_ends::without_dark_ends;
-use rasters::Extent;
+use rasters::{Extent, RowStep};
 
 use super::operation::{Dot, OffSurface, Operation, OperationKind};
 use crate::drawing::{Action, Corners, Curve, Note, Power, Step};
@@ -63,6 +63,8 @@ pub(crate) struct Operations<'a> {
     done: VecDeque<Operation>,
     /// The last two paths, as they were drawn.
     before: [Option<Extent>; 2],
+    /// The last lit step that may have led from one row of a raster to the next.
+    row_step: Option<RowStep>,
     /// Whether the last operation only goes to the dark end of the path before it.
     leaves_dark_end: bool,
     is_finished: bool,
@@ -93,6 +95,7 @@ impl<'a> Operations<'a> {
             contour: None,
             done: VecDeque::new(),
             before: [None; 2],
+            row_step: None,
             leaves_dark_end: false,
             is_finished: false,
             is_raised: false,

@@ -26,6 +26,14 @@ pub(super) struct Extent {
     is_lit: bool,
 }
 
+/// A lit step between two lines that may be rows of a raster.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RowStep {
+    way: Vector3<f64>,
+    to: Vector3<f64>,
+    is_left_out: bool,
+}
+
 impl Extent {
     pub(super) fn of(contour: &Contour) -> Self {
         let (start, end) = (contour.start(), contour.end());
@@ -42,27 +50,57 @@ impl Extent {
 }
 
 impl Operations<'_> {
-    /// Leaves out a short step between two rows of a raster: lit at one speed it could only be marked by
-    /// two loops, and it lies within the rows' own width; dark it only leads to the next row.
+    /// Leaves out a short step between two rows of a raster: dark it only leads to the next row; lit at one
+    /// speed it could only be marked by two loops, and it lies within the rows' own width. Two lines that go
+    /// to and fro once, such as those of a slot, are no raster: it takes a second step like the first.
     pub(super) fn leave_row_step(&mut self, next: &Extent) {
         let [Some(row), Some(step)] = self.before else { return };
         if !is_row_step(&row, &step, next) {
             return;
         }
-        let is_path = |operation: &Operation| matches!(operation.kind, OperationKind::Path(_));
-        let Some(index) = self.done.iter().rposition(is_path) else { return };
-        let Some(Operation { line, .. }) = self.done.remove(index) else { return };
-        self.leave_approach();
         if !step.is_lit {
+            self.leave_path(0);
             return;
         }
+        let way = step.to - step.from;
+        let before = self.row_step.replace(RowStep { way, to: step.to, is_left_out: false });
+        let Some(before) = before.filter(|before| before.is_followed_by(&row, &way)) else {
+            return;
+        };
+        let line = self.leave_path(0);
+        if !before.is_left_out {
+            // The row between the two is the last path now.
+            self.leave_path(1);
+        }
+        self.row_step = Some(RowStep { way, to: step.to, is_left_out: true });
         let text =
             "the steps between the rows of this raster are moved with the laser off: at constant \
                     speed they cannot be marked"
                 .to_owned();
         if !self.notes.iter().any(|note| note.text == text) {
-            self.notes.push(Note { line, text });
+            self.notes.push(Note { line: line.unwrap_or(0), text });
         }
+    }
+
+    /// Leaves out a path with so many behind it; gives its line.
+    fn leave_path(&mut self, behind: usize) -> Option<u64> {
+        let is_path = |operation: &Operation| matches!(operation.kind, OperationKind::Path(_));
+        let mut paths = (0..self.done.len()).rev().filter(|&index| is_path(&self.done[index]));
+        let index = paths.nth(behind)?;
+        let line = self.done.remove(index)?.line;
+        if behind == 0 {
+            self.leave_approach();
+        }
+        Some(line)
+    }
+}
+
+impl RowStep {
+    /// Whether a step of this `way` at the end of `row` is another one like it.
+    fn is_followed_by(&self, row: &Extent, way: &Vector3<f64>) -> bool {
+        /// How much the distances of rows differ by, as a share.
+        const UNEVEN: f64 = 0.25;
+        (row.from - self.to).norm() <= GAP && (way - self.way).norm() <= UNEVEN * self.way.norm()
     }
 }
 
