@@ -24,6 +24,8 @@ const ROUNDING: f64 = 1e-9;
 
 /// All branches of a mechanism that can be chosen one value at a time, at most 32; the first is its
 /// own. Which turn a table is in is no branch here: turns are chosen among the joints.
+///
+/// A branch is known by its place in this list, so the list does not depend on which side `near` is on.
 pub(crate) fn branches<const N: usize, M: Mechanism<N>>(
     mechanism: &M,
     near: &Joints<N>,
@@ -41,7 +43,9 @@ pub(crate) fn branches<const N: usize, M: Mechanism<N>>(
             let open = named.choices();
             let known = choices.clone();
             choices.extend(
-                open.into_iter().filter(|(name, _)| known.iter().all(|(other, _)| other != name)),
+                open.into_iter()
+                    .filter(|(name, _)| known.iter().all(|(other, _)| other != name))
+                    .map(|(name, values)| (name, values.into_iter().map(i32::abs).collect())),
             );
         }
         choices
@@ -179,6 +183,47 @@ impl<const N: usize> Walked<N> {
     }
 }
 
+/// Whether the joints go on without a jump over a step of the tool on which the mechanism changes its side,
+/// from `before` on; `tool` is a function of the share of the step, 0 to 1.
+///
+/// A path through a singularity, as the centre of a table, changes sides there and its joints go on. One that
+/// passes beside it does so only where it is looked at too seldom.
+pub(crate) fn crosses<const N: usize, M: Mechanism<N>>(
+    limits: &MotionLimits<'_, N, M>,
+    before: &Configuration<N>,
+    tool: &PathFunction<'_>,
+) -> Result<bool, KinematicsError> {
+    /// Halvings of the step, after which the joints do not go farther than rounding.
+    const HALVINGS: usize = 30;
+    /// How far apart the joints may then be on both sides [m or rad].
+    const TOGETHER: f64 = 1e-7;
+    let side = |at: &Configuration<N>| {
+        let assembly = limits.solve(&at.joints, at.branch, None)?;
+        Ok(limits.mechanism.branch_of(&assembly).in_any_turn())
+    };
+    let follow = |at: f64, near: &Configuration<N>| {
+        let mut branch = near.branch;
+        let motion = limits.follow(&tool(at), &mut branch, &near.joints)?;
+        Ok(Configuration { joints: motion.position, branch })
+    };
+    let own = side(before)?;
+    let (mut near, mut low, mut high) = (*before, 0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let middle = (low + high) / 2.0;
+        let now = follow(middle, &near)?;
+        if (now.joints - near.joints).amax() > JUMP {
+            return Ok(false);
+        }
+        if side(&now)? == own {
+            (near, low) = (now, middle);
+        } else {
+            high = middle;
+        }
+    }
+    let beyond = follow(high, &near)?;
+    Ok(side(&beyond)? != own && (beyond.joints - near.joints).amax() <= TOGETHER)
+}
+
 /// Walks from `start` along `parts` in small steps.
 pub(crate) fn walk<const N: usize, M: Mechanism<N>>(
     limits: &MotionLimits<'_, N, M>,
@@ -199,6 +244,11 @@ fn walk_noting<const N: usize, M: Mechanism<N>>(
     let (mut lower, mut upper) = (joints, joints);
     let mechanism = limits.mechanism;
     let mut near: Option<M::ChainState> = None;
+    // Where the start does not tell its side, the first step does.
+    let mut before_side = limits
+        .solve(&joints, branch, None)
+        .ok()
+        .map(|assembly| mechanism.branch_of(&assembly).in_any_turn());
     for part in parts {
         let whole = 1.0 / STEPS as f64;
         let (mut at, mut step) = (0.0, whole);
@@ -208,7 +258,18 @@ fn walk_noting<const N: usize, M: Mechanism<N>>(
             let tool = part(next);
             let motion = limits.follow(&tool, &mut tried, &joints)?;
             let change = motion.position - joints;
-            if change.amax() > JUMP {
+            let before = Configuration { joints, branch };
+            let is_steady = change.amax() <= JUMP;
+            let assembly = if is_steady {
+                Some(limits.solve_at(&tool, &motion.position, tried, near.as_ref())?)
+            } else {
+                None
+            };
+            let side = assembly.as_ref().map(|it| mechanism.branch_of(it).in_any_turn());
+            let within = |share: f64| part(at + (next - at) * share);
+            let is_same = before_side.is_none() || side == before_side;
+            let goes_on = is_steady && (is_same || crosses(limits, &before, &within)?);
+            let Some(assembly) = assembly.filter(|_| goes_on) else {
                 step /= 2.0;
                 if step < SHORTEST {
                     return Err(KinematicsError {
@@ -220,10 +281,9 @@ fn walk_noting<const N: usize, M: Mechanism<N>>(
                     });
                 }
                 continue;
-            }
-            let assembly = limits.solve_at(&tool, &motion.position, tried, near.as_ref())?;
+            };
             keeps_margins(mechanism, &assembly)?;
-            near = Some(assembly);
+            (near, before_side) = (Some(assembly), side);
             (joints, branch, at) = (motion.position, tried, next);
             note(at, &Configuration { joints, branch });
             lower = lower.inf(&joints);
@@ -368,4 +428,51 @@ fn turn(
         return Err(outside());
     }
     Ok((-gap / TAU).round().clamp(least, most) * TAU)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::path::Path;
+
+    use machine::{Machine, MechanismKind};
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::geometry::attitude::AttitudeLaw;
+
+    /// The joints at the end of a line of 100 mm that passes `beside` the centre of a table [m].
+    fn past_the_centre(beside: f64) -> [Joints<3>; 2] {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../machines/polar.toml");
+        let machine = Machine::load(Path::new(file), &[]).unwrap();
+        let MechanismKind::Polar(polar) = &machine.mechanism else { panic!("{file}") };
+        let place = |x: f64| Pose::at(Vector3::new(x, beside, 0.05));
+        let from = polar.inverse(&place(-0.05), polar.branch, &Joints::zeros()).unwrap();
+        let law = AttitudeLaw::Level;
+        let limits = MotionLimits::new(polar, &machine, machine.path, &from, law, Scope::Machine);
+        let line = |share: f64| ToolMotion {
+            velocity: Vector3::x() * 0.1,
+            ..ToolMotion::rest(&place(share * 0.1 - 0.05))
+        };
+        let start = Configuration { joints: from, branch: 0 };
+        [from, walk(&limits, start, &[&line]).unwrap().end.joints]
+    }
+
+    #[test]
+    fn the_arm_changes_sides_where_a_path_goes_through_the_centre() {
+        let [from, to] = past_the_centre(0.0);
+        assert!((to[0] + from[0]).abs() < 1e-9, "{from:?} {to:?}");
+        assert!((to[1] - from[1] - from[0].abs()).abs() < 1e-9, "{from:?} {to:?}");
+    }
+
+    #[test]
+    fn the_table_turns_where_a_path_passes_beside_the_centre_however_near() {
+        for beside in [1e-3, 5e-5, 1e-6] {
+            let [from, to] = past_the_centre(beside);
+            assert!((to[0] - from[0]).abs() < 1e-9, "{from:?} {to:?}");
+            let turned = (to[1] - from[1]).abs();
+            assert!((turned - core::f64::consts::PI).abs() < 0.1, "{from:?} {to:?}");
+        }
+    }
 }

@@ -1,9 +1,9 @@
 //! Whether the joints can follow a flight of the tool, and which of their limits it takes too much of.
 
-use machine::kinematics::{KinematicsError, ToolMotion};
+use machine::kinematics::{Branch, KinematicsError, ToolMotion};
 use machine::{Mechanism, WorkArea};
 
-use crate::joint_space::configuration::{Configuration, keeps_margins};
+use crate::joint_space::configuration::{Configuration, crosses, keeps_margins};
 use crate::law::flight::Flight;
 use crate::law::row::Row;
 use crate::limits::limit_id::{JointLimit, LimitId};
@@ -90,8 +90,15 @@ pub(crate) fn follow_flight<const N: usize, M: Mechanism<N>>(
     }
     let mut followed = Followed { end: *start, used: [[0.0; JointLimit::COUNT]; N] };
     let mut rows = Vec::new();
+    let (mut before, mut side) = (0.0, None);
     for (index, time) in looks(flight).into_iter().enumerate() {
-        step(limits, &mut followed, &flight.tool(time), shares, &mut rows)?;
+        let from = followed.end;
+        let now = step(limits, &mut followed, &flight.tool(time), shares, &mut rows)?;
+        let within = |share: f64| flight.tool(before + (time - before) * share);
+        if side.is_some() && now != side && !crosses(limits, &from, &within).ok()? {
+            return None;
+        }
+        (before, side) = (time, now);
         if followed.used.iter().flatten().any(|used| used.is_nan() || *used > most) {
             return Some(followed);
         }
@@ -119,20 +126,21 @@ fn looks(flight: &Flight) -> Vec<f64> {
     looks
 }
 
-/// Follows the tool to one instant, at which time itself is the parameter of the limits.
+/// Follows the tool to one instant, at which time itself is the parameter of the limits; the side that the
+/// mechanism is on there, where the machine's limits are asked for.
 fn step<const N: usize, M: Mechanism<N>>(
     limits: &MotionLimits<'_, N, M>,
     followed: &mut Followed<N>,
     tool: &ToolMotion,
     shares: &Tightening,
     rows: &mut Vec<Row>,
-) -> Option<()> {
+) -> Option<Option<M::Branch>> {
     let before = followed.end;
     let mut branch = before.branch;
     let motion = limits.follow(tool, &mut branch, &before.joints).ok()?;
     followed.end = Configuration { joints: motion.position, branch };
     if limits.scope == Scope::PathAlone {
-        return Some(());
+        return Some(None);
     }
     if (motion.position - before.joints).amax() > JUMP {
         return None;
@@ -143,15 +151,15 @@ fn step<const N: usize, M: Mechanism<N>>(
             return None;
         }
     }
-    let mut look = || -> Result<Local, KinematicsError> {
+    let mut look = || -> Result<(Local, M::Branch), KinematicsError> {
         let state = limits.solve_at(tool, &motion.position, branch, None)?;
         keeps_margins(limits.mechanism, &state)?;
         rows.clear();
         let mut local = Local::new(f64::INFINITY, LimitId::RAPID, 1.0, f64::INFINITY);
         limits.joint_rows(&motion, &state, shares, &mut local, rows)?;
-        Ok(local)
+        Ok((local, limits.mechanism.branch_of(&state).in_any_turn()))
     };
-    let local = look().ok()?;
+    let (local, side) = look().ok()?;
     followed.note(local.speed_source, 1.0 / local.speed);
     for row in rows.iter() {
         let used = row.base[2] + row.by_speed[2];
@@ -159,5 +167,5 @@ fn step<const N: usize, M: Mechanism<N>>(
         // Where the speed alone leaves nothing, only less of it helps.
         followed.note(LimitId(row.limit), if room > 0.0 { used / room } else { f64::INFINITY });
     }
-    Some(())
+    Some(Some(side))
 }
