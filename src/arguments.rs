@@ -2,6 +2,7 @@
 
 mod bench;
 mod examples;
+mod operating;
 mod pipeline;
 mod planning;
 mod workbench;
@@ -11,6 +12,9 @@ pub use self::workbench::{
     NewArguments, SizeArguments, SizeGears, SizeOrder, TableFormat, TablesArguments,
 };
 pub use bench::{BenchArguments, BenchCommand, LatencyArguments, PlanBenchArguments};
+pub use operating::{
+    HomeArguments, InputArguments, InputLevel, JogArguments, ProbeArguments, TestPulseArguments,
+};
 pub use pipeline::{
     DomainArguments, DrivesArguments, DrivesKind, OverrideArguments, RunArguments,
     ServiceArguments, SimulateArguments, SubmitArguments,
@@ -90,6 +94,16 @@ pub enum Command {
     Enable(InstanceArguments),
     /// Unpower the motors, which must be at rest.
     Disable(InstanceArguments),
+    /// Find the references of the axes, and go home.
+    Home(HomeArguments),
+    /// Move an axis by a distance, or on until Ctrl-C.
+    Jog(JogArguments),
+    /// Light the laser for a moment, weak and short.
+    TestPulse(TestPulseArguments),
+    /// Move an axis until the probe touches, and say where.
+    Probe(ProbeArguments),
+    /// Set an input of a simulated machine, such as its door.
+    Input(InputArguments),
     /// Say what a running pipeline is doing, with the process ids of its services.
     Status(InstanceArguments),
     /// Compare machines on the same job: time, error, what their motors must give, stiffness, and who

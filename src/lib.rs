@@ -15,8 +15,8 @@ pub mod pipeline;
 use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
-    bench, calibrate, check, compare, export, figures, kinematics, machine, manual, operator, plan,
-    run, service, simulate, size, tables, verify,
+    bench, calibrate, check, compare, export, figures, kinematics, machine, manual, operating,
+    operator, plan, run, service, simulate, size, tables, verify,
 };
 use exit::{Exit, Failure};
 use pipeline::operators::Verb;
@@ -59,6 +59,11 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Enable(arguments) => operator::verb(Verb::Enable, arguments),
         Command::Disable(arguments) => operator::verb(Verb::Disable, arguments),
         Command::Override(arguments) => operator::override_rate(arguments),
+        Command::Home(arguments) => operating::home(arguments),
+        Command::Jog(arguments) => operating::jog(arguments),
+        Command::TestPulse(arguments) => operating::test_pulse(arguments),
+        Command::Probe(arguments) => operating::probe(arguments),
+        Command::Input(arguments) => operating::input(arguments),
         Command::Status(arguments) => operator::status(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Tables(arguments) => tables::run(arguments),

@@ -10,6 +10,7 @@ pub mod control;
 pub mod job_run;
 pub mod operators;
 pub mod power_up;
+mod refusals;
 pub mod services;
 pub mod status;
 
@@ -20,7 +21,7 @@ use machine::Machine;
 use messages::time::SETPOINT_TIME;
 use messages::{
     ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorReply, OperatorVerb,
-    PlannerReport, Progress,
+    PlannerReport, Progress, SimulatedInputs,
 };
 use operators::{Operators, Submission};
 use power_up::PowerUp;
@@ -32,6 +33,7 @@ use services::{Ended, Recovery, Services};
 use status::StatusBoard;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// How often the supervisor polls the services.
@@ -118,6 +120,9 @@ pub struct Pipeline {
     operators: Operators,
     link: Arc<OperatorLink>,
     offers: Publisher<JobOffer>,
+    /// Inputs of a simulated machine that people have set.
+    inputs: Arc<AtomicU64>,
+    simulated: Publisher<SimulatedInputs>,
     subscriptions: Subscriptions,
     services: Services,
     owner: ServiceOwner,
@@ -156,7 +161,16 @@ impl Pipeline {
             // Its one job is under way from here on: an operator who says stop means it.
             control.begin(ONLY_JOB);
         }
-        let answers = operators::Answers::new(link.clone(), board.clone(), control.clone());
+        board.know(&machine);
+        let inputs = Arc::new(AtomicU64::new(0));
+        let simulated = domain.publisher().map_err(Failure::service)?;
+        let answers = operators::Answers::new(
+            link.clone(),
+            board.clone(),
+            control.clone(),
+            &machine,
+            inputs.clone(),
+        );
         let operators = Operators::bind(&domain, answers, owner)?;
         let services = match owner {
             ServiceOwner::Own => Services::start(&domain)?,
@@ -170,6 +184,8 @@ impl Pipeline {
             operators,
             link,
             offers,
+            inputs,
+            simulated,
             subscriptions,
             services,
             owner,
@@ -185,6 +201,8 @@ impl Pipeline {
     pub fn poll(&mut self) -> Result<Vec<Ended>, Failure> {
         // An offer is published once: a service that was started again has not heard it.
         self.offers.greet().map_err(Failure::service)?;
+        let inputs = SimulatedInputs { inputs: self.inputs.load(Ordering::Relaxed) };
+        self.simulated.publish(&inputs).map_err(Failure::service)?;
         let latest = &mut self.latest;
         if let Some(sample) = self.subscriptions.progress.newest().map_err(Failure::service)? {
             latest.progress = sample;
@@ -365,7 +383,13 @@ impl Drop for Pipeline {
 fn is_moving(latest: &Latest) -> bool {
     matches!(
         ControllerState::from_wire(latest.progress.state),
-        ControllerState::Running | ControllerState::Holding | ControllerState::Stopping
+        ControllerState::Running
+            | ControllerState::Holding
+            | ControllerState::Stopping
+            | ControllerState::Homing
+            | ControllerState::Jogging
+            | ControllerState::Probing
+            | ControllerState::Pulsing
     )
 }
 

@@ -16,6 +16,9 @@
 //! | `Enabling` | driven, against the weight | follow the feedback until the power is on, then stand | off |
 //! | `Squaring` | driven | to where the actuators of each axis are together | off |
 //! | `Idle` | driven | stand | off |
+//! | `Homing`, `Jogging`, `Probing` | driven | motions of single joints, limited in jerk | off |
+//! | `Pulsing` | driven | stand | a test pulse |
+//! | `Halted` | driven | stand | off |
 //! | `Running` | driven | the stream, at a rate | as the stream says |
 //! | `Holding`, `Stopping` | driven | along the stream to rest | off |
 //! | `Stopping` after a fault | driven while the axes follow, else quick stop | the same | off |
@@ -39,6 +42,7 @@
 //! - *Finding*: something wrong, not yet a fault. The first finding becomes the latched fault.
 
 mod answer;
+mod operating;
 mod requests;
 mod transitions;
 
@@ -47,20 +51,25 @@ use crate::cascade::Cascade;
 use crate::catch_up::CatchUp;
 use crate::exchange::{Inputs, Outputs, Peers, Presence};
 use crate::feedforward::{Feedforward, Planned};
+use crate::homing::Homing;
 use crate::intake::Intake;
 use crate::player::{Event, Player};
+use crate::reference::Reference;
+use crate::safety::Safety;
 use crate::squaring::Squaring;
 use crate::standing::Standing;
 use crate::state::{AfterRest, State};
 use crate::statistics::Statistics;
 use crate::stream_time::{ONE, StreamTime};
 use crate::supervision::{Elapsed, Finding, Supervision, Tracking};
+use crate::test_pulse::TestPulse;
+use crate::travel::Travel;
 use answer::PROGRESS_INTERVAL;
 use machine::{Actuator, ActuatorMode, Machine};
 use messages::feedback::status;
 use messages::{
     ActuatorArray, Command, CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity,
-    Feedback, LaserCycle, MAX_ACTUATORS, Nanoseconds, RealtimeFacts,
+    Feedback, LaserCycle, MAX_ACTUATORS, MAX_AXES, Nanoseconds, RealtimeFacts,
 };
 use transitions::Waits;
 
@@ -96,6 +105,15 @@ pub struct Controller {
     supervision: Supervision,
     standing: Standing,
     squaring: Squaring,
+    reference: Reference,
+    safety: Safety,
+    /// What moves without a stream.
+    travel: Travel,
+    homing: Homing,
+    /// Cycles for which each jogged axis goes on without another word; `None` for one that is not jogged so.
+    dead_man: [Option<u32>; MAX_AXES],
+    probing: operating::Probing,
+    pulse: TestPulse,
     /// Where the motors stood when they were to be enabled [rad].
     enabled_at: ActuatorArray,
     statistics: Statistics,
@@ -138,6 +156,13 @@ impl Controller {
             supervision: Supervision::new(machine),
             standing: Standing::new(machine),
             squaring: Squaring::default(),
+            reference: Reference::new(machine),
+            safety: Safety::new(machine),
+            travel: Travel::new(machine, period.seconds()),
+            homing: Homing::new(machine, period.seconds()),
+            dead_man: [None; MAX_AXES],
+            probing: operating::Probing::default(),
+            pulse: TestPulse::default(),
             enabled_at: ActuatorArray::default(),
             statistics: Statistics::new(machine),
             playing: 0,
@@ -163,6 +188,10 @@ impl Controller {
 
     /// Answers one feedback.
     pub fn step(&mut self, now: Nanoseconds, inputs: &Inputs<'_>, outputs: &mut Outputs) {
+        self.refer();
+        // Everything here is in the machine's places.
+        let located = *self.reference.locate(inputs.feedback);
+        let inputs = &Inputs { feedback: &located, ..*inputs };
         let feedback = inputs.feedback;
         let state_before = self.state.to_wire();
         self.cycles += 1;
@@ -177,12 +206,15 @@ impl Controller {
             self.fail(finding, now);
         }
         let settling = self.pass_missed(elapsed, feedback, now);
-        outputs.reply = inputs.request.map(|request| self.request(&request, feedback.cycle));
+        self.safety.see(feedback.inputs);
+        self.heed_inputs(now, feedback);
+        outputs.reply = inputs.request.map(|request| self.request(&request, feedback));
         self.transition(now, feedback);
         self.advance(feedback);
         self.await_settled(settling, now);
         if self.state.follows()
-            && let Err(finding) = self.supervision.motion(feedback, &self.feedforward.now().angle)
+            && let Err(finding) =
+                self.supervision.motion(feedback, &self.feedforward.now().angle, self.bounded())
         {
             self.fail(finding, now);
         }
@@ -278,6 +310,7 @@ impl Controller {
             self.fault = finding.fault.at(now);
         }
         self.player.hold();
+        self.give_up_travel();
         self.state = match self.state {
             State::Disabled | State::Faulted => State::Faulted,
             State::Failing { tracking: Tracking::Sound, .. }
@@ -316,7 +349,7 @@ impl Controller {
         }
         let catch_up = self.feedforward.coasted(&last, elapsed.missed);
         // Squaring is so slow that what it goes on by matters nothing.
-        if self.follows_positions && self.playing != 0 {
+        if self.follows_positions && (self.playing != 0 || !self.travel.is_at_rest()) {
             self.feedforward.put_coasted(&last, elapsed.missed);
             self.catch_up = catch_up;
         }
@@ -363,10 +396,15 @@ impl Controller {
                 cascade.reset();
             }
             (self.catch_up, self.squaring) = (CatchUp::default(), Squaring::default());
+            self.travel.reset();
             return;
         }
         if self.playing == 0 {
-            let next = self.squaring.advance().unwrap_or(*self.feedforward.after());
+            let mut next = match self.squaring.advance() {
+                Some(next) => next,
+                None => self.travel_on(),
+            };
+            self.catch_up.apply(&mut next);
             self.feedforward.advance(next);
             return;
         }

@@ -125,6 +125,13 @@ impl Feedforward {
         }
     }
 
+    /// The motors' places are told otherwise by `shift` [rad] from now on: nothing moves.
+    pub fn shift(&mut self, shift: &ActuatorArray) {
+        for planned in [&mut self.before, &mut self.now, &mut self.next, &mut self.after] {
+            planned.angle.iter_mut().zip(shift).for_each(|(angle, shift)| *angle += shift);
+        }
+    }
+
     /// Goes on by one cycle, to `planned` at its end.
     pub fn advance(&mut self, planned: Planned) {
         for (index, actuator) in self.actuators.iter().enumerate() {

@@ -3,6 +3,7 @@
 
 use core::fmt;
 
+use crate::feedforward::Planned;
 use machine::kinematics::{Joints, Mechanism};
 use machine::{Actuator, Machine, MechanismVisitor};
 use messages::time::Period;
@@ -99,11 +100,23 @@ impl Standing {
         self.pause = self.pause.saturating_sub(1);
         if self.pause == 0 {
             match self.weight.at(angle) {
-                Some((torque, lever)) => (self.torque, self.lever) = (torque, lever),
+                Some(AtRest { torque, lever, .. }) => {
+                    (self.torque, self.lever) = (torque, lever);
+                }
                 None => self.pause = self.retry,
             }
         }
         &self.torque
+    }
+
+    /// Gives `planned` the torque that its place takes, and where its tool is; whether the mechanism can be there.
+    pub fn bear(&mut self, planned: &mut Planned) -> bool {
+        let Some(AtRest { torque, lever, tool }) = self.weight.at(&planned.angle) else {
+            planned.torque = self.torque;
+            return false;
+        };
+        (self.torque, self.lever, planned.torque, planned.tool) = (torque, lever, torque, tool);
+        true
     }
 
     /// The motor that has sunk furthest from `place` [rad], by more than some counts, of those that nothing
@@ -170,9 +183,18 @@ fn release(actuators: &[Actuator], period: Period) -> u64 {
 
 /// A mechanism of any kind, asked for its weight.
 trait Weight: Send {
-    /// Torques that hold motors at `angle` [rad], and the way of the tool per radian of each; `None` where
-    /// the mechanism cannot be.
-    fn at(&mut self, angle: &ActuatorArray) -> Option<(ActuatorArray, ActuatorArray)>;
+    /// What motors at `angle` [rad] bear; `None` where the mechanism cannot be.
+    fn at(&mut self, angle: &ActuatorArray) -> Option<AtRest>;
+}
+
+/// The mechanism at rest in one place.
+struct AtRest {
+    /// Torques that hold the motors [N·m].
+    torque: ActuatorArray,
+    /// Way of the tool per radian of each [m/rad].
+    lever: ActuatorArray,
+    /// Where the tool is, machine frame [m].
+    tool: [f64; 3],
 }
 
 struct Of<const N: usize, M: Mechanism<N>> {
@@ -183,7 +205,7 @@ struct Of<const N: usize, M: Mechanism<N>> {
 }
 
 impl<const N: usize, M: Mechanism<N>> Weight for Of<N, M> {
-    fn at(&mut self, angle: &ActuatorArray) -> Option<(ActuatorArray, ActuatorArray)> {
+    fn at(&mut self, angle: &ActuatorArray) -> Option<AtRest> {
         // What springs have the motors ahead moves no weight to speak of.
         let mut joints = Joints::<N>::zeros();
         for (actuator, angle) in self.actuators.iter().zip(angle) {
@@ -201,8 +223,9 @@ impl<const N: usize, M: Mechanism<N>> Weight for Of<N, M> {
         }
         let is_known = torque.iter().chain(&lever).all(|value| value.is_finite());
         is_known.then(|| {
+            let tool = self.mechanism.pose(&chain).position.into();
             self.near = Some(chain);
-            (torque, lever)
+            AtRest { torque, lever, tool }
         })
     }
 }

@@ -30,6 +30,27 @@ pub(crate) enum State {
         waited: u64,
     },
     Faulted,
+    /// At rest and powered, with the fault of an emergency stop of category 2 latched.
+    Halted,
+    /// Axes look for their references.
+    Homing(HomingStage),
+    /// Axes are moved by hand, or come to rest from what was given up.
+    Jogging,
+    /// An axis moves until the probe touches.
+    Probing,
+    /// The laser is tested, at rest.
+    Pulsing,
+}
+
+/// How far homing has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum HomingStage {
+    /// The axes of a group look for their references.
+    Searching,
+    /// Those of the group were found, and are brought together where they have several actuators.
+    Squaring { begun: bool },
+    /// All were found, and go home.
+    Returning,
 }
 
 /// What follows once a hold has come to rest.
@@ -53,6 +74,11 @@ impl State {
             Self::Holding(_) => ControllerState::Holding,
             Self::Stopping | Self::Failing { .. } => ControllerState::Stopping,
             Self::Faulted => ControllerState::Faulted,
+            Self::Halted => ControllerState::Halted,
+            Self::Homing(_) => ControllerState::Homing,
+            Self::Jogging => ControllerState::Jogging,
+            Self::Probing => ControllerState::Probing,
+            Self::Pulsing => ControllerState::Pulsing,
         }
     }
 

@@ -4,6 +4,7 @@
 //! so they come to rest along the path, else the drives brake them.
 
 use crate::ramp::{LARGEST_CHANGE, LARGEST_TURN};
+use crate::reference::bit;
 use crate::standing::STANDING_COUNTS;
 use machine::trip::Limit;
 use machine::trip::following::{CREEP, DISCONTINUITY, LEAD_STEP};
@@ -174,11 +175,16 @@ impl Supervision {
     }
 
     /// Whether the actuators follow `angle` [rad at the motor] inside the limits of their axes, those of
-    /// one axis together, and are cool.
+    /// one axis together, and are cool. Soft limits hold for the axes that have a bit in `bounded`.
     ///
     /// # Errors
     /// Following error, soft limit, racking or overload, with the actuator, or with the axis.
-    pub fn motion(&self, feedback: &Feedback, angle: &ActuatorArray) -> Result<(), Finding> {
+    pub fn motion(
+        &self,
+        feedback: &Feedback,
+        angle: &ActuatorArray,
+        bounded: u32,
+    ) -> Result<(), Finding> {
         // A winding stays too warm until the axes rest: that must not hide the loss of an axis.
         let mut overload = None;
         for (axis_index, axis) in self.axes.iter().enumerate().take(MAX_AXES) {
@@ -212,7 +218,8 @@ impl Supervision {
             // A plan may go right up to the limit, and the axis follows it with some error.
             let [lower, upper] = limits.position;
             let margin = limits.following_error;
-            if joint < lower - margin || joint > upper + margin {
+            let is_bounded = bounded & bit(axis_index) != 0;
+            if is_bounded && (joint < lower - margin || joint > upper + margin) {
                 let limit = if joint < lower { lower } else { upper };
                 let fault = Fault::new(FaultCode::PositionLimit).on_axis(axis_index);
                 return Err(Finding::lost(fault.beyond(FaultQuantity::Position, joint, limit)));

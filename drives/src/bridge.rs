@@ -145,6 +145,11 @@ impl Bridge {
         self.permission = permission;
     }
 
+    /// Sets the inputs of a simulated machine that have no place of their own, one bit each.
+    pub fn set_inputs(&mut self, inputs: u64) {
+        self.port.set_inputs(inputs);
+    }
+
     /// Stops the axes by the drive's own brake, from the next begin on, until a person resets.
     pub fn stop(&mut self, cause: FaultCode, now: Nanoseconds) {
         self.watchdog.stop(Fault::new(cause).at(now));

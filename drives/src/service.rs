@@ -18,7 +18,9 @@ use machine::{Machine, Timing};
 use messages::feedback::status;
 use messages::report::refused;
 use messages::time::Period;
-use messages::{Command, DrivesReport, FaultCode, Feedback, Nanoseconds, RealtimeFacts};
+use messages::{
+    Command, DrivesReport, FaultCode, Feedback, Nanoseconds, RealtimeFacts, SimulatedInputs,
+};
 use runtime::clock::{self, PeriodicClock};
 use runtime::peer::{PeerState, Peers};
 use runtime::stall::{StallNote, StallWatch};
@@ -104,6 +106,7 @@ struct ServiceCycle {
     feedbacks: Publisher<Feedback>,
     reports: Publisher<DrivesReport>,
     commands: Subscriber<Command>,
+    simulated: Subscriber<SimulatedInputs>,
     feedback_wake: Notifier,
     command_wake: Listener,
     /// None where the operating system gives no thread: stalls stay unexplained.
@@ -133,6 +136,7 @@ impl ServiceCycle {
             feedbacks: domain.publisher()?,
             reports: domain.publisher()?,
             commands: domain.subscriber(Samples::Latest)?,
+            simulated: domain.subscriber(Samples::Latest)?,
             feedback_wake: domain.notifier(Wake::Feedback)?,
             command_wake: domain.listener(Wake::Command)?,
             stalls: StallWatch::start().ok(),
@@ -225,6 +229,9 @@ impl ServiceCycle {
     }
 
     fn begin(&mut self, deadline: Nanoseconds) -> Result<(), ServiceError> {
+        if let Some(simulated) = self.simulated.newest()? {
+            self.bridge.set_inputs(simulated.inputs);
+        }
         self.bridge.begin(clock::now(), deadline);
         let feedback = self.bridge.stamp(clock::now());
         self.feedbacks.publish(feedback)?;

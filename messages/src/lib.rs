@@ -37,7 +37,7 @@ pub use fault::{Fault, FaultCode, FaultQuantity};
 pub use feedback::Feedback;
 pub use job::{JobOffer, PlannerPhase, PlannerReport};
 pub use laser::{GateEdge, LaserCycle, MAX_EDGES};
-pub use operator::{OperatorReply, OperatorRequest, OperatorVerb};
+pub use operator::{OperatorReply, OperatorRequest, OperatorVerb, SimulatedInputs};
 pub use progress::Progress;
 pub use refusal::Refusal;
 pub use report::{ControllerReport, DrivesReport, LinkCounters, RealtimeFacts};

@@ -77,6 +77,14 @@ sample! {
 }
 
 sample! {
+    /// Inputs of a simulated machine that people have set, from the domain holder to drives.
+    SimulatedInputs = "graver.SimulatedInputs.v1" {
+        /// One bit each, in the order of the machine file: 1 is active.
+        inputs: u64,
+    }
+}
+
+sample! {
     /// The controller's answer, given as soon as the request is accepted or refused; its effect
     /// shows in the progress.
     OperatorReply = "graver.OperatorReply.v2" {

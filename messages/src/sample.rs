@@ -190,6 +190,7 @@ mod tests {
             crate::Stalls::LAYOUT,
             crate::OperatorRequest::LAYOUT,
             crate::OperatorReply::LAYOUT,
+            crate::SimulatedInputs::LAYOUT,
         ];
         layouts.sort_unstable();
         assert!(layouts.windows(2).all(|pair| pair[0] != pair[1]), "{layouts:x?}");

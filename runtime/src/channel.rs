@@ -17,7 +17,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use messages::{
     Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress, Sample,
-    Setpoint,
+    Setpoint, SimulatedInputs,
 };
 
 use crate::domain::{Domain, DomainGuard};
@@ -118,6 +118,11 @@ impl Channel for PlannerReport {
 
 impl Channel for JobOffer {
     const SERVICE: &'static str = "job-offers";
+    const QOS: Qos = Qos::KeepLast { depth: STATUS_DEPTH };
+}
+
+impl Channel for SimulatedInputs {
+    const SERVICE: &'static str = "simulated-inputs";
     const QOS: Qos = Qos::KeepLast { depth: STATUS_DEPTH };
 }
 

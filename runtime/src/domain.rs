@@ -18,7 +18,7 @@ use iceoryx2::prelude::{
 };
 use messages::{
     Command as MotorCommand, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport,
-    Progress, Setpoint,
+    Progress, Setpoint, SimulatedInputs,
 };
 
 use crate::channel::{self, Channel, ChannelError, Publisher, Samples, Subscriber};
@@ -336,6 +336,7 @@ fn create_services(
         channel::create::<DrivesReport>(node)?,
         channel::create::<PlannerReport>(node)?,
         channel::create::<JobOffer>(node)?,
+        channel::create::<SimulatedInputs>(node)?,
         wake::create(node, Wake::Feedback)?,
         wake::create(node, Wake::Command)?,
         operator::create(node)?,

@@ -45,7 +45,7 @@ pub fn override_rate(arguments: &OverrideArguments) -> Result<Exit, Failure> {
     ask(&Request::Verb { verb: Verb::Override, value }, &arguments.instance)
 }
 
-fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure> {
+pub(super) fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure> {
     let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
     let reply = match send(request, &instance) {
         Err(error @ SocketError::Silent { .. }) => ask_controller(request, &instance, &error)?,
@@ -64,7 +64,8 @@ fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure
         }
         Ok(Exit::Done)
     } else {
-        message::tell(&format!("refused: not possible while the machine is {state}"));
+        let otherwise = format!("not possible while the machine is {state}");
+        message::tell(&format!("refused: {}", reply["refusal"].as_str().unwrap_or(&otherwise)));
         Ok(Exit::Stopped)
     }
 }
@@ -116,7 +117,29 @@ pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
     }
     say!("stroke     {}", status["stroke"]);
     say!("rate       {:.0} %", status["rate"].as_f64().unwrap_or(0.0) * 100.0);
+    let names = |key: &str| {
+        let list = status[key].as_array().into_iter().flatten().filter_map(Value::as_str);
+        list.collect::<Vec<_>>().join(", ")
+    };
+    let unhomed = names("unhomed");
+    say!(
+        "homed      {}",
+        if unhomed.is_empty() { "all axes".into() } else { format!("not {unhomed}") }
+    );
+    let active = status["inputs"].as_object().into_iter().flatten();
+    let active = active.filter(|(_, level)| level.as_bool() == Some(true));
+    let active = active.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+    if status["inputs"].as_object().is_some_and(|inputs| !inputs.is_empty()) {
+        say!("inputs     {}", if active.is_empty() { "none active" } else { &active });
+    }
     say!("fault      {}", text("fault"));
+    for past in status["faults"].as_array().into_iter().flatten() {
+        say!(
+            "  {} UTC  {}",
+            clock(past["time"].as_u64()),
+            past["detail"].as_str().unwrap_or_default()
+        );
+    }
     say!("cycles     {}, {} overruns", status["cycles"], status["overruns"]);
     for (name, pid) in status["services"].as_object().into_iter().flatten() {
         match pid.as_i64() {
@@ -125,6 +148,12 @@ pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
         }
     }
     Ok(Exit::Done)
+}
+
+/// The time of day of `seconds` since 1970.
+fn clock(seconds: Option<u64>) -> String {
+    let seconds = seconds.unwrap_or_default() % 86_400;
+    format!("{:02}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
 }
 
 /// Hands a job to a running pipeline and follows it to its end.
@@ -205,6 +234,17 @@ fn send(request: &Request, instance: &Instance) -> Result<Value, SocketError> {
     let urgent = matches!(request, Request::Verb { verb: Verb::Stop | Verb::Hold, .. });
     let patience = if urgent { URGENT_PATIENCE } else { ANSWER_PATIENCE };
     OperatorClient::connect(instance)?.request_within(&json!(request), patience)
+}
+
+/// Asks, and waits for the answer at most `patience`.
+pub(super) fn send_checked(
+    request: &Request,
+    instance: &Instance,
+    patience: Duration,
+) -> Result<Value, Failure> {
+    let client = OperatorClient::connect(instance).map_err(Failure::service)?;
+    let mut client = client;
+    checked(client.request_within(&json!(request), patience).map_err(Failure::service)?)
 }
 
 fn checked(reply: Value) -> Result<Value, Failure> {

@@ -149,7 +149,12 @@ impl<'a> JobRun<'a> {
                 self.stage = Stage::Starting(power_up);
                 match ready {
                     Ok(false) => {}
-                    Ok(true) => self.offer()?,
+                    Ok(true) => match self.unhomed() {
+                        Some(axis) => {
+                            self.end_with(format!("axis {axis} is not homed: `graver home`"))
+                        }
+                        None => self.offer()?,
+                    },
                     Err(NotReady::Faulted(fault)) => self.fail(fault),
                     Err(other) => self.end_with(other.to_string()),
                 }
@@ -163,6 +168,13 @@ impl<'a> JobRun<'a> {
             Stage::Playing | Stage::Resting(_) => return Ok(self.is_over()),
         }
         Ok(false)
+    }
+
+    /// The first axis that has to be homed before a job.
+    fn unhomed(&self) -> Option<String> {
+        let homed = self.pipeline.latest.progress.homed;
+        let mut axes = self.pipeline.machine.axes.iter().enumerate();
+        axes.find(|(index, _)| homed >> index & 1 == 0).map(|(_, axis)| axis.name.clone())
     }
 
     fn offer(&mut self) -> Result<(), Failure> {

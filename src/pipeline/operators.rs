@@ -7,10 +7,12 @@
 use super::ServiceOwner;
 use super::caps::caps;
 use super::control::{JobControl, Phase};
+use super::refusals;
 use super::status::StatusBoard;
 use crate::exit::Failure;
 use crossbeam::channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
-use messages::{ControllerState, OperatorReply, OperatorVerb};
+use machine::Machine;
+use messages::{ControllerState, OperatorReply, OperatorRequest, OperatorVerb};
 use monitor::summary::Summary;
 use planner::request::JobRequest;
 use runtime::Domain;
@@ -46,6 +48,24 @@ pub enum Request {
         verb: Verb,
         /// Its argument.
         value: f64,
+    },
+    /// A verb about axes, with two numbers.
+    Operate {
+        /// Its name.
+        verb: Verb,
+        /// The axes by name.
+        axes: Vec<String>,
+        /// Its first argument, SI.
+        value: f64,
+        /// Its second one, SI.
+        second: f64,
+    },
+    /// Sets an input of a simulated machine.
+    Input {
+        /// Its name in the machine file.
+        name: String,
+        /// Whether it is active from now on.
+        is_active: bool,
     },
     /// What is going on?
     Status,
@@ -91,13 +111,25 @@ pub enum Verb {
     Reset,
     /// Another rate.
     Override,
+    /// Find the references of axes.
+    Home,
+    /// Move an axis for as long as it is asked for.
+    Jog,
+    /// Move an axis by a distance.
+    Step,
+    /// Light the laser for a moment.
+    TestPulse,
+    /// Move an axis until the probe touches.
+    Probe,
 }
 
 /// The machine's answer to a verb, as `graver hold --json` and its like print it.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct VerbReply {
-    /// Whether it is carried out; otherwise the state does not allow it.
+    /// Whether it is carried out.
     pub accepted: bool,
+    /// Why it is not; null where it is.
+    pub refusal: Option<String>,
     /// The state that the request met; `preparing` for a job that is not played yet.
     pub state: String,
     /// The rate now wanted, 1 as planned.
@@ -109,7 +141,12 @@ pub struct VerbReply {
 impl VerbReply {
     /// A request that is carried out without the controller.
     fn accepted(state: &str) -> Self {
-        Self { accepted: true, state: state.to_owned(), value: 1.0, capped_by: None }
+        Self { accepted: true, refusal: None, state: state.to_owned(), value: 1.0, capped_by: None }
+    }
+
+    /// What the controller of `machine` said.
+    pub fn of(reply: &OperatorReply, machine: &Machine) -> Self {
+        Self { refusal: refusals::words(reply, machine), ..Self::from(*reply) }
     }
 }
 
@@ -117,6 +154,7 @@ impl From<OperatorReply> for VerbReply {
     fn from(reply: OperatorReply) -> Self {
         Self {
             accepted: reply.accepted == 1,
+            refusal: None,
             state: ControllerState::from_wire(reply.state).name().to_owned(),
             value: reply.value,
             capped_by: None,
@@ -134,6 +172,11 @@ impl From<Verb> for OperatorVerb {
             Verb::Stop => Self::Stop,
             Verb::Reset => Self::Reset,
             Verb::Override => Self::Override,
+            Verb::Home => Self::Home,
+            Verb::Jog => Self::Jog,
+            Verb::Step => Self::Step,
+            Verb::TestPulse => Self::TestPulse,
+            Verb::Probe => Self::Probe,
         }
     }
 }
@@ -206,6 +249,10 @@ impl Operators {
                     json!({})
                 }
                 Request::Verb { verb, value } => answers.carry_out(verb, value),
+                Request::Operate { verb, axes, value, second } => {
+                    answers.operate(verb, &axes, [value, second])
+                }
+                Request::Input { name, is_active } => answers.set_input(&name, is_active),
             }
         };
         let server = OperatorServer::bind(domain, answer).map_err(Failure::service)?;
@@ -250,12 +297,59 @@ pub struct Answers {
     link: Arc<OperatorLink>,
     board: Arc<StatusBoard>,
     control: Arc<JobControl>,
+    machine: Machine,
+    /// Inputs of a simulated machine that are set, one bit each.
+    inputs: Arc<AtomicU64>,
 }
 
 impl Answers {
     /// Answers for one pipeline.
-    pub fn new(link: Arc<OperatorLink>, board: Arc<StatusBoard>, control: Arc<JobControl>) -> Self {
-        Self { link, board, control }
+    pub fn new(
+        link: Arc<OperatorLink>,
+        board: Arc<StatusBoard>,
+        control: Arc<JobControl>,
+        machine: &Machine,
+        inputs: Arc<AtomicU64>,
+    ) -> Self {
+        Self { link, board, control, machine: machine.clone(), inputs }
+    }
+
+    /// Asks the controller for a verb about axes.
+    fn operate(&self, verb: Verb, axes: &[String], [value, second]: [f64; 2]) -> Value {
+        let mut numbers = Vec::with_capacity(axes.len());
+        for name in axes {
+            match refusals::axis(&self.machine, name) {
+                Ok(number) => numbers.push(number),
+                Err(error) => return json!({ "error": error }),
+            }
+        }
+        let axis = match verb {
+            Verb::Home => numbers.iter().fold(0, |bits, number| bits | 1 << (number - 1)),
+            _ => numbers.first().copied().unwrap_or_default(),
+        };
+        let verb = OperatorVerb::from(verb) as u32;
+        let request = OperatorRequest { verb, axis, value, second, ..OperatorRequest::default() };
+        match self.link.ask_within(request, STOP_PATIENCE) {
+            Ok(reply) => json!(VerbReply::of(&reply, &self.machine)),
+            Err(error) => json!({ "error": error.to_string() }),
+        }
+    }
+
+    /// Sets an input of a simulated machine.
+    fn set_input(&self, name: &str, is_active: bool) -> Value {
+        let Some((index, _)) = self.machine.operating.input(name) else {
+            let inputs = &self.machine.operating.inputs;
+            let names: Vec<&str> = inputs.iter().map(|input| input.name.as_str()).collect();
+            let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            return json!({ "error": format!("there is no input {name:?}; the machine has {known}") });
+        };
+        let bit = 1 << index;
+        if is_active {
+            self.inputs.fetch_or(bit, Ordering::Relaxed);
+        } else {
+            self.inputs.fetch_and(!bit, Ordering::Relaxed);
+        }
+        json!({})
     }
 
     fn carry_out(&self, verb: Verb, value: f64) -> Value {
@@ -268,7 +362,7 @@ impl Answers {
                 Ok(reply) => {
                     let folder = self.board.folder();
                     let capped_by = folder.and_then(|folder| caps(&folder, reply.value));
-                    json!(VerbReply { capped_by, ..VerbReply::from(reply) })
+                    json!(VerbReply { capped_by, ..VerbReply::of(&reply, &self.machine) })
                 }
                 Err(error) => json!({ "error": error.to_string() }),
             },
@@ -278,7 +372,7 @@ impl Answers {
 
     fn ask(&self, verb: Verb, value: f64) -> Value {
         match self.link.request(verb.into(), value) {
-            Ok(reply) => json!(VerbReply::from(reply)),
+            Ok(reply) => json!(VerbReply::of(&reply, &self.machine)),
             Err(error) => json!({ "error": error.to_string() }),
         }
     }
@@ -302,7 +396,7 @@ impl Answers {
         let asked = Instant::now();
         loop {
             let reply = match self.link.request_within(OperatorVerb::Hold, 0.0, STOP_PATIENCE) {
-                Ok(reply) => VerbReply::from(reply),
+                Ok(reply) => VerbReply::of(&reply, &self.machine),
                 Err(error) => return json!({ "error": error.to_string() }),
             };
             let starting = !reply.accepted

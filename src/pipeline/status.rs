@@ -1,11 +1,14 @@
 //! What operators see of a running pipeline.
 
 use super::Latest;
-use messages::{ControllerState, PlannerPhase};
+use machine::Machine;
+use messages::{ControllerState, Fault, Nanoseconds, PlannerPhase};
+use monitor::summary::FaultSummary;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A notice board: the supervisor writes, operators' threads read.
 #[derive(Debug, Default)]
@@ -13,6 +16,10 @@ pub struct StatusBoard {
     status: Mutex<Status>,
     /// The run folder of the job.
     folder: Mutex<Option<PathBuf>>,
+    /// The machine, once it is known.
+    machine: Mutex<Option<Machine>>,
+    /// When the newest fault was found.
+    newest: Mutex<Nanoseconds>,
 }
 
 /// What a pipeline is doing, as `graver status --json` prints it.
@@ -39,8 +46,20 @@ pub struct Status {
     pub rate: f64,
     /// Where the plan has the tool [m].
     pub tool: [f64; 3],
+    /// Axes that know their place; all of a machine without homing.
+    pub homed: Vec<String>,
+    /// Axes that have to be homed before a job.
+    pub unhomed: Vec<String>,
+    /// Where the joints are, by name [m or rad].
+    pub axes: BTreeMap<String, f64>,
+    /// The inputs of the machine file, and whether each is active.
+    pub inputs: BTreeMap<String, bool>,
+    /// Where the joint that was probed last was when the probe touched; null before [m or rad].
+    pub probed: Option<f64>,
     /// The latched fault.
     pub fault: Option<String>,
+    /// The faults since the start, the newest last, with the time of day.
+    pub faults: Vec<PastFault>,
     /// Cycles since drives started.
     pub cycles: u64,
     /// Overruns since drives started.
@@ -49,7 +68,44 @@ pub struct Status {
     pub services: BTreeMap<String, Option<i32>>,
 }
 
+/// A fault that was latched.
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct PastFault {
+    /// When, in seconds since 1970.
+    pub time: u64,
+    /// Its code.
+    pub code: String,
+    /// What was found, in words.
+    pub detail: String,
+}
+
+/// The most faults that are remembered.
+const MOST_FAULTS: usize = 32;
+
 impl StatusBoard {
+    /// Learns the names of the machine's axes and inputs.
+    pub fn know(&self, machine: &Machine) {
+        *locked(&self.machine) = Some(machine.clone());
+    }
+
+    /// Adds a fault that is new to those that are remembered.
+    fn remember(&self, status: &mut Status, fault: &Fault) {
+        let mut newest = locked(&self.newest);
+        if !fault.is_some() || *newest == fault.at {
+            return;
+        }
+        *newest = fault.at;
+        let machine = locked(&self.machine);
+        let told = machine.as_ref().and_then(|machine| FaultSummary::of(fault, machine));
+        let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+        let code = fault.code().name().to_owned();
+        let detail = told.map_or_else(|| code.clone(), |told| told.to_string());
+        if status.faults.len() >= MOST_FAULTS {
+            status.faults.remove(0);
+        }
+        status.faults.push(PastFault { time, code, detail });
+    }
+
     /// Writes the latest samples; `held` when a person holds a job that is not played yet.
     pub fn post(&self, latest: &Latest, held: bool, pids: &[(&'static str, Option<i32>)]) {
         let mut status = self.lock();
@@ -74,6 +130,23 @@ impl StatusBoard {
         status.tool = progress.tool;
         let fault = progress.fault;
         status.fault = fault.is_some().then(|| fault.code().name().to_owned());
+        self.remember(&mut status, &fault);
+        if let Some(machine) = locked(&self.machine).as_ref() {
+            let named = |is_homed: bool| {
+                let axes = machine.axes.iter().enumerate();
+                let own =
+                    axes.filter(move |(index, _)| (progress.homed >> index & 1 == 1) == is_homed);
+                own.map(|(_, axis)| axis.name.clone()).collect::<Vec<_>>()
+            };
+            (status.homed, status.unhomed) = (named(true), named(false));
+            let axes = machine.axes.iter().zip(&progress.position);
+            status.axes = axes.map(|(axis, place)| (axis.name.clone(), *place)).collect();
+            let inputs = machine.operating.bits();
+            let inputs =
+                inputs.map(|(bit, input)| (input.name.clone(), progress.inputs & bit != 0));
+            status.inputs = inputs.collect();
+        }
+        status.probed = (progress.probed_axis != 0).then_some(progress.probed);
         status.cycles = drives.cycle.0;
         status.overruns = drives.overruns;
         status.services = pids.iter().map(|(name, pid)| ((*name).to_owned(), *pid)).collect();

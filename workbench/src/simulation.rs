@@ -32,6 +32,9 @@ const LIGHT_LAG: usize = monitor::conclusion::LIGHT_LAG as usize + 1;
 /// How long enabling may take: the controller gives up before, with a fault that says why.
 const ENABLE_PATIENCE: Nanoseconds = Nanoseconds(3_000_000_000);
 
+/// How long homing may take: ten minutes.
+const HOMING_PATIENCE: Nanoseconds = Nanoseconds(600_000_000_000);
+
 /// What a simulation gives besides its records.
 #[derive(Debug, Clone)]
 pub struct Simulated {
@@ -113,9 +116,17 @@ impl Pipeline {
         // Drives powers nothing before it has been greeted by an unpowered command.
         self.cycle(&[], None);
         self.cycle(&[], Some(request(OperatorVerb::Enable, 0.0)));
-        for _ in 0..machine.realtime.period.cycles_for(ENABLE_PATIENCE) {
+        let period = machine.realtime.period;
+        let mut is_homed = machine.operating.homing.iter().all(Option::is_none);
+        let mut left = period.cycles_for(ENABLE_PATIENCE);
+        while left > 0 {
+            left -= 1;
             match self.outputs.command.state() {
-                ControllerState::Idle => return Ok(()),
+                ControllerState::Idle if is_homed => return Ok(()),
+                ControllerState::Idle => {
+                    (is_homed, left) = (true, period.cycles_for(HOMING_PATIENCE));
+                    self.cycle(&[], Some(request(OperatorVerb::Home, 0.0)));
+                }
                 ControllerState::Faulted => break,
                 _ => self.cycle(&[], None),
             }

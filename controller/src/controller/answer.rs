@@ -44,10 +44,17 @@ impl Controller {
             command.outputs = lookahead.setpoint(self.player.outputs_at().sequence()).outputs;
         }
         self.close_loops(feedback, command);
+        self.reference.command(command);
     }
 
     /// What the laser shall do in the cycle in which the command acts.
     fn light(&mut self, now: Nanoseconds) -> LaserCycle {
+        if self.safety.is_dark() {
+            return LaserCycle::OFF;
+        }
+        if self.state == State::Pulsing {
+            return self.pulse.cycle(self.machine.realtime.period.time());
+        }
         if self.playing == 0 {
             return LaserCycle::OFF;
         }
@@ -146,10 +153,10 @@ impl Controller {
             override_rate: self.player.asked_rate(),
             tool: command.tool,
             position,
-            inputs: 0,
-            homed: u32::MAX,
-            probed_axis: 0,
-            probed: 0.0,
+            inputs: self.safety.inputs(),
+            homed: self.reference.homed(),
+            probed_axis: self.probing.found_axis(),
+            probed: self.probing.found(),
             state: command.state,
             completed: u32::from(self.completed),
             fault: self.fault,

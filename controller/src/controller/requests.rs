@@ -1,31 +1,87 @@
 //! What people ask of the controller.
 
 use super::Controller;
-use crate::state::{AfterRest, State};
-use messages::{Cycle, Fault, OperatorReply, OperatorRequest, OperatorVerb, Refusal};
+use super::operating::Probing;
+use crate::reference::bit;
+use crate::state::{AfterRest, HomingStage, State};
+use crate::test_pulse::TestPulse;
+use machine::operating::Side;
+use messages::feedback::status;
+use messages::{
+    Fault, Feedback, MAX_AXES, Nanoseconds, OperatorReply, OperatorRequest, OperatorVerb, Refusal,
+};
+
+/// Why a request is refused.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Refused {
+    refusal: Refusal,
+    /// The axis from 1, 0 for none.
+    axis: u32,
+    found: f64,
+    limit: f64,
+}
+
+impl From<Refusal> for Refused {
+    fn from(refusal: Refusal) -> Self {
+        Self { refusal, ..Self::default() }
+    }
+}
+
+impl Refused {
+    fn on(refusal: Refusal, axis: usize) -> Self {
+        Self { axis: axis as u32 + 1, ..refusal.into() }
+    }
+
+    fn beyond(self, found: f64, limit: f64) -> Self {
+        Self { found, limit, ..self }
+    }
+}
+
+/// Refuses `value` unless it is 0 to `most`.
+fn at_most(value: f64, most: f64) -> Result<(), Refused> {
+    match value {
+        value if !value.is_finite() => Err(Refusal::NotANumber.into()),
+        value if value > most => Err(Refused::from(Refusal::TooLarge).beyond(value, most)),
+        value if value <= 0.0 => Err(Refused::from(Refusal::TooSmall).beyond(value, 0.0)),
+        _ => Ok(()),
+    }
+}
 
 impl Controller {
-    /// Carries a request out in `cycle`, or refuses it.
-    pub(super) fn request(&mut self, request: &OperatorRequest, cycle: Cycle) -> OperatorReply {
+    /// Carries a request out, or refuses it.
+    pub(super) fn request(
+        &mut self,
+        request: &OperatorRequest,
+        feedback: &Feedback,
+    ) -> OperatorReply {
         let met = self.state.to_wire();
-        let accepted = OperatorVerb::from_wire(request.verb)
-            .is_some_and(|verb| self.obey(verb, request, cycle));
+        let outcome = match OperatorVerb::from_wire(request.verb) {
+            Some(verb) => self.obey(verb, request, feedback),
+            None => Err(Refusal::Unknown.into()),
+        };
+        let Refused { refusal, axis, found, limit } = outcome.err().unwrap_or_default();
         OperatorReply {
             ticket: request.ticket,
-            accepted: u32::from(accepted),
+            accepted: u32::from(outcome.is_ok()),
             state: met as u32,
-            refusal: if accepted { Refusal::None } else { Refusal::State } as u32,
-            axis: 0,
+            refusal: refusal as u32,
+            axis,
             reserved: 0,
-            found: 0.0,
-            limit: 0.0,
+            found,
+            limit,
             value: self.player.asked_rate(),
         }
     }
 
-    fn obey(&mut self, verb: OperatorVerb, request: &OperatorRequest, cycle: Cycle) -> bool {
+    fn obey(
+        &mut self,
+        verb: OperatorVerb,
+        request: &OperatorRequest,
+        feedback: &Feedback,
+    ) -> Result<(), Refused> {
         match (verb, self.state) {
             (OperatorVerb::Enable, State::Disabled) => {
+                self.is_not_stopped()?;
                 self.state = State::Enabling { waited: 0, held: 0, settled: 0 };
             }
             (
@@ -41,6 +97,7 @@ impl Controller {
             // Already on its way, as soon as there is something to play.
             (OperatorVerb::Resume, State::Holding(AfterRest::Supply { .. })) => {}
             (OperatorVerb::Resume, State::Holding(_)) => {
+                self.may_light()?;
                 self.state = State::Holding(AfterRest::Resume);
             }
             (OperatorVerb::Stop, State::Running | State::Holding(_)) => {
@@ -48,27 +105,220 @@ impl Controller {
                 self.state = State::Stopping;
             }
             (
+                OperatorVerb::Stop | OperatorVerb::Hold,
+                State::Homing(_) | State::Jogging | State::Probing | State::Pulsing,
+            ) => {
+                self.give_up_travel();
+                self.state = State::Jogging;
+            }
+            (
                 OperatorVerb::Stop,
                 State::Idle | State::Disabled | State::Enabling { .. } | State::Squaring { .. },
             ) if self.intake.started() != 0 => {
-                self.give_up(cycle);
+                self.give_up(feedback.cycle);
             }
-            (OperatorVerb::Reset, State::Faulted) => {
-                self.state = State::Disabled;
-                self.fault = Fault::default();
-                self.reset_ticket = u64::from(request.ticket);
-                self.supervision.reset();
+            (OperatorVerb::Reset, State::Faulted | State::Halted) => self.reset(request.ticket)?,
+            (OperatorVerb::Override, _) => {
+                if !self.player.ask_rate(request.value) {
+                    return Err(Refused::from(Refusal::TooLarge).beyond(request.value, 2.0));
+                }
             }
-            (OperatorVerb::Override, _) => return self.player.ask_rate(request.value),
             (
                 OperatorVerb::Start,
                 State::Disabled | State::Enabling { .. } | State::Squaring { .. } | State::Idle,
-            ) => {
-                let stream = request.value as u64;
-                return stream as f64 == request.value && self.intake.start(stream);
-            }
-            _ => return false,
+            ) => self.start(request.value)?,
+            (OperatorVerb::Home, State::Idle) => self.begin_homing(request.axis)?,
+            (OperatorVerb::Jog, State::Idle | State::Jogging) => self.jog(request)?,
+            (OperatorVerb::Step, State::Idle | State::Jogging) => self.step_axis(request)?,
+            (OperatorVerb::Probe, State::Idle) => self.begin_probing(request)?,
+            (OperatorVerb::TestPulse, State::Idle) => self.begin_pulse(request, feedback)?,
+            _ => return Err(Refusal::State.into()),
         }
-        true
+        Ok(())
+    }
+
+    /// Clears the fault, unless what caused it is still there.
+    fn reset(&mut self, ticket: u32) -> Result<(), Refused> {
+        if self.safety.is_stopped() {
+            return Err(Refusal::EmergencyStop.into());
+        }
+        self.state = if self.state == State::Halted { State::Idle } else { State::Disabled };
+        self.fault = Fault::default();
+        self.reset_ticket = u64::from(ticket);
+        self.supervision.reset();
+        Ok(())
+    }
+
+    fn start(&mut self, value: f64) -> Result<(), Refused> {
+        self.may_light()?;
+        if let Some(axis) = self.reference.unknown(self.machine.axes.len()) {
+            return Err(Refused::on(Refusal::NotHomed, axis));
+        }
+        if let Some(axis) = self.safety.limited() {
+            return Err(Refused::on(Refusal::LimitSwitch, axis));
+        }
+        let stream = value as u64;
+        if stream as f64 == value && self.intake.start(stream) {
+            Ok(())
+        } else {
+            Err(Refusal::Stream.into())
+        }
+    }
+
+    fn begin_homing(&mut self, axes: u32) -> Result<(), Refused> {
+        self.may_move()?;
+        if self.homing.axes(axes).next().is_none() {
+            return Err(Refusal::NothingToFind.into());
+        }
+        for axis in 0..self.machine.axes.len().min(MAX_AXES) {
+            if self.homing.axes(axes).any(|it| it == axis) {
+                self.reference.forget(axis);
+            }
+        }
+        self.homing.begin(axes);
+        self.state = State::Homing(HomingStage::Searching);
+        Ok(())
+    }
+
+    /// Moves an axis for as long as it is asked to.
+    fn jog(&mut self, request: &OperatorRequest) -> Result<(), Refused> {
+        let axis = self.axis(request.axis)?;
+        let speed = request.value;
+        if speed == 0.0 {
+            self.travel.stop(axis);
+            self.dead_man[axis] = None;
+            return Ok(());
+        }
+        self.may_go(axis, speed, speed)?;
+        let standing = *self.feedforward.after();
+        // One that comes to rest does so before it hears the next word: it would need more room.
+        if !self.travel.comes_to_rest(axis) {
+            self.travel.run(axis, speed, &standing);
+        }
+        let dead_man = Nanoseconds::from_seconds(self.machine.operating.safety.dead_man);
+        let cycles = self.machine.realtime.period.cycles_in(dead_man);
+        self.dead_man[axis] = Some(u32::try_from(cycles).unwrap_or(u32::MAX));
+        self.state = State::Jogging;
+        Ok(())
+    }
+
+    /// Moves an axis on by a distance.
+    fn step_axis(&mut self, request: &OperatorRequest) -> Result<(), Refused> {
+        let axis = self.axis(request.axis)?;
+        let distance = request.value;
+        self.may_go(axis, request.second, distance)?;
+        if !self.travel.rests(axis) {
+            return Err(Refusal::State.into());
+        }
+        let standing = *self.feedforward.after();
+        self.is_within(axis, self.travel.place(axis, &standing) + distance, distance)?;
+        self.dead_man[axis] = None;
+        self.travel.go(axis, distance, request.second, &standing);
+        self.state = State::Jogging;
+        Ok(())
+    }
+
+    fn begin_probing(&mut self, request: &OperatorRequest) -> Result<(), Refused> {
+        let axis = self.axis(request.axis)?;
+        let (distance, speed) = (request.value, request.second);
+        self.may_go(axis, speed, distance)?;
+        match self.safety.probe() {
+            None => return Err(Refusal::NothingToFind.into()),
+            Some(true) => return Err(Refusal::Touching.into()),
+            Some(false) => {}
+        }
+        let standing = *self.feedforward.after();
+        let place = self.travel.place(axis, &standing);
+        self.is_within(axis, place + distance, distance)?;
+        let bounds = [place.min(place + distance), place.max(place + distance)];
+        self.probing = Probing::new(axis, bounds, place);
+        self.travel.run(axis, speed.abs() * distance.signum(), &standing);
+        self.state = State::Probing;
+        Ok(())
+    }
+
+    fn begin_pulse(
+        &mut self,
+        request: &OperatorRequest,
+        feedback: &Feedback,
+    ) -> Result<(), Refused> {
+        self.may_move()?;
+        self.may_light()?;
+        if feedback.has(status::GATE_INHIBITED) {
+            return Err(Refusal::State.into());
+        }
+        let (power, time) = (request.value, request.second);
+        let safety = &self.machine.operating.safety;
+        at_most(power, safety.test_power)?;
+        at_most(time, safety.test_time)?;
+        let least = self.machine.laser.min_power;
+        if power < least {
+            return Err(Refused::from(Refusal::TooSmall).beyond(power, least));
+        }
+        self.pulse = TestPulse::new(power, Nanoseconds::from_seconds(time));
+        self.state = State::Pulsing;
+        Ok(())
+    }
+
+    /// Whether axes may be moved, or the laser tested, without a stream.
+    fn may_move(&self) -> Result<(), Refused> {
+        self.is_closed()?;
+        if self.intake.started() != 0 { Err(Refusal::State.into()) } else { Ok(()) }
+    }
+
+    /// Whether an axis may go in the direction of `way`, at `speed`.
+    fn may_go(&self, axis: usize, speed: f64, way: f64) -> Result<(), Refused> {
+        self.may_move()?;
+        let most = self.travel.pace(axis).map_or(0.0, |pace| pace.velocity);
+        if !way.is_finite() || way == 0.0 {
+            return Err(Refused::on(Refusal::NotANumber, axis));
+        }
+        at_most(speed.abs(), most)
+            .map_err(|refused| Refused { axis: axis as u32 + 1, ..refused })?;
+        let side = if way < 0.0 { Side::Lower } else { Side::Upper };
+        if self.safety.is_at_limit(axis, side) {
+            return Err(Refused::on(Refusal::LimitSwitch, axis));
+        }
+        let place = self.travel.place(axis, self.feedforward.after());
+        self.is_within(axis, place, way)
+    }
+
+    /// Whether the joint may be at `end`, having come in the direction of `way` [m or rad].
+    fn is_within(&self, axis: usize, end: f64, way: f64) -> Result<(), Refused> {
+        let known = self.reference.homed() & bit(axis) != 0;
+        let Some(limits) = self.machine.axes.get(axis).filter(|_| known) else { return Ok(()) };
+        let [lower, upper] = limits.limits.position;
+        let refuse = |limit| Err(Refused::on(Refusal::SoftLimit, axis).beyond(end, limit));
+        match way {
+            way if way > 0.0 && end > upper => refuse(upper),
+            way if way < 0.0 && end < lower => refuse(lower),
+            _ => Ok(()),
+        }
+    }
+
+    /// The index of the axis that is number `axis` from 1.
+    fn axis(&self, axis: u32) -> Result<usize, Refused> {
+        let axes = self.machine.axes.len().min(MAX_AXES);
+        let index = (axis as usize).checked_sub(1).filter(|index| *index < axes);
+        index.ok_or(Refused::from(Refusal::NoAxis).beyond(f64::from(axis), axes as f64))
+    }
+
+    fn is_not_stopped(&self) -> Result<(), Refused> {
+        if self.safety.is_stopped() { Err(Refusal::EmergencyStop.into()) } else { Ok(()) }
+    }
+
+    /// Whether neither emergency stop nor door nor an interlock is in the way of light.
+    fn may_light(&self) -> Result<(), Refused> {
+        self.is_closed()?;
+        if self.safety.is_interlocked() { Err(Refusal::Interlock.into()) } else { Ok(()) }
+    }
+
+    /// Whether neither emergency stop nor door is in the way of motion.
+    fn is_closed(&self) -> Result<(), Refused> {
+        self.is_not_stopped()?;
+        if self.safety.is_open() {
+            return Err(Refusal::DoorOpen.into());
+        }
+        Ok(())
     }
 }

@@ -8,7 +8,7 @@ use crate::state::{AfterRest, State};
 use crate::supervision::{Finding, Tracking};
 use messages::feedback::status;
 use messages::time::Period;
-use messages::{Cycle, Fault, FaultCode, FaultQuantity, Feedback, Nanoseconds};
+use messages::{Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, Nanoseconds};
 
 /// How long an axis stands still before it counts as at rest without a plan, and as enabled.
 const STANDING: Nanoseconds = Nanoseconds(20_000_000);
@@ -65,13 +65,23 @@ impl Controller {
                 self.finish(false);
                 self.state = State::Idle;
             }
+            State::Homing(stage) => self.home(now, feedback, stage),
+            State::Jogging if self.travel.is_at_rest() => {
+                // Nobody has to speak for an axis that rests.
+                self.dead_man = [None; MAX_AXES];
+                self.state = State::Idle;
+            }
+            State::Probing => self.probe(feedback),
+            State::Pulsing if self.pulse.is_over() => self.state = State::Idle,
             State::Failing { tracking, waited } => {
                 let at_rest = match tracking {
                     Tracking::Sound => self.stands_on_plan() && self.alignment.is_done(),
                     Tracking::Lost => self.supervision.standing() >= self.waits.standing,
                 };
                 self.state = State::Failing { tracking, waited: waited + 1 };
-                if at_rest || waited >= self.waits.patience {
+                if at_rest && tracking == Tracking::Sound && self.halts() {
+                    self.halt(feedback.cycle);
+                } else if at_rest || waited >= self.waits.patience {
                     self.end_in_fault(feedback.cycle);
                 }
             }
@@ -221,7 +231,8 @@ impl Controller {
 
     /// Whether the stream rests, and what a stall left behind has been compensated: without that the next motion would jump by it.
     fn stands_on_plan(&self) -> bool {
-        self.player.is_at_rest() && self.catch_up.is_done() && self.squaring.is_done()
+        let rests = self.squaring.is_done() && self.travel.is_at_rest();
+        self.player.is_at_rest() && self.catch_up.is_done() && rests
     }
 
     /// Whether the stream in hand has been played to its last setpoint, with no light left to make up for.

@@ -8,6 +8,7 @@ use std::mem::{align_of, size_of};
 use iceoryx2::service::header::publish_subscribe::Header;
 use messages::{
     Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress, Setpoint,
+    SimulatedInputs,
 };
 
 use super::page;
@@ -47,7 +48,8 @@ pub(crate) fn pipeline() -> u64 {
         + whole::<ControllerReport>()
         + whole::<DrivesReport>()
         + whole::<PlannerReport>()
-        + whole::<JobOffer>();
+        + whole::<JobOffer>()
+        + whole::<SimulatedInputs>();
     let wakes = 2 * wake();
     channels + wakes + 2 * operator() + holder() + NODES * node()
 }
@@ -55,7 +57,7 @@ pub(crate) fn pipeline() -> u64 {
 /// What the holder creates: for each service a description and the list of its ports, and the
 /// segment that counts nodes.
 pub(crate) fn holder() -> u64 {
-    const CHANNELS: u64 = 8;
+    const CHANNELS: u64 = 9;
     (2 * (CHANNELS + OTHER_SERVICES) + 1) * page()
 }
 
@@ -145,6 +147,7 @@ mod tests {
         open::<DrivesReport>(&domain, &mut ports);
         open::<PlannerReport>(&domain, &mut ports);
         open::<JobOffer>(&domain, &mut ports);
+        open::<SimulatedInputs>(&domain, &mut ports);
         for wake in [Wake::Feedback, Wake::Command] {
             ports.push(Box::new(domain.listener(wake).unwrap()));
             ports.push(Box::new(domain.notifier(wake).unwrap()));

@@ -1,0 +1,260 @@
+//! Homing, jogging, probing, and what the inputs do to them.
+
+use super::Controller;
+use crate::feedforward::Planned;
+use crate::homing::{GroupOutcome, Seen};
+use crate::reference::bit;
+use crate::squaring::Squaring;
+use crate::state::{AfterRest, HomingStage, State};
+use crate::supervision::Finding;
+use machine::operating::{DoorAction, Side, StopCategory};
+use messages::{
+    CommandMode, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, Nanoseconds,
+};
+
+/// A way until the probe touches, and where it did.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Probing {
+    axis: usize,
+    /// How far the joint may go [m or rad].
+    bounds: [f64; 2],
+    /// Where the joint was in the measurement before [m or rad].
+    before: f64,
+    found: Option<f64>,
+}
+
+impl Probing {
+    pub(super) fn new(axis: usize, bounds: [f64; 2], place: f64) -> Self {
+        Self { axis, bounds, before: place, found: None }
+    }
+
+    /// The axis that was probed last, from 1; 0 for none.
+    pub(super) fn found_axis(&self) -> u32 {
+        if self.found.is_some() { self.axis as u32 + 1 } else { 0 }
+    }
+
+    /// Where the joint was when the probe touched [m or rad].
+    pub(super) fn found(&self) -> f64 {
+        self.found.unwrap_or_default()
+    }
+}
+
+impl Controller {
+    /// Takes the references that were found in the cycle before: the same places have other numbers.
+    pub(super) fn refer(&mut self) {
+        if let Some(shift) = self.reference.apply() {
+            self.feedforward.shift(&shift);
+            self.travel.shift(&shift);
+        }
+    }
+
+    /// Axes whose soft limits hold: those that know their place, and do not look for it.
+    pub(super) fn bounded(&self) -> u32 {
+        if matches!(self.state, State::Homing(_)) { 0 } else { self.reference.homed() }
+    }
+
+    /// Goes on by one cycle where axes are moved without a stream, or stands.
+    pub(super) fn travel_on(&mut self) -> Planned {
+        let standing = *self.feedforward.after();
+        if self.travel.is_at_rest() {
+            return standing;
+        }
+        self.watch_dead_man();
+        self.keep_within_limits(&standing);
+        let mut is_reached = true;
+        let weight = |planned: &mut Planned| is_reached = self.standing.bear(planned);
+        let planned = self.travel.advance(weight).unwrap_or(standing);
+        if !is_reached {
+            self.travel.stop_all();
+        }
+        planned
+    }
+
+    /// Stops the axes that nobody has spoken for.
+    fn watch_dead_man(&mut self) {
+        for (axis, left) in self.dead_man.iter_mut().enumerate() {
+            *left = match *left {
+                Some(0) => {
+                    self.travel.stop(axis);
+                    None
+                }
+                Some(left) => Some(left - 1),
+                None => None,
+            };
+        }
+    }
+
+    /// Keeps jogged and probing axes within what they may go to.
+    fn keep_within_limits(&mut self, standing: &Planned) {
+        let bounded = self.bounded();
+        for (index, axis) in self.machine.axes.iter().enumerate().take(MAX_AXES) {
+            if bounded & bit(index) != 0 {
+                self.travel.keep_within(index, axis.limits.position, standing);
+            }
+        }
+        if self.state == State::Probing {
+            self.travel.keep_within(self.probing.axis, self.probing.bounds, standing);
+        }
+    }
+
+    /// Whatever moves without a stream comes to rest, and light is out.
+    pub(super) fn give_up_travel(&mut self) {
+        self.travel.stop_all();
+        self.dead_man = [None; MAX_AXES];
+        self.pulse = Default::default();
+    }
+
+    /// Reacts to what the inputs say.
+    pub(super) fn heed_inputs(&mut self, now: Nanoseconds, feedback: &Feedback) {
+        if self.state.mode() == CommandMode::Disabled {
+            return;
+        }
+        if self.safety.is_stopped() && !matches!(self.state, State::Failing { .. } | State::Halted)
+        {
+            self.fail(Finding::sound(Fault::new(FaultCode::EmergencyStop)), now);
+        }
+        if self.safety.is_stopped() && self.safety.category() == StopCategory::Zero {
+            self.end_in_fault(feedback.cycle);
+            return;
+        }
+        self.heed_limits(now);
+        if self.safety.is_open() {
+            self.heed_door(now);
+        }
+        if self.safety.is_dark() {
+            match self.state {
+                State::Running | State::Holding(_) => {
+                    self.player.hold();
+                    self.state = State::Holding(AfterRest::Wait);
+                }
+                State::Pulsing => {
+                    self.give_up_travel();
+                    self.state = State::Idle;
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn heed_door(&mut self, now: Nanoseconds) {
+        let plays = matches!(self.state, State::Running | State::Holding(_));
+        if plays && self.safety.action() == DoorAction::Stop {
+            self.fail(Finding::sound(Fault::new(FaultCode::DoorOpened)), now);
+        }
+        if matches!(self.state, State::Homing(_) | State::Probing | State::Jogging) {
+            self.give_up_travel();
+            self.state = State::Jogging;
+        }
+    }
+
+    /// An axis that moves on towards the limit switch that it is on must be stopped by its drive.
+    fn heed_limits(&mut self, now: Nanoseconds) {
+        if self.safety.limited().is_none() || !self.state.follows() {
+            return;
+        }
+        for index in 0..self.machine.axes.len().min(MAX_AXES) {
+            let speed = self.joint_speed(index);
+            let side = if speed < 0.0 { Side::Lower } else { Side::Upper };
+            if speed != 0.0 && self.safety.is_at_limit(index, side) {
+                let fault = Fault::new(FaultCode::HardLimit).on_axis(index);
+                let place = self.travel.place(index, self.feedforward.now());
+                self.fail(Finding::lost(fault.with(FaultQuantity::Position, place)), now);
+                return;
+            }
+        }
+    }
+
+    /// How fast the plan has the joint of an axis go on [joint units/s].
+    fn joint_speed(&self, axis: usize) -> f64 {
+        let speed = &self.feedforward.after().speed;
+        let own = self.machine.actuators.iter().zip(speed).filter(|(it, _)| it.axis == axis);
+        own.map(|(it, speed)| it.share * (speed * it.ratio)).sum()
+    }
+
+    /// Whether the latched fault leaves the axes powered at rest.
+    pub(super) fn halts(&self) -> bool {
+        self.fault.code() == FaultCode::EmergencyStop && self.safety.category() == StopCategory::Two
+    }
+
+    /// At rest and powered, with the fault latched; a stream in hand is given up.
+    pub(super) fn halt(&mut self, cycle: Cycle) {
+        self.state = State::Halted;
+        if self.intake.started() != 0 {
+            self.give_up(cycle);
+        }
+    }
+
+    /// Goes on with homing.
+    pub(super) fn home(&mut self, now: Nanoseconds, feedback: &Feedback, stage: HomingStage) {
+        match stage {
+            HomingStage::Searching => {
+                let seen = Seen {
+                    inputs: feedback.inputs,
+                    angle: &feedback.position,
+                    current: &feedback.current,
+                    standing: self.feedforward.after(),
+                };
+                match self.homing.step(&seen, &mut self.travel) {
+                    GroupOutcome::Searching => {}
+                    GroupOutcome::Found(axis, shift) => {
+                        self.reference.shift(&shift);
+                        self.reference.found(axis);
+                    }
+                    GroupOutcome::Group => {
+                        self.state = State::Homing(HomingStage::Squaring { begun: false });
+                    }
+                    GroupOutcome::Lost(axis, way, most) => {
+                        let fault = Fault::new(FaultCode::HomingFailed).on_axis(axis);
+                        let fault = fault.beyond(FaultQuantity::SearchDistance, way, most);
+                        self.fail(Finding::sound(fault), now);
+                    }
+                }
+            }
+            HomingStage::Squaring { begun: false } => {
+                self.squaring = Squaring::new(&self.machine, self.feedforward.after());
+                self.state = State::Homing(HomingStage::Squaring { begun: true });
+            }
+            HomingStage::Squaring { begun: true } if self.squaring.is_done() => {
+                if self.homing.next_group() {
+                    self.state = State::Homing(HomingStage::Searching);
+                } else {
+                    self.go_home();
+                    self.state = State::Homing(HomingStage::Returning);
+                }
+            }
+            HomingStage::Returning if self.travel.is_at_rest() => self.state = State::Idle,
+            HomingStage::Squaring { .. } | HomingStage::Returning => {}
+        }
+    }
+
+    /// Sends the axes that were homed to where they stand at home.
+    fn go_home(&mut self) {
+        let standing = *self.feedforward.after();
+        for axis in 0..self.machine.axes.len().min(MAX_AXES) {
+            if !self.homing.took_part(axis) {
+                continue;
+            }
+            let home = self.machine.home_joints.get(axis).copied().unwrap_or_default();
+            let way = home - self.travel.place(axis, &standing);
+            if way != 0.0 {
+                self.travel.go(axis, way, self.homing.speed(axis), &standing);
+            }
+        }
+    }
+
+    /// Goes on with probing.
+    pub(super) fn probe(&mut self, feedback: &Feedback) {
+        let Probing { axis, before, found, .. } = self.probing;
+        let own =
+            self.machine.actuators.iter().zip(&feedback.position).filter(|(it, _)| it.axis == axis);
+        let place: f64 = own.map(|(it, angle)| it.share * (angle * it.ratio)).sum();
+        if found.is_none() && self.safety.probe() == Some(true) {
+            self.probing.found = Some((before + place) / 2.0);
+            self.travel.stop(axis);
+        }
+        self.probing.before = place;
+        if self.travel.is_at_rest() {
+            self.state = State::Idle;
+        }
+    }
+}

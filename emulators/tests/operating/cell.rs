@@ -1,0 +1,190 @@
+//! A machine that is operated: controller, drives and plant in one process, with switches.
+
+use controller::{Controller, Inputs, Outputs, Peers};
+use drives::bridge::BridgeOptions;
+use drives::{Bridge, Deadlines, PlantOptions, SimulatedPlant};
+use machine::Machine;
+use messages::time::SETPOINT_PERIOD;
+use messages::{
+    Command, ControllerState, Feedback, Nanoseconds, OperatorReply, OperatorRequest, OperatorVerb,
+    Progress, Refusal,
+};
+
+const CARTESIAN: &str = include_str!("../../../machines/cartesian.toml");
+
+/// Switches at both ends, an index on y, a probe at 150 mm of x, a door, an interlock and an emergency stop.
+const SWITCHES: &str = r#"
+[inputs.x_home]
+function = "home"
+axis = "x"
+at = "-2 mm"
+[inputs.x_min]
+function = "limit"
+axis = "x"
+side = "lower"
+at = "-6 mm"
+[inputs.x_max]
+function = "limit"
+axis = "x"
+side = "upper"
+at = "206 mm"
+[inputs.y_home]
+function = "home"
+axis = "y"
+side = "upper"
+at = "198 mm"
+[inputs.y_index]
+function = "index"
+axis = "y"
+at = "0 mm"
+[inputs.estop]
+function = "estop"
+active = "low"
+[inputs.door]
+function = "door"
+[inputs.chiller]
+function = "interlock"
+[inputs.probe]
+function = "probe"
+axis = "x"
+side = "upper"
+at = "150 mm"
+[axis.x.homing]
+position = "-2 mm"
+speed = "50 mm/s"
+latch_speed = "2 mm/s"
+[axis.y.homing]
+method = "index"
+direction = "upper"
+position = "200 mm"
+speed = "50 mm/s"
+latch_speed = "2 mm/s"
+order = 1
+"#;
+
+pub const X: u32 = 1;
+pub const Y: u32 = 2;
+pub const ESTOP: u64 = 1 << 5;
+pub const DOOR: u64 = 1 << 6;
+pub const CHILLER: u64 = 1 << 7;
+
+/// The operated machine, with `more` in its file.
+pub fn machine(more: &str) -> Machine {
+    Machine::parse("cell.toml", &format!("{CARTESIAN}{SWITCHES}{more}"), &[]).unwrap()
+}
+
+pub struct Cell {
+    pub controller: Controller,
+    pub bridge: Bridge,
+    pub outputs: Outputs,
+    pub progress: Progress,
+    now: Nanoseconds,
+    /// What the last two commands were.
+    pub before: [Command; 2],
+}
+
+impl Cell {
+    pub fn new(machine: &Machine) -> Self {
+        let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
+        let options =
+            BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, timing: machine.realtime };
+        Self {
+            controller: Controller::new(machine),
+            bridge: Bridge::new(port, options),
+            outputs: Outputs::default(),
+            progress: Progress::default(),
+            now: Nanoseconds(0),
+            before: [Command::default(); 2],
+        }
+    }
+
+    /// Enabled, and idle.
+    pub fn enabled(machine: &Machine) -> Self {
+        let mut cell = Self::new(machine);
+        cell.run(3);
+        cell.accept(OperatorVerb::Enable, 0, 0.0, 0.0);
+        cell.until(ControllerState::Idle, 3000);
+        cell
+    }
+
+    /// Homed, and at home.
+    pub fn homed(machine: &Machine) -> Self {
+        let mut cell = Self::enabled(machine);
+        cell.accept(OperatorVerb::Home, 0, 0.0, 0.0);
+        cell.until(ControllerState::Idle, 60_000);
+        assert_eq!(cell.progress.homed & 3, 3);
+        cell
+    }
+
+    pub fn cycle(&mut self, request: Option<OperatorRequest>) -> &Command {
+        self.now = self.now + SETPOINT_PERIOD;
+        self.bridge.begin(self.now, self.now);
+        let feedback = self.bridge.feedback();
+        let inputs = Inputs {
+            feedback,
+            received: self.now,
+            setpoints: &[],
+            request,
+            peers: Peers::default(),
+        };
+        self.before = [self.before[1], self.outputs.command];
+        self.controller.step(self.now, &inputs, &mut self.outputs);
+        self.progress = self.outputs.progress.unwrap_or(self.progress);
+        self.bridge.latch(&self.outputs.command, self.now);
+        self.bridge.finish(self.now);
+        &self.outputs.command
+    }
+
+    pub fn run(&mut self, cycles: u32) {
+        (0..cycles).for_each(|_| {
+            self.cycle(None);
+        });
+    }
+
+    pub fn until(&mut self, state: ControllerState, most: u32) {
+        for _ in 0..most {
+            if self.state() == state {
+                self.run(6);
+                return;
+            }
+            self.cycle(None);
+        }
+        panic!("{:?}, not {state:?}: {:?}", self.state(), self.outputs.command.fault);
+    }
+
+    pub fn ask(&mut self, verb: OperatorVerb, axis: u32, value: f64, second: f64) -> OperatorReply {
+        let request =
+            OperatorRequest { verb: verb as u32, ticket: 9, axis, value, second, reserved: 0 };
+        self.cycle(Some(request));
+        self.outputs.reply.unwrap()
+    }
+
+    pub fn accept(&mut self, verb: OperatorVerb, axis: u32, value: f64, second: f64) {
+        let reply = self.ask(verb, axis, value, second);
+        assert_eq!(reply.accepted, 1, "{verb:?}: {reply:?}");
+    }
+
+    pub fn refuse(&mut self, verb: OperatorVerb, axis: u32, value: f64, second: f64) -> Refusal {
+        let reply = self.ask(verb, axis, value, second);
+        assert_eq!(reply.accepted, 0, "{verb:?}");
+        Refusal::from_wire(reply.refusal)
+    }
+
+    pub fn state(&self) -> ControllerState {
+        self.outputs.command.state()
+    }
+
+    pub fn feedback(&self) -> &Feedback {
+        self.bridge.feedback()
+    }
+
+    /// Where the plan has a joint now [m].
+    pub fn place(&self, axis: usize) -> f64 {
+        self.outputs.command.tool[axis]
+    }
+
+    /// Where the joint really is [m].
+    pub fn truth(&self, axis: usize) -> f64 {
+        self.feedback().tool[axis]
+    }
+}
