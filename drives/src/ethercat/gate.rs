@@ -72,7 +72,9 @@ mod tests {
         assert!(!bits(&LaserCycle::OFF, 100).contains(&true));
         let lit = bits(&laser(3, &[]), 100);
         assert_eq!(lit.iter().position(|bit| !bit), Some(99));
-        assert_eq!(bits(&laser(3, &[(400_000, 0)]), 1), [true]);
+        // One sample: a change before the middle of the cycle is made at its beginning, a later one in the next.
+        assert_eq!(bits(&laser(3, &[(400_000, 0)]), 1), [false]);
+        assert_eq!(bits(&laser(3, &[(600_000, 0)]), 1), [true]);
         assert_eq!(bits(&laser(0, &[(600_000, 4)]), 1), [false]);
     }
 
