@@ -405,7 +405,7 @@ impl Supervision {
         }
     }
 
-    /// The first actuator that has moved by more than an encoder count or so within [`STANDING_TIME`] or a
+    /// The first actuator that has moved by more than an encoder count or so within `STANDING_TIME` or a
     /// cycle, with its speed and what counts as standing [joint units/s].
     pub fn moving(&self) -> Option<(usize, f64, f64)> {
         let time = self.timing.period.seconds();

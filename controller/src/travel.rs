@@ -1,8 +1,8 @@
 //! Motions of single joints that no stream asks for: homing, jogging, probing.
 //!
-//! Each joint follows a [`Course`]: from rest to rest by a quintic, or from however it moves to another speed by
+//! Each joint follows a `Course`: from rest to rest by a quintic, or from however it moves to another speed by
 //! a cubic of the velocity. Both have their limits in closed form, end exactly, and need no memory. Limits are
-//! those of the axis and, where the joint slides, of the path; an axis without any takes [`RISE`] to its
+//! those of the axis and, where the joint slides, of the path; an axis without any takes `RISE` to its
 //! largest speed.
 
 use crate::feedforward::Planned;

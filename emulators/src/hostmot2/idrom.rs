@@ -16,7 +16,7 @@ const PINS_OFFSET: usize = 0x200;
 /// Its end: nothing else is read below the watchdog.
 const END: usize = 0x0c00;
 
-/// Addresses 0 to [`END`], read only.
+/// Addresses 0 to `END`, read only.
 #[derive(Debug, Clone)]
 pub struct Idrom(Vec<u8>);
 

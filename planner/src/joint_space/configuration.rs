@@ -463,7 +463,9 @@ mod tests {
     fn the_arm_changes_sides_where_a_path_goes_through_the_centre() {
         let [from, to] = past_the_centre(0.0);
         assert!((to[0] + from[0]).abs() < 1e-9, "{from:?} {to:?}");
-        assert!((to[1] - from[1] - from[0].abs()).abs() < 1e-9, "{from:?} {to:?}");
+        // The table goes on by half of what the arm turns: θ₂ = θ₁/2 + π/2 − φ on a line in direction φ.
+        let arm = to[0] - from[0];
+        assert!((to[1] - from[1] - arm / 2.0).abs() < 1e-9, "{from:?} {to:?}");
     }
 
     #[test]
