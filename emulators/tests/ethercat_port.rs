@@ -111,9 +111,14 @@ struct Bench {
 
 impl Bench {
     fn new(mode: &str, rates: Rates) -> Self {
+        Self::on(mode, rates, 0)
+    }
+
+    /// The same, with the slaves' clocks drawn by `seed`; 0 for clocks that run right.
+    fn on(mode: &str, rates: Rates, seed: u64) -> Self {
         let machine = machine(mode);
         assert!(matches!(machine.drives.kind, DrivesKind::Ethercat(_)));
-        let layout = Layout { seed: 0, ..Layout::default() };
+        let layout = Layout { seed, ..Layout::default() };
         let segment = Segment::new(&machine, &layout, PlantOptions::default()).expect("a line");
         let link = Link::new(segment, rates, 7);
         let cable = Cable(Arc::new(Mutex::new(World { link, now: Nanoseconds(0) })));
@@ -254,4 +259,27 @@ fn a_bridge_that_dies_leaves_the_line_dark() {
     bench.cable.until(Nanoseconds(died + 100 * PERIOD));
     let last = bench.cable.lit().last().map_or(0, |span| span[1]);
     assert!(last <= died + LATENCY + PERIOD, "{last} {died}");
+}
+
+#[test]
+fn a_clock_that_has_drifted_away_is_a_fault_and_dark() {
+    let mut bench = Bench::on("position", Rates::default(), 1);
+    bench.enable();
+    let mut faulted = None;
+    for cycle in 0..60_000_u32 {
+        bench.cycle(&bench.driven(0.0, 0.0, laser(1, &[])));
+        if bench.measurement.fault.is_some() {
+            faulted = Some(cycle);
+            break;
+        }
+    }
+    assert!(faulted.is_some_and(|cycle| cycle > 1000), "{faulted:?}: {:?}", bench.port.link());
+    let apart = bench.port.link().clock_error_max;
+    assert!((200_000..201_000).contains(&apart), "{apart}");
+    let at = bench.deadline.0;
+    for _ in 0..5 {
+        bench.cycle(&bench.driven(0.0, 0.0, laser(1, &[])));
+    }
+    let last = bench.cable.lit().last().map_or(0, |span| span[1]);
+    assert!(last <= at + LATENCY + PERIOD, "{last} {at}");
 }

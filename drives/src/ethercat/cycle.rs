@@ -22,6 +22,10 @@ const MOST_STARTING: u32 = 5000;
 /// A word of the port's own: see `machine::drives::fault_text`.
 const NO_ANSWER: f64 = 1.0;
 const NOT_OPERATIONAL: f64 = 2.0;
+const NOT_SYNCHRONOUS: f64 = 3.0;
+/// What of a period the clocks may be apart: farther, a frame comes to the sync signal of another cycle, and
+/// the gate's samples belong to another place.
+const APART: f64 = 0.2;
 /// AL control: to OP; to SAFE-OP, with an error acknowledged; to INIT.
 const OPERATIONAL: u16 = 0x08;
 const ACKNOWLEDGE: u16 = 0x14;
@@ -132,7 +136,7 @@ impl BusCycle {
 
     /// The first deadline from `from` on at which the latency is that of the machine file.
     pub fn first_deadline(&self, from: Nanoseconds) -> Nanoseconds {
-        let phase = (from.0 + self.offset).rem_euclid(self.period.0.max(1));
+        let phase = from.0.wrapping_add(self.offset).rem_euclid(self.period.0.max(1));
         Nanoseconds(from.0 + (self.period.0 - phase).rem_euclid(self.period.0.max(1)))
     }
 
@@ -218,7 +222,12 @@ impl BusCycle {
                 is_measured = true;
                 if let Some(time) = response.extra {
                     let ours = (start.0 + end.0) / 2;
-                    self.clock_offset = Nanoseconds((time as i64).wrapping_sub(ours) - self.offset);
+                    self.clock_offset =
+                        Nanoseconds((time as i64).wrapping_sub(ours).wrapping_sub(self.offset));
+                }
+                let apart = self.clock_offset.0.unsigned_abs() as f64 / self.period.0 as f64;
+                if apart > APART && self.mode != CommandMode::Disabled {
+                    self.fail(Fault::new(FaultCode::DriveFault), NOT_SYNCHRONOUS);
                 }
                 let all = response.subdevice_states.iter();
                 let is_operational =

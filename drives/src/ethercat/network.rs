@@ -47,7 +47,7 @@ const TENTHS: u16 = 2498;
 /// The bit of a sync manager's control byte that lets the watchdog watch it.
 const WATCHED: u8 = 0x40;
 /// How long after they are set up the sync signals begin.
-const AHEAD: u64 = 100_000_000;
+const AHEAD: i64 = 100_000_000;
 /// How often the clock of the bus is read for the quickest answer.
 const READINGS: u32 = 16;
 /// How long a reading may take.
@@ -215,7 +215,7 @@ pub fn offset(network: &Network, wire: &mut Wire) -> Option<i64> {
         let after = wire.now();
         let took = after - before;
         if best.is_none_or(|(least, _)| took < least) {
-            best = Some((took, time as i64 - (before.0 + after.0) / 2));
+            best = Some((took, (time as i64).wrapping_sub((before.0 + after.0) / 2)));
         }
     }
     best.map(|(_, offset)| offset)
@@ -386,7 +386,10 @@ async fn start_sync(
     };
     let clock_of = group.subdevice(main, reference).asked(WHAT)?;
     let time = clock_of.register_read::<u64>(register::SYSTEM_TIME).await.asked(WHAT)?;
-    let start = (time + AHEAD).div_ceil(period) * period + wanted.shift.0.unsigned_abs();
+    // The time of a bus is 64 bits that go round: it is reckoned as the number that the slaves compare.
+    let ahead = (time as i64).wrapping_add(AHEAD);
+    let deadline = ahead.wrapping_add(period as i64).wrapping_sub(ahead.rem_euclid(period as i64));
+    let start = deadline.wrapping_add(wanted.shift.0) as u64;
     for (index, samples) in synced.chain(gate) {
         let slave = group.subdevice(main, index).asked(WHAT)?;
         let sync0 = (period / u64::from(samples)) as u32;
