@@ -1,6 +1,6 @@
 //! The port to FPGA boards with HostMot2 firmware, by LBP16 over UDP.
 //!
-//! - [`lbp16`]: requests and replies; [`link`]: how they travel; [`asking`]: questions before the clock starts.
+//! - [`lbp16`]: requests and replies; [`crate::link`]: how they travel; [`asking`]: questions before the clock starts.
 //! - [`idrom`]: what a board is; [`arming`]: its pins, its clock and its watchdog.
 //! - [`steps`], [`pwm`], [`galvo`], [`encoder`]: the modules that move and measure; [`axes`]: an actuator on
 //!   them; [`path`]: what it is told through a cycle.
@@ -22,7 +22,6 @@ pub mod gate;
 pub mod grid;
 pub mod idrom;
 pub mod lbp16;
-pub mod link;
 pub mod path;
 pub mod port;
 pub mod pwm;

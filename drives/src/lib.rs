@@ -4,6 +4,7 @@
 //! - [`ports`]: the list of the ports that there are.
 //! - [`plant`]: the simulated plant, motors and laser included.
 //! - [`bridge`]: one cycle: apply the latched command, measure, tell.
+//! - [`link`]: how datagrams and frames reach hardware and come back.
 //! - [`watchdog`]: laser off without a fresh command, axes to rest when that lasts too long.
 //! - [`stalls`]: the account of the times in which the cycle stood still.
 //!
@@ -17,6 +18,7 @@ pub mod bridge;
 pub mod ethercat;
 pub mod fired;
 pub mod hostmot2;
+pub mod link;
 pub mod plant;
 pub mod port;
 pub mod ports;

@@ -4,7 +4,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use drives::ethercat::EthercatPort;
-use drives::ethercat::link::FrameLink;
+use drives::link::Link as _;
 use drives::{Actuation, Freshness, Measurement, PlantOptions, Port, Power};
 use emulators::ethercat::faults::Rates;
 use emulators::ethercat::{Framing, Layout, Link, Segment};
@@ -55,7 +55,7 @@ impl Cable {
     }
 }
 
-impl FrameLink for Cable {
+impl drives::link::Link for Cable {
     fn send(&mut self, frame: &[u8]) {
         self.with(|world| world.link.send(frame, Framing::Ethernet, world.now));
     }

@@ -3,9 +3,9 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use drives::hostmot2::link::Link;
 use drives::hostmot2::session::{Counters, Trouble};
 use drives::hostmot2::{Config, Connection, Hostmot2Port};
+use drives::link::Link;
 use drives::{Actuation, Freshness, Measurement, Port};
 use emulators::hostmot2::record::Record;
 use emulators::hostmot2::rig::Rig;

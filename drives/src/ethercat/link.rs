@@ -1,12 +1,12 @@
-//! How Ethernet frames reach the bus and come back.
+//! Ethernet frames of a bus on the links that there are: raw on an interface, or in UDP.
 
-use std::io::ErrorKind;
-use std::net::{SocketAddr, UdpSocket};
-use std::os::fd::AsFd;
+use std::net::SocketAddr;
 
 use messages::Nanoseconds;
+use runtime::clock;
 use runtime::raw_frames::RawFrames;
-use runtime::{clock, ready};
+
+use crate::link::{self, Link, UdpLink};
 
 /// Bytes of an Ethernet header.
 pub const HEADER: usize = 14;
@@ -15,23 +15,10 @@ pub const HEADER: usize = 14;
 const FROM_DATAGRAM: [u8; HEADER] =
     [0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x12, 0x10, 0x10, 0x10, 0x10, 0x10, 0x88, 0xa4];
 
-/// A way to the bus, by which frames may be lost, late, doubled or damaged.
-pub trait FrameLink: Send {
-    /// Sends `frame`, Ethernet header and all, or loses it; does not wait.
-    fn send(&mut self, frame: &[u8]);
-
-    /// The length of the next frame from the bus, put into `buffer`, if one is there or comes before `until`
-    /// on the clock of [`Self::now`].
-    fn receive(&mut self, buffer: &mut [u8], until: Nanoseconds) -> Option<usize>;
-
-    /// The time by which it waits.
-    fn now(&self) -> Nanoseconds;
-}
-
 /// EtherCAT in UDP: a datagram carries what an Ethernet frame would.
 #[derive(Debug)]
 pub struct UdpFrames {
-    socket: UdpSocket,
+    link: UdpLink,
 }
 
 impl UdpFrames {
@@ -40,67 +27,40 @@ impl UdpFrames {
     /// # Errors
     /// What the operating system says.
     pub fn open(address: SocketAddr) -> std::io::Result<Self> {
-        let any: SocketAddr = match address {
-            SocketAddr::V4(_) => (std::net::Ipv4Addr::UNSPECIFIED, 0).into(),
-            SocketAddr::V6(_) => (std::net::Ipv6Addr::UNSPECIFIED, 0).into(),
-        };
-        let socket = UdpSocket::bind(any)?;
-        socket.connect(address)?;
-        socket.set_nonblocking(true)?;
-        Ok(Self { socket })
+        Ok(Self { link: UdpLink::open(address)? })
     }
 }
 
-impl FrameLink for UdpFrames {
+impl Link for UdpFrames {
     fn send(&mut self, frame: &[u8]) {
-        // What is not sent is not answered, and counted as lost.
-        let _ = frame.get(HEADER..).map(|payload| self.socket.send(payload));
+        if let Some(payload) = frame.get(HEADER..) {
+            self.link.send(payload);
+        }
     }
 
     fn receive(&mut self, buffer: &mut [u8], until: Nanoseconds) -> Option<usize> {
         let (header, payload) = buffer.split_at_mut_checked(HEADER)?;
         header.copy_from_slice(&FROM_DATAGRAM);
-        loop {
-            match self.socket.recv(payload) {
-                Ok(length) => return Some(HEADER + length),
-                Err(error) if is_nothing_yet(&error) => {}
-                Err(_) => return None,
-            }
-            if !ready::wait_readable(self.socket.as_fd(), until).ok()? && clock::now() >= until {
-                return None;
-            }
-        }
+        self.link.receive(payload, until).map(|length| HEADER + length)
     }
 
     fn now(&self) -> Nanoseconds {
-        clock::now()
+        self.link.now()
     }
 }
 
-impl FrameLink for RawFrames {
+impl Link for RawFrames {
     fn send(&mut self, frame: &[u8]) {
+        // What is not sent is not answered, and counted as lost.
         let _ = RawFrames::send(self, frame);
     }
 
     fn receive(&mut self, buffer: &mut [u8], until: Nanoseconds) -> Option<usize> {
-        loop {
-            match RawFrames::receive(self, buffer) {
-                Ok(length) => return Some(length),
-                Err(error) if is_nothing_yet(&error) => {}
-                Err(_) => return None,
-            }
-            if !ready::wait_readable(self.as_fd(), until).ok()? && clock::now() >= until {
-                return None;
-            }
-        }
+        let frames = &*self;
+        link::receive(frames, until, || RawFrames::receive(frames, buffer))
     }
 
     fn now(&self) -> Nanoseconds {
         clock::now()
     }
-}
-
-/// Nothing is there, or the other computer says that nobody listens: as silent as a cut cable.
-fn is_nothing_yet(error: &std::io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::ConnectionRefused)
 }

@@ -9,9 +9,10 @@ use messages::{LinkCounters, Nanoseconds};
 use runtime::raw_frames::{ETHERCAT, RawFrames};
 
 use super::cycle::BusCycle;
-use super::link::{FrameLink, UdpFrames};
+use super::link::UdpFrames;
 use super::network::{self, Trouble, Wanted};
 use super::wire::Wire;
+use crate::link::Link;
 use crate::port::{Actuation, ActuatorProfile, Measurement, Port, PortClock, PortError, Profile};
 
 /// Frames under way at once, and bytes of each.
@@ -31,7 +32,7 @@ pub struct EthercatPort {
     bus: Ethercat,
     period: Nanoseconds,
     profile: Profile,
-    link: Option<Box<dyn FrameLink>>,
+    link: Option<Box<dyn Link>>,
     cycle: Option<BusCycle>,
 }
 
@@ -81,12 +82,12 @@ impl EthercatPort {
 
     /// The same by another link than that of the machine file.
     #[must_use]
-    pub fn with_link(mut self, link: Box<dyn FrameLink>) -> Self {
+    pub fn with_link(mut self, link: Box<dyn Link>) -> Self {
         self.link = Some(link);
         self
     }
 
-    fn connect(&mut self) -> Result<Box<dyn FrameLink>, PortError> {
+    fn connect(&mut self) -> Result<Box<dyn Link>, PortError> {
         if let Some(link) = self.link.take() {
             return Ok(link);
         }

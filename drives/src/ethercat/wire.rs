@@ -13,7 +13,8 @@ use std::sync::Arc;
 use ethercrab::{PduRx, PduTx, ReceiveAction};
 use messages::{LinkCounters, Nanoseconds};
 
-use super::link::{FrameLink, HEADER};
+use super::link::HEADER;
+use crate::link::Link;
 
 /// Longest Ethernet frame, without its checksum.
 const LONGEST: usize = 1518;
@@ -25,7 +26,7 @@ const INDEX: usize = HEADER + 3;
 pub struct Wire {
     sender: PduTx<'static>,
     receiver: PduRx<'static>,
-    link: Box<dyn FrameLink>,
+    link: Box<dyn Link>,
     counters: LinkCounters,
     /// Index of the newest frame that was answered.
     answered: Option<u8>,
@@ -36,7 +37,7 @@ pub struct Wire {
 
 impl Wire {
     /// The frames of `sender` and `receiver` on `link`.
-    pub fn new(sender: PduTx<'static>, receiver: PduRx<'static>, link: Box<dyn FrameLink>) -> Self {
+    pub fn new(sender: PduTx<'static>, receiver: PduRx<'static>, link: Box<dyn Link>) -> Self {
         let (counters, answered) = (LinkCounters::default(), None);
         let time = Arc::new(AtomicI64::new(link.now().0));
         Self { sender, receiver, link, counters, answered, time, buffer: [0; LONGEST] }

@@ -4,7 +4,7 @@ use messages::Nanoseconds;
 
 use super::idrom::BoardError;
 use super::lbp16::{LONGEST, MOST_ITEMS, Request, Space};
-use super::link::Link;
+use crate::link::Link;
 
 /// How long a board may take for one answer.
 const PATIENCE: Nanoseconds = Nanoseconds(200_000_000);

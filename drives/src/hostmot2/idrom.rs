@@ -1,7 +1,7 @@
 //! What a board is: its name, its modules and its pins, read from the board itself and checked.
 
 use super::asking::Asking;
-use super::link::Link;
+use crate::link::Link;
 
 /// What stands at [`COOKIE_AT`] of every HostMot2 board, and the name behind it.
 const COOKIE: u32 = 0x55aa_cafe;

@@ -13,10 +13,10 @@ use super::config::{Config, Connection};
 use super::gate::Gate;
 use super::idrom::{Board, BoardError, Kind};
 use super::lbp16::{self, Reply, Request};
-use super::link::{Link, UdpLink};
 use super::pwm::Pwms;
 use super::session::{Counters, Parts, Session, Trouble};
 use crate::fired::Fired;
+use crate::link::{Link, UdpLink};
 use crate::port::{Actuation, ActuatorProfile, Measurement, Port, PortClock, PortError, Profile};
 
 /// An edge of the gate is at most half of it away: clocks of 10 ns, and what the board's clock is off by.

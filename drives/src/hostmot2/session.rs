@@ -7,10 +7,10 @@ use super::axes::{Drive, Refusal};
 use super::gate::{Gate, LEAD, Light};
 use super::grid::Grid;
 use super::lbp16::{LONGEST, Reply, Request};
-use super::link::Link;
 use super::path::is_driven;
 use super::pwm::Pwms;
 use crate::fired::Fired;
+use crate::link::Link;
 use crate::port::{Actuation, Freshness, Measurement, Power};
 use crate::watchdog::impossible_light;
 

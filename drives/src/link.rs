@@ -1,4 +1,4 @@
-//! How datagrams reach a board and come back.
+//! How datagrams and frames reach hardware and come back.
 
 use std::io::ErrorKind;
 use std::net::{SocketAddr, UdpSocket};
@@ -7,12 +7,12 @@ use std::os::fd::AsFd;
 use messages::Nanoseconds;
 use runtime::{clock, ready};
 
-/// A way to a board, by which datagrams may be lost, late or doubled.
+/// A way to hardware, by which what is sent, datagrams or Ethernet frames, may be lost, late, doubled or damaged.
 pub trait Link: Send {
     /// Sends `datagram`, or loses it; does not wait.
     fn send(&mut self, datagram: &[u8]);
 
-    /// The length of the next datagram from the board, put into `buffer`, if one is there or comes before
+    /// The length of the next datagram from the hardware, put into `buffer`, if one is there or comes before
     /// `until` on the clock of [`Self::now`].
     fn receive(&mut self, buffer: &mut [u8], until: Nanoseconds) -> Option<usize>;
 
@@ -27,7 +27,7 @@ pub struct UdpLink {
 }
 
 impl UdpLink {
-    /// A socket that hears the board at `address` only.
+    /// A socket that hears `address` only.
     ///
     /// # Errors
     /// What the operating system says.
@@ -50,22 +50,32 @@ impl Link for UdpLink {
     }
 
     fn receive(&mut self, buffer: &mut [u8], until: Nanoseconds) -> Option<usize> {
-        loop {
-            match self.socket.recv(buffer) {
-                Ok(length) => return Some(length),
-                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-                // The board's computer says that nobody listens there: as silent as a cut cable.
-                Err(error) if error.kind() == ErrorKind::ConnectionRefused => {}
-                Err(_) => return None,
-            }
-            if !ready::wait_readable(self.socket.as_fd(), until).ok()? && self.now() >= until {
-                return None;
-            }
-        }
+        let socket = &self.socket;
+        receive(socket, until, || socket.recv(buffer))
     }
 
     fn now(&self) -> Nanoseconds {
         clock::now()
+    }
+}
+
+/// The length of what `read` gives of `socket`, at once or when it comes before `until`.
+pub(crate) fn receive(
+    socket: &impl AsFd,
+    until: Nanoseconds,
+    mut read: impl FnMut() -> std::io::Result<usize>,
+) -> Option<usize> {
+    loop {
+        match read() {
+            Ok(length) => return Some(length),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+            // The other computer says that nobody listens there: as silent as a cut cable.
+            Err(error) if error.kind() == ErrorKind::ConnectionRefused => {}
+            Err(_) => return None,
+        }
+        if !ready::wait_readable(socket.as_fd(), until).ok()? && clock::now() >= until {
+            return None;
+        }
     }
 }
 
