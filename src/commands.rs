@@ -9,6 +9,7 @@ pub mod figures;
 pub mod kinematics;
 pub mod machine;
 pub mod manual;
+pub mod motion;
 pub mod operating;
 pub mod operator;
 pub mod path_check;

@@ -17,7 +17,7 @@ pub mod status;
 use crate::exit::Failure;
 use configuration::Configuration;
 use control::JobControl;
-use machine::Machine;
+use machine::{DrivesKind, Machine};
 use messages::time::SETPOINT_TIME;
 use messages::{
     ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorReply, OperatorVerb,
@@ -144,7 +144,7 @@ impl Pipeline {
         for warning in instance.warnings() {
             message::tell(&warning);
         }
-        let machine = configuration.source.machine()?;
+        let machine = configuration.machine()?;
         let domain = Domain::create(instance).map_err(Failure::service)?;
         configuration.write(instance)?;
         let subscriptions = Subscriptions {
@@ -169,7 +169,7 @@ impl Pipeline {
             board.clone(),
             control.clone(),
             &machine,
-            inputs.clone(),
+            (machine.drives.kind == DrivesKind::Simulated).then(|| inputs.clone()),
         );
         let operators = Operators::bind(&domain, answers, owner)?;
         let services = match owner {

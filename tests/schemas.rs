@@ -14,6 +14,7 @@ use graver::commands::check::CheckReport;
 use graver::commands::figures::FiguresReport;
 use graver::commands::kinematics::lines::Reply;
 use graver::commands::machine::NewReport;
+use graver::commands::motion::MotionReply;
 use graver::commands::plan::PlanReport;
 use graver::pipeline::operators::VerbReply;
 use graver::pipeline::status::Status;
@@ -36,6 +37,7 @@ fn schemas() -> Vec<(&'static str, Schema)> {
         ("latency", schema_for!(LatencyReport)),
         ("latency_rates", schema_for!(RatesReport)),
         ("machine_new", schema_for!(NewReport)),
+        ("motion", schema_for!(MotionReply)),
         ("plan", schema_for!(PlanReport)),
         ("reply", schema_for!(VerbReply)),
         ("speed", schema_for!(SpeedReport)),

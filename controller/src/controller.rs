@@ -69,7 +69,7 @@ use machine::{Actuator, ActuatorMode, Machine};
 use messages::feedback::status;
 use messages::{
     ActuatorArray, Command, CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity,
-    Feedback, LaserCycle, MAX_ACTUATORS, MAX_AXES, Nanoseconds, RealtimeFacts,
+    Feedback, LaserCycle, MAX_ACTUATORS, MAX_AXES, MotionEnd, Nanoseconds, RealtimeFacts,
 };
 use transitions::Waits;
 
@@ -110,8 +110,11 @@ pub struct Controller {
     /// What moves without a stream.
     travel: Travel,
     homing: Homing,
-    /// Cycles for which each jogged axis goes on without another word; `None` for one that is not jogged so.
-    dead_man: [Option<u32>; MAX_AXES],
+    /// Of each axis that is jogged for as long as it is asked for.
+    jogs: [Option<operating::Jog>; MAX_AXES],
+    /// Requests of people that were accepted, and how the newest motion by hand ended.
+    requests: u32,
+    motion_end: MotionEnd,
     probing: operating::Probing,
     pulse: TestPulse,
     /// Where the motors stood when they were to be enabled [rad].
@@ -160,7 +163,9 @@ impl Controller {
             safety: Safety::new(machine),
             travel: Travel::new(machine, period.seconds()),
             homing: Homing::new(machine, period.seconds()),
-            dead_man: [None; MAX_AXES],
+            jogs: [None; MAX_AXES],
+            requests: 0,
+            motion_end: MotionEnd::None,
             probing: operating::Probing::default(),
             pulse: TestPulse::default(),
             enabled_at: ActuatorArray::default(),
@@ -233,7 +238,7 @@ impl Controller {
             // The final one too, again and again: who joins late must learn how the stream ended.
             outputs.report = Some(self.statistics.report()).filter(|report| report.stream != 0);
         }
-        let changed = self.state.to_wire() != state_before;
+        let changed = self.state.to_wire() != state_before || outputs.reply.is_some();
         if changed || outputs.report.is_some() || self.cycles.is_multiple_of(self.progress_interval)
         {
             outputs.progress = Some(self.progress(now, &outputs.command));
@@ -310,7 +315,7 @@ impl Controller {
             self.fault = finding.fault.at(now);
         }
         self.player.hold();
-        self.give_up_travel();
+        self.give_up_travel(MotionEnd::Fault);
         self.state = match self.state {
             State::Disabled | State::Faulted => State::Faulted,
             State::Failing { tracking: Tracking::Sound, .. }

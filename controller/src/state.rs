@@ -90,6 +90,11 @@ impl State {
         }
     }
 
+    /// Whether it is a motion, or light, that a person asked for without a stream.
+    pub(crate) fn is_by_hand(self) -> bool {
+        matches!(self, Self::Homing(_) | Self::Jogging | Self::Probing | Self::Pulsing)
+    }
+
     /// Whether the plan holds the axes, so that they must follow it.
     pub(crate) fn follows(self) -> bool {
         match self {

@@ -282,22 +282,42 @@ impl Travel {
     }
 
     /// Stops the joint of `axis` where another cycle would take it beyond `upper`, or `lower`, before it rests
-    /// [m or rad]; the axes stand at `standing` where none moves.
-    pub fn keep_within(&mut self, axis: usize, [lower, upper]: [f64; 2], standing: &Planned) {
+    /// [m or rad], and tells whether it did; the axes stand at `standing` where none moves.
+    pub fn keep_within(&mut self, axis: usize, bounds: [f64; 2], standing: &Planned) -> bool {
         if self.rests(axis) || self.comes_to_rest(axis) {
-            return;
+            return false;
         }
-        let (Some(pace), Some(course)) = (self.paces.get(axis), self.courses.get(axis)) else {
-            return;
-        };
+        let Some(course) = self.courses.get(axis) else { return false };
+        let goes_out = !self.comes_to_rest_within(axis, course, bounds, standing);
+        if goes_out {
+            self.stop(axis);
+        }
+        goes_out
+    }
+
+    /// Whether the joint of `axis`, told to go on at `speed`, could do so for a cycle and come to rest within
+    /// `bounds` [m or rad]; the axes stand at `standing` where none moves.
+    pub fn has_room(&self, axis: usize, speed: f64, bounds: [f64; 2], standing: &Planned) -> bool {
+        let Some(pace) = self.paces.get(axis) else { return false };
+        let speed = speed.clamp(-pace.velocity, pace.velocity);
+        let course = Course::to_speed(self.motion(axis), speed, pace, self.period);
+        self.comes_to_rest_within(axis, &course, bounds, standing)
+    }
+
+    /// Whether the joint of `axis` comes to rest between `lower` and `upper` if it follows `course` for another cycle.
+    fn comes_to_rest_within(
+        &self,
+        axis: usize,
+        course: &Course,
+        [lower, upper]: [f64; 2],
+        standing: &Planned,
+    ) -> bool {
+        let Some(pace) = self.paces.get(axis) else { return false };
         let next = course.at(course.elapsed + 1, self.period);
         let rest = Course::to_speed(next, 0.0, pace, self.period);
         let way = rest.end(self.period) - self.motion(axis).position;
         let end = self.place(axis, standing) + way;
-        let goes_out = (way > 0.0 && end > upper) || (way < 0.0 && end < lower);
-        if goes_out {
-            self.stop(axis);
-        }
+        !((way > 0.0 && end > upper) || (way < 0.0 && end < lower))
     }
 
     /// Goes on by one cycle, to where `weight` [N·m] has to be borne; where that is, `None` where nothing moves.

@@ -25,8 +25,8 @@ pub enum OperatorVerb {
     Start = 8,
     /// Find the reference of the axes whose bits `axis` has, 0 for all, in the machine file's order.
     Home = 9,
-    /// Move axis `axis` at speed `value`, with its sign, for as long as this request is repeated within the
-    /// machine file's `safety.dead_man`; 0 stops it.
+    /// Move axis `axis` at speed `value`, with its sign, for as long as [`Self::JogOn`] comes within the machine
+    /// file's `safety.dead_man`; 0 stops it.
     Jog = 10,
     /// Move axis `axis` on by `value`, at speed `second` at most.
     Step = 11,
@@ -34,6 +34,9 @@ pub enum OperatorVerb {
     TestPulse = 12,
     /// Move axis `axis` on by `value` at speed `second` until the probe touches.
     Probe = 13,
+    /// Go on with the jog of axis `axis` whose reply had the number `value`. One that has ended, for whatever
+    /// reason, is not begun anew.
+    JogOn = 14,
 }
 
 impl OperatorVerb {
@@ -53,6 +56,7 @@ impl OperatorVerb {
             11 => Self::Step,
             12 => Self::TestPulse,
             13 => Self::Probe,
+            14 => Self::JogOn,
             _ => return None,
         })
     }
@@ -87,7 +91,7 @@ sample! {
 sample! {
     /// The controller's answer, given as soon as the request is accepted or refused; its effect
     /// shows in the progress.
-    OperatorReply = "graver.OperatorReply.v2" {
+    OperatorReply = "graver.OperatorReply.v3" {
         /// The request's ticket.
         ticket: u32,
         /// 1 when it is carried out, 0 when it is refused.
@@ -98,8 +102,8 @@ sample! {
         refusal: u32,
         /// The axis that it is refused for, from 1; 0 for none.
         axis: u32,
-        /// Always 0; keeps the sample free of padding.
-        reserved: u32,
+        /// How many requests the controller has accepted, this one included.
+        number: u32,
         /// What was found, as the refusal says.
         found: f64,
         /// What was due, as the refusal says.

@@ -4,7 +4,7 @@ use crate::{Fault, Nanoseconds, sample};
 
 sample! {
     /// Published every few cycles; the planner's licence to send more.
-    Progress = "graver.Progress.v5" {
+    Progress = "graver.Progress.v6" {
         /// When it was published.
         published: Nanoseconds,
         /// The stream in the look-ahead, 0 for none.
@@ -36,6 +36,11 @@ sample! {
         probed_axis: u32,
         /// Where its joint was when the probe touched [m or rad].
         probed: f64,
+        /// How many requests of people the controller has accepted: an [`OperatorReply`](crate::OperatorReply)
+        /// with a greater `number` has no effect here yet.
+        requests: u32,
+        /// A [`MotionEnd`](crate::MotionEnd): how the newest motion by hand ended, 0 while it lasts.
+        motion_end: u32,
         /// A [`ControllerState`](crate::ControllerState).
         state: u32,
         /// 1 if the newest finished stream was played to its end, else 0.

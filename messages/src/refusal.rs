@@ -40,10 +40,16 @@ pub enum Refusal {
     Stream = 15,
     /// What caused the fault is still there.
     StillThere = 16,
+    /// Of a test pulse: power `found`, 0..=1, is outside the range that ends at `limit`.
+    Power = 17,
+    /// Of a test pulse: time `found` [s] is outside the range that ends at `limit`.
+    Time = 18,
+    /// The jog has ended.
+    Ended = 19,
 }
 
 impl Refusal {
-    const ALL: [Self; 17] = [
+    const ALL: [Self; 20] = [
         Self::None,
         Self::State,
         Self::Unknown,
@@ -61,6 +67,9 @@ impl Refusal {
         Self::Touching,
         Self::Stream,
         Self::StillThere,
+        Self::Power,
+        Self::Time,
+        Self::Ended,
     ];
 
     /// The refusal with this number in a sample; an unknown number reads as [`Self::State`].
@@ -88,6 +97,9 @@ impl Refusal {
             Self::Touching => "touching",
             Self::Stream => "stream",
             Self::StillThere => "still_there",
+            Self::Power => "power",
+            Self::Time => "time",
+            Self::Ended => "ended",
         }
     }
 }

@@ -1,161 +1,171 @@
 //! Operating a machine by hand: home, jog, probe, test pulse, and the inputs of a simulated machine.
 
-use super::operator::{ask, send_checked};
+use super::motion::{Motion, nearest_limit, operate, place, places};
+use super::operator::{connect, send_checked};
 use crate::arguments::{
     HomeArguments, InputArguments, InputLevel, InstanceArguments, JogArguments, ProbeArguments,
     TestPulseArguments,
 };
 use crate::exit::{Exit, Failure};
-use crate::output::say;
+use crate::output::{self, say};
 use crate::pipeline::operators::{Request, Verb};
-use machine::quantity::{self, Travel, TravelSpeed};
+use machine::quantity::{self, Kind, Travel, TravelSpeed};
+use runtime::message;
 use runtime::socket::ANSWER_PATIENCE;
-use runtime::{Instance, message, signal};
-use serde_json::{Value, json};
 use std::time::Duration;
 
 /// How often a jog is asked for anew: several times within any dead man's time.
 const JOG_INTERVAL: Duration = Duration::from_millis(20);
 
-/// How often the state is polled until a motion has ended.
-const POLL_INTERVAL: Duration = Duration::from_millis(50);
-
 /// Finds the references of axes, and waits until they are at home.
 ///
 /// # Errors
-/// No pipeline, or one that refuses.
+/// No pipeline.
 pub fn home(arguments: &HomeArguments) -> Result<Exit, Failure> {
-    let request = operate(Verb::Home, arguments.axes.clone(), [0.0; 2]);
-    carry_out(&request, &arguments.instance, "homing").map(|(exit, _)| exit)
+    let request = operate(Verb::Home, &arguments.axes, [0.0; 2], None);
+    let mut motion = match Motion::begin(&request, &arguments.instance)? {
+        Ok(motion) => motion,
+        Err(exit) => return Ok(exit),
+    };
+    let reply = motion.end()?;
+    let done = format!("homed; {}", places(&reply.axes, &arguments.axes));
+    motion.tell(&reply, &done)
 }
 
 /// Moves an axis by a distance, or until Ctrl-C.
 ///
 /// # Errors
-/// No pipeline, or one that refuses; a quantity that is none.
+/// No pipeline; a quantity that is none.
 pub fn jog(arguments: &JogArguments) -> Result<Exit, Failure> {
-    let speed = read::<TravelSpeed>("speed", &arguments.speed)?;
-    let axes = vec![arguments.axis.clone()];
+    let (speed, unit) = read::<TravelSpeed>("speed", &arguments.speed)?;
+    let axes = [arguments.axis.clone()];
     let Some(distance) = &arguments.distance else {
-        return jog_on(&axes, speed, &arguments.instance);
+        return jog_on(&axes, speed, unit, &arguments.instance);
     };
-    let distance = read::<Travel>("distance", distance)?;
-    let request = operate(Verb::Step, axes, [distance, speed.abs()]);
-    carry_out(&request, &arguments.instance, "jogging").map(|(exit, _)| exit)
+    let (distance, of_distance) = read::<Travel>("distance", distance)?;
+    same_unit(of_distance, unit)?;
+    let request = operate(Verb::Step, &axes, [distance, speed.abs()], Some(unit));
+    let mut motion = match Motion::begin(&request, &arguments.instance)? {
+        Ok(motion) => motion,
+        Err(exit) => return Ok(exit),
+    };
+    let reply = motion.end()?;
+    motion.tell(&reply, &places(&reply.axes, &axes))
 }
 
 /// Asks for the motion again and again until a signal comes. Whatever ends this process ends the motion too.
-fn jog_on(axes: &[String], speed: f64, arguments: &InstanceArguments) -> Result<Exit, Failure> {
-    signal::install().map_err(Failure::service)?;
-    let request = operate(Verb::Jog, axes.to_vec(), [speed, 0.0]);
-    let exit = ask(&request, arguments)?;
-    if exit != Exit::Done {
-        return Ok(exit);
+fn jog_on(
+    axes: &[String; 1],
+    speed: f64,
+    unit: &str,
+    arguments: &InstanceArguments,
+) -> Result<Exit, Failure> {
+    let request = operate(Verb::Jog, axes, [speed, 0.0], Some(unit));
+    let mut motion = match Motion::begin(&request, arguments)? {
+        Ok(motion) => motion,
+        Err(exit) => return Ok(exit),
+    };
+    if !arguments.json {
+        say!("{} moves; Ctrl-C stops it", axes[0]);
     }
-    let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
-    while signal::termination().is_none() {
+    let go_on = operate(Verb::JogOn, axes, [f64::from(motion.number), 0.0], None);
+    let mut goes_on = true;
+    while goes_on && !motion.heed_signal() {
         std::thread::sleep(JOG_INTERVAL);
-        let reply = send_checked(&request, &instance, ANSWER_PATIENCE)?;
-        if reply["accepted"].as_bool() != Some(true) {
-            message::tell(&format!("refused: {}", reply["refusal"].as_str().unwrap_or("unknown")));
-            return Ok(Exit::Stopped);
-        }
+        goes_on = motion.ask(&go_on)?;
     }
-    ask(&operate(Verb::Jog, axes.to_vec(), [0.0; 2]), arguments)
+    if goes_on {
+        motion.ask(&operate(Verb::Jog, axes, [0.0; 2], None))?;
+    }
+    let reply = motion.end()?;
+    let axis = reply.axes.get(&axes[0]);
+    match (reply.end.as_deref(), axis.and_then(|axis| Some((axis, nearest_limit(axis)?)))) {
+        (Some("soft_limit"), Some((axis, limit))) => {
+            if arguments.json {
+                output::json(&reply)?;
+            } else {
+                let limit = place(limit, &axis.unit);
+                say!("{}: its soft limit is {limit}", places(&reply.axes, axes));
+            }
+            Ok(Exit::Done)
+        }
+        _ => motion.tell(&reply, &places(&reply.axes, axes)),
+    }
 }
 
 /// Lights the laser for a moment.
 ///
 /// # Errors
-/// No pipeline, or one that refuses; a quantity that is none.
+/// No pipeline; a quantity that is none.
 pub fn test_pulse(arguments: &TestPulseArguments) -> Result<Exit, Failure> {
     let power = quantity::read_share(&arguments.power)
         .map_err(|error| Failure::bad_input(format!("power {:?}: {error}", arguments.power)))?;
-    let time = read::<quantity::Duration>("time", &arguments.time)?;
-    ask(&operate(Verb::TestPulse, Vec::new(), [power, time]), &arguments.instance)
+    let (time, _) = read::<quantity::Duration>("time", &arguments.time)?;
+    let request = operate(Verb::TestPulse, &[], [power, time], None);
+    let mut motion = match Motion::begin(&request, &arguments.instance)? {
+        Ok(motion) => motion,
+        Err(exit) => return Ok(exit),
+    };
+    let reply = motion.end()?;
+    motion.tell(&reply, &format!("lit for {} ms at {} %", time * 1e3, power * 100.0))
 }
 
 /// Moves an axis until the probe touches, and says where.
 ///
 /// # Errors
-/// No pipeline, or one that refuses; a quantity that is none.
+/// No pipeline; a quantity that is none.
 pub fn probe(arguments: &ProbeArguments) -> Result<Exit, Failure> {
-    let distance = read::<Travel>("distance", &arguments.distance)?;
-    let speed = read::<TravelSpeed>("speed", &arguments.speed)?;
-    let request = operate(Verb::Probe, vec![arguments.axis.clone()], [distance, speed.abs()]);
-    let (exit, status) = carry_out(&request, &arguments.instance, "probing")?;
-    if exit != Exit::Done {
-        return Ok(exit);
-    }
-    match status["probed"].as_f64() {
-        Some(place) => {
-            say!("touched at {:.4} mm", place * 1e3);
-            Ok(Exit::Done)
-        }
-        None => {
-            message::tell("the probe did not touch");
-            Ok(Exit::Stopped)
-        }
-    }
+    let (distance, unit) = read::<Travel>("distance", &arguments.distance)?;
+    let (speed, of_speed) = read::<TravelSpeed>("speed", &arguments.speed)?;
+    same_unit(unit, of_speed)?;
+    let axes = [arguments.axis.clone()];
+    let request = operate(Verb::Probe, &axes, [distance, speed.abs()], Some(unit));
+    let mut motion = match Motion::begin(&request, &arguments.instance)? {
+        Ok(motion) => motion,
+        Err(exit) => return Ok(exit),
+    };
+    let mut reply = motion.end()?;
+    reply.probed = if reply.end.as_deref() == Some("reached") { motion.probed()? } else { None };
+    let touched = reply.probed.as_ref().map(|it| place(it.position, &it.unit));
+    let places = places(&reply.axes, &axes);
+    motion.tell(&reply, &format!("touched at {}; {places}", touched.unwrap_or_default()))
 }
 
 /// Sets an input of a simulated machine.
 ///
 /// # Errors
-/// No pipeline, or no such input.
+/// No pipeline.
 pub fn input(arguments: &InputArguments) -> Result<Exit, Failure> {
-    let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
     let is_active = arguments.level == InputLevel::On;
     let request = Request::Input { name: arguments.name.clone(), is_active };
-    send_checked(&request, &instance, ANSWER_PATIENCE)?;
-    say!("{} is {}", arguments.name, if is_active { "active" } else { "not active" });
+    let reply = send_checked(&request, &mut connect(&arguments.instance)?, ANSWER_PATIENCE)?;
+    if arguments.instance.json {
+        output::json(&reply)?;
+    }
+    if reply["accepted"].as_bool() != Some(true) {
+        message::tell(&format!("refused: {}", reply["refusal"].as_str().unwrap_or_default()));
+        return Ok(Exit::Stopped);
+    }
+    if !arguments.instance.json {
+        say!("{} is {}", arguments.name, if is_active { "active" } else { "not active" });
+    }
     Ok(Exit::Done)
 }
 
-fn operate(verb: Verb, axes: Vec<String>, [value, second]: [f64; 2]) -> Request {
-    Request::Operate { verb, axes, value, second }
+/// The value of a quantity, SI, and the unit that an axis has which it is meant for.
+fn read<K: Kind>(name: &str, text: &str) -> Result<(f64, &'static str), Failure> {
+    let read = quantity::read_form::<K>(text);
+    let (value, form) =
+        read.map_err(|error| Failure::bad_input(format!("{name} {text:?}: {error}")))?;
+    Ok((value, if form == 0 { "m" } else { "rad" }))
 }
 
-/// Asks, and waits while the machine is in the state called `during`: the last status.
-fn carry_out(
-    request: &Request,
-    arguments: &InstanceArguments,
-    during: &str,
-) -> Result<(Exit, Value), Failure> {
-    let exit = ask(request, arguments)?;
-    if exit != Exit::Done {
-        return Ok((exit, json!({})));
+/// Refuses a distance and a speed of which one is a length's and the other an angle's.
+fn same_unit(distance: &str, speed: &str) -> Result<(), Failure> {
+    if distance == speed {
+        return Ok(());
     }
-    let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
-    signal::install().map_err(Failure::service)?;
-    let mut told_to_stop = false;
-    loop {
-        std::thread::sleep(POLL_INTERVAL);
-        if signal::termination().is_some() && !told_to_stop {
-            told_to_stop = true;
-            ask(&Request::Verb { verb: Verb::Stop, value: 0.0 }, arguments)?;
-        }
-        let status = send_checked(&Request::Status, &instance, ANSWER_PATIENCE)?;
-        let state = status["state"].as_str().unwrap_or_default();
-        if state == during || state == "stopping" || told_to_stop && state == "jogging" {
-            continue;
-        }
-        let fault = status["fault"].as_str();
-        if let Some(fault) = fault {
-            message::tell(&format!("fault: {fault}"));
-        } else if told_to_stop {
-            message::tell("stopped");
-        }
-        let exit = match fault {
-            Some(_) => Exit::Fault,
-            None if told_to_stop || state != "idle" => Exit::Stopped,
-            None => Exit::Done,
-        };
-        return Ok((exit, status));
-    }
-}
-
-fn read<K: quantity::Kind>(name: &str, text: &str) -> Result<f64, Failure> {
-    let value = quantity::read_form::<K>(text).map(|(value, _)| value);
-    value.map_err(|error| Failure::bad_input(format!("{name} {text:?}: {error}")))
+    Err(Failure::bad_input(
+        "distance and speed do not fit: write \"10 mm\" and \"20 mm/s\", or \"10 deg\" and \"20 deg/s\"",
+    ))
 }

@@ -1,5 +1,6 @@
 //! Requests to a running pipeline: hold, resume, override, stop, status, submit.
 
+use super::motion;
 use crate::arguments::{InstanceArguments, OverrideArguments, SubmitArguments};
 use crate::exit::{Exit, Failure};
 use crate::output::say;
@@ -25,6 +26,9 @@ const URGENT_PATIENCE: Duration = Duration::from_secs(1);
 /// # Errors
 /// No pipeline, or one that refuses.
 pub fn verb(verb: Verb, arguments: &InstanceArguments) -> Result<Exit, Failure> {
+    if verb == Verb::Enable {
+        return motion::enable(arguments);
+    }
     ask(&Request::Verb { verb, value: 0.0 }, arguments)
 }
 
@@ -45,7 +49,7 @@ pub fn override_rate(arguments: &OverrideArguments) -> Result<Exit, Failure> {
     ask(&Request::Verb { verb: Verb::Override, value }, &arguments.instance)
 }
 
-pub(super) fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure> {
+fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure> {
     let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
     let reply = match send(request, &instance) {
         Err(error @ SocketError::Silent { .. }) => ask_controller(request, &instance, &error)?,
@@ -109,23 +113,18 @@ pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
     }
     let text = |key: &str| status[key].as_str().unwrap_or("none").to_owned();
     say!("state      {}", text("state"));
-    say!("job        {}", text("job"));
-    say!("planner    {}", text("planner"));
-    say!("played     {} of {} setpoints", status["played"], status["samples"]);
-    if let Some(left) = status["time_left"].as_f64() {
-        say!("time left  {}", monitor::summary::text::duration(left));
+    if status["job"].is_string() {
+        say!("job        {}", text("job"));
+        say!("planner    {}", text("planner"));
+        say!("played     {} of {} setpoints", status["played"], status["samples"]);
+        if let Some(left) = status["time_left"].as_f64() {
+            say!("time left  {}", monitor::summary::text::duration(left));
+        }
+        say!("stroke     {}", status["stroke"]);
+        say!("rate       {:.0} %", status["rate"].as_f64().unwrap_or(0.0) * 100.0);
     }
-    say!("stroke     {}", status["stroke"]);
-    say!("rate       {:.0} %", status["rate"].as_f64().unwrap_or(0.0) * 100.0);
-    let names = |key: &str| {
-        let list = status[key].as_array().into_iter().flatten().filter_map(Value::as_str);
-        list.collect::<Vec<_>>().join(", ")
-    };
-    let unhomed = names("unhomed");
-    say!(
-        "homed      {}",
-        if unhomed.is_empty() { "all axes".into() } else { format!("not {unhomed}") }
-    );
+    let axes = serde_json::from_value(status["axes"].clone()).unwrap_or_default();
+    say!("axes       {}", motion::places(&axes, &[]));
     let active = status["inputs"].as_object().into_iter().flatten();
     let active = active.filter(|(_, level)| level.as_bool() == Some(true));
     let active = active.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
@@ -239,12 +238,16 @@ fn send(request: &Request, instance: &Instance) -> Result<Value, SocketError> {
 /// Asks, and waits for the answer at most `patience`.
 pub(super) fn send_checked(
     request: &Request,
-    instance: &Instance,
+    client: &mut OperatorClient,
     patience: Duration,
 ) -> Result<Value, Failure> {
-    let client = OperatorClient::connect(instance).map_err(Failure::service)?;
-    let mut client = client;
     checked(client.request_within(&json!(request), patience).map_err(Failure::service)?)
+}
+
+/// Speaks to the pipeline that the arguments name.
+pub(super) fn connect(arguments: &InstanceArguments) -> Result<OperatorClient, Failure> {
+    let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
+    OperatorClient::connect(&instance).map_err(Failure::service)
 }
 
 fn checked(reply: Value) -> Result<Value, Failure> {

@@ -9,7 +9,7 @@ use watch::WORD_PATIENCE;
 use super::control::JobControl;
 use super::operators::{JobEvent, Submission};
 use super::power_up::{NotReady, PowerUp};
-use super::{POLL_INTERVAL, Pipeline};
+use super::{POLL_INTERVAL, Pipeline, ServiceOwner};
 use crate::exit::Failure;
 use crate::output::ProgressLine;
 use messages::{Cycle, Fault, OperatorVerb, PlannerPhase, run_folder};
@@ -150,9 +150,7 @@ impl<'a> JobRun<'a> {
                 match ready {
                     Ok(false) => {}
                     Ok(true) => match self.unhomed() {
-                        Some(axis) => {
-                            self.end_with(format!("axis {axis} is not homed: `graver home`"))
-                        }
+                        Some(axis) => self.refuse_unhomed(&axis),
                         None => self.offer()?,
                     },
                     Err(NotReady::Faulted(fault)) => self.fail(fault),
@@ -175,6 +173,18 @@ impl<'a> JobRun<'a> {
         let homed = self.pipeline.latest.progress.homed;
         let mut axes = self.pipeline.machine.axes.iter().enumerate();
         axes.find(|(index, _)| homed >> index & 1 == 0).map(|(_, axis)| axis.name.clone())
+    }
+
+    /// A job is refused while an axis does not know its place.
+    fn refuse_unhomed(&mut self, axis: &str) {
+        let advice = match self.pipeline.owner() {
+            ServiceOwner::Others => "`graver home` finds its place",
+            ServiceOwner::Own => {
+                "`graver home` finds its place, in a pipeline that stays: see `graver domain --help`"
+            }
+        };
+        self.end_with(format!("axis {axis} is not homed: {advice}"));
+        self.run_outcome.outcome = Some(Outcome::Refused);
     }
 
     fn offer(&mut self) -> Result<(), Failure> {

@@ -12,7 +12,7 @@ use super::status::StatusBoard;
 use crate::exit::Failure;
 use crossbeam::channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
 use machine::Machine;
-use messages::{ControllerState, OperatorReply, OperatorRequest, OperatorVerb};
+use messages::{ControllerState, OperatorReply, OperatorRequest, OperatorVerb, Refusal};
 use monitor::summary::Summary;
 use planner::request::JobRequest;
 use runtime::Domain;
@@ -59,6 +59,8 @@ pub enum Request {
         value: f64,
         /// Its second one, SI.
         second: f64,
+        /// The unit that the axis must have for them: `m` or `rad`; null where they have none.
+        unit: Option<String>,
     },
     /// Sets an input of a simulated machine.
     Input {
@@ -121,6 +123,8 @@ pub enum Verb {
     TestPulse,
     /// Move an axis until the probe touches.
     Probe,
+    /// Go on with a jog.
+    JogOn,
 }
 
 /// The machine's answer to a verb, as `graver hold --json` and its like print it.
@@ -128,8 +132,12 @@ pub enum Verb {
 pub struct VerbReply {
     /// Whether it is carried out.
     pub accepted: bool,
-    /// Why it is not; null where it is.
+    /// Why it is not, in words; null where it is.
     pub refusal: Option<String>,
+    /// The same by name, such as `soft_limit`.
+    pub code: Option<String>,
+    /// The requests that the controller had accepted then, this one included.
+    pub number: u32,
     /// The state that the request met; `preparing` for a job that is not played yet.
     pub state: String,
     /// The rate now wanted, 1 as planned.
@@ -141,12 +149,19 @@ pub struct VerbReply {
 impl VerbReply {
     /// A request that is carried out without the controller.
     fn accepted(state: &str) -> Self {
-        Self { accepted: true, refusal: None, state: state.to_owned(), value: 1.0, capped_by: None }
+        let reply = OperatorReply { accepted: 1, value: 1.0, ..OperatorReply::default() };
+        Self { state: state.to_owned(), ..Self::from(reply) }
     }
 
-    /// What the controller of `machine` said.
-    pub fn of(reply: &OperatorReply, machine: &Machine) -> Self {
-        Self { refusal: refusals::words(reply, machine), ..Self::from(*reply) }
+    /// A request that is refused without the controller.
+    fn refused(code: Refusal, words: String, state: String) -> Self {
+        let (refusal, code) = (Some(words), Some(code.name().to_owned()));
+        Self { refusal, code, state, ..Self::from(OperatorReply::default()) }
+    }
+
+    /// What the controller of `machine` said about `verb`.
+    pub fn of(reply: &OperatorReply, verb: Verb, machine: &Machine) -> Self {
+        Self { refusal: refusals::words(reply, verb, machine), ..Self::from(*reply) }
     }
 }
 
@@ -155,6 +170,9 @@ impl From<OperatorReply> for VerbReply {
         Self {
             accepted: reply.accepted == 1,
             refusal: None,
+            code: (reply.accepted != 1)
+                .then(|| Refusal::from_wire(reply.refusal).name().to_owned()),
+            number: reply.number,
             state: ControllerState::from_wire(reply.state).name().to_owned(),
             value: reply.value,
             capped_by: None,
@@ -177,6 +195,7 @@ impl From<Verb> for OperatorVerb {
             Verb::Step => Self::Step,
             Verb::TestPulse => Self::TestPulse,
             Verb::Probe => Self::Probe,
+            Verb::JogOn => Self::JogOn,
         }
     }
 }
@@ -249,8 +268,8 @@ impl Operators {
                     json!({})
                 }
                 Request::Verb { verb, value } => answers.carry_out(verb, value),
-                Request::Operate { verb, axes, value, second } => {
-                    answers.operate(verb, &axes, [value, second])
+                Request::Operate { verb, axes, value, second, unit } => {
+                    answers.operate(verb, &axes, unit.as_deref(), [value, second])
                 }
                 Request::Input { name, is_active } => answers.set_input(&name, is_active),
             }
@@ -298,8 +317,8 @@ pub struct Answers {
     board: Arc<StatusBoard>,
     control: Arc<JobControl>,
     machine: Machine,
-    /// Inputs of a simulated machine that are set, one bit each.
-    inputs: Arc<AtomicU64>,
+    /// Inputs of a simulated machine that are set, one bit each; `None` where the machine is not simulated.
+    inputs: Option<Arc<AtomicU64>>,
 }
 
 impl Answers {
@@ -309,47 +328,58 @@ impl Answers {
         board: Arc<StatusBoard>,
         control: Arc<JobControl>,
         machine: &Machine,
-        inputs: Arc<AtomicU64>,
+        inputs: Option<Arc<AtomicU64>>,
     ) -> Self {
         Self { link, board, control, machine: machine.clone(), inputs }
     }
 
     /// Asks the controller for a verb about axes.
-    fn operate(&self, verb: Verb, axes: &[String], [value, second]: [f64; 2]) -> Value {
+    fn operate(
+        &self,
+        verb: Verb,
+        axes: &[String],
+        unit: Option<&str>,
+        [value, second]: [f64; 2],
+    ) -> Value {
         let mut numbers = Vec::with_capacity(axes.len());
         for name in axes {
-            match refusals::axis(&self.machine, name) {
+            match refusals::axis(&self.machine, name, unit) {
                 Ok(number) => numbers.push(number),
-                Err(error) => return json!({ "error": error }),
+                Err((code, words)) => {
+                    return json!(VerbReply::refused(code, words, self.board.read().state));
+                }
             }
         }
         let axis = match verb {
             Verb::Home => numbers.iter().fold(0, |bits, number| bits | 1 << (number - 1)),
             _ => numbers.first().copied().unwrap_or_default(),
         };
-        let verb = OperatorVerb::from(verb) as u32;
+        let (asked, verb) = (verb, OperatorVerb::from(verb) as u32);
         let request = OperatorRequest { verb, axis, value, second, ..OperatorRequest::default() };
         match self.link.ask_within(request, STOP_PATIENCE) {
-            Ok(reply) => json!(VerbReply::of(&reply, &self.machine)),
+            Ok(reply) => json!(VerbReply::of(&reply, asked, &self.machine)),
             Err(error) => json!({ "error": error.to_string() }),
         }
     }
 
     /// Sets an input of a simulated machine.
     fn set_input(&self, name: &str, is_active: bool) -> Value {
+        let state = self.board.read().state;
         let Some((index, _)) = self.machine.operating.input(name) else {
-            let inputs = &self.machine.operating.inputs;
-            let names: Vec<&str> = inputs.iter().map(|input| input.name.as_str()).collect();
-            let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-            return json!({ "error": format!("there is no input {name:?}; the machine has {known}") });
+            let words = refusals::no_input(&self.machine, name);
+            return json!(VerbReply::refused(Refusal::Unknown, words, state));
+        };
+        let Some(inputs) = &self.inputs else {
+            let words = "the machine is not simulated: its inputs say what is so".to_owned();
+            return json!(VerbReply::refused(Refusal::State, words, state));
         };
         let bit = 1 << index;
         if is_active {
-            self.inputs.fetch_or(bit, Ordering::Relaxed);
+            inputs.fetch_or(bit, Ordering::Relaxed);
         } else {
-            self.inputs.fetch_and(!bit, Ordering::Relaxed);
+            inputs.fetch_and(!bit, Ordering::Relaxed);
         }
-        json!({})
+        json!(VerbReply::accepted(&state))
     }
 
     fn carry_out(&self, verb: Verb, value: f64) -> Value {
@@ -362,7 +392,7 @@ impl Answers {
                 Ok(reply) => {
                     let folder = self.board.folder();
                     let capped_by = folder.and_then(|folder| caps(&folder, reply.value));
-                    json!(VerbReply { capped_by, ..VerbReply::of(&reply, &self.machine) })
+                    json!(VerbReply { capped_by, ..VerbReply::of(&reply, verb, &self.machine) })
                 }
                 Err(error) => json!({ "error": error.to_string() }),
             },
@@ -372,7 +402,7 @@ impl Answers {
 
     fn ask(&self, verb: Verb, value: f64) -> Value {
         match self.link.request(verb.into(), value) {
-            Ok(reply) => json!(VerbReply::of(&reply, &self.machine)),
+            Ok(reply) => json!(VerbReply::of(&reply, verb, &self.machine)),
             Err(error) => json!({ "error": error.to_string() }),
         }
     }
@@ -396,7 +426,7 @@ impl Answers {
         let asked = Instant::now();
         loop {
             let reply = match self.link.request_within(OperatorVerb::Hold, 0.0, STOP_PATIENCE) {
-                Ok(reply) => VerbReply::of(&reply, &self.machine),
+                Ok(reply) => VerbReply::of(&reply, Verb::Hold, &self.machine),
                 Err(error) => return json!({ "error": error.to_string() }),
             };
             let starting = !reply.accepted

@@ -1,14 +1,14 @@
 //! Why a request was refused, in words.
 
+use super::operators::Verb;
 use machine::{JointUnit, Machine};
 use messages::{ControllerState, OperatorReply, Refusal};
 
-/// What `reply` of the controller for `machine` says; `None` where it is no refusal.
-pub(super) fn words(reply: &OperatorReply, machine: &Machine) -> Option<String> {
+/// What `reply` of the controller for `machine` to `verb` says; `None` where it is no refusal.
+pub(super) fn words(reply: &OperatorReply, verb: Verb, machine: &Machine) -> Option<String> {
     if reply.accepted == 1 {
         return None;
     }
-    let state = ControllerState::from_wire(reply.state).name();
     let axis = (reply.axis as usize).checked_sub(1).and_then(|index| machine.axes.get(index));
     let name = axis.map_or("", |axis| axis.name.as_str());
     let quantity = |value: f64| match axis.map(|axis| axis.unit) {
@@ -16,37 +16,89 @@ pub(super) fn words(reply: &OperatorReply, machine: &Machine) -> Option<String> 
         Some(JointUnit::Angle) => format!("{:.3} deg", value.to_degrees()),
         None => format!("{value}"),
     };
+    let speed = |value: f64| format!("{}/s", quantity(value));
     let (found, limit) = (reply.found, reply.limit);
     Some(match Refusal::from_wire(reply.refusal) {
-        Refusal::None | Refusal::State => format!("not possible while the machine is {state}"),
+        Refusal::None | Refusal::State => by_state(ControllerState::from_wire(reply.state), verb),
         Refusal::Unknown => "the controller knows no such request".to_owned(),
         Refusal::NoAxis => format!("there is no such axis; the machine has {}", names(machine)),
-        Refusal::TooLarge => {
-            format!("{} is too much: at most {}", quantity(found), quantity(limit))
+        Refusal::TooLarge if axis.is_some() => {
+            format!(
+                "axis {name} is moved by hand at {} at most, not {}",
+                speed(limit),
+                speed(found)
+            )
         }
-        Refusal::TooSmall => {
-            format!("{} is too little: more than {}", quantity(found), quantity(limit))
-        }
-        Refusal::NotANumber => "that is no number to move by".to_owned(),
+        Refusal::TooLarge => format!("{found} is too much: at most {limit}"),
+        Refusal::TooSmall => format!("a speed of {} leads nowhere", speed(found)),
+        Refusal::NotANumber => "a way or speed of 0, or none, leads nowhere".to_owned(),
         Refusal::NotHomed => format!("axis {name} is not homed: `graver home`"),
-        Refusal::SoftLimit => format!(
-            "axis {name} would be at {}, beyond its soft limit {}",
-            quantity(found),
-            quantity(limit)
-        ),
-        Refusal::EmergencyStop => "the emergency stop is pressed".to_owned(),
+        Refusal::SoftLimit if (found - limit).abs() < LIMIT_REACHED => {
+            format!("axis {name} is at its soft limit of {}", quantity(limit))
+        }
+        Refusal::SoftLimit => {
+            let (found, limit) = (quantity(found), quantity(limit));
+            format!("axis {name} would be at {found}, beyond its soft limit of {limit}")
+        }
+        Refusal::EmergencyStop => {
+            "the emergency stop is pressed: release it, then `graver reset`".to_owned()
+        }
         Refusal::DoorOpen => "the door is open".to_owned(),
         Refusal::Interlock => "an interlock is missing".to_owned(),
         Refusal::LimitSwitch => {
-            format!("axis {name} is on its limit switch; it can be jogged away from it")
+            format!("axis {name} is on its limit switch: jog it away from it")
+        }
+        Refusal::NothingToFind if verb == Verb::Probe => {
+            "the machine file has no input with the function `probe`".to_owned()
         }
         Refusal::NothingToFind => {
-            "the machine file has nothing to find: no homing, or no probe".to_owned()
+            "none of these axes has a reference to find: they know their place".to_owned()
         }
         Refusal::Touching => "the probe touches already".to_owned(),
         Refusal::Stream => "there is no such stream to start".to_owned(),
         Refusal::StillThere => "what caused the fault is still there".to_owned(),
+        Refusal::Power => format!(
+            "a test pulse has {} % at {}, not {} %",
+            short(limit * 100.0),
+            if found > limit { "most (`safety.test_power`)" } else { "least (`laser.min_power`)" },
+            short(found * 100.0)
+        ),
+        Refusal::Time if found > limit => format!(
+            "a test pulse lasts {} ms at most (`safety.test_time`), not {} ms",
+            short(limit * 1e3),
+            short(found * 1e3)
+        ),
+        Refusal::Time => "a test pulse lasts longer than 0 s".to_owned(),
+        Refusal::Ended => format!("the jog of axis {name} has ended"),
     })
+}
+
+/// A place no further from a soft limit is at it [m or rad]: a jog stops a cycle's way before it.
+const LIMIT_REACHED: f64 = 1e-3;
+
+/// A number to a thousandth, without zeros at its end.
+fn short(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}
+
+/// Why `verb` is not possible in a state, and what would make it so.
+fn by_state(state: ControllerState, verb: Verb) -> String {
+    use ControllerState as State;
+    let moves = matches!(
+        verb,
+        Verb::Home | Verb::Jog | Verb::JogOn | Verb::Step | Verb::Probe | Verb::TestPulse
+    );
+    let advice = match state {
+        State::Disabled if moves => ": `graver enable`",
+        State::Faulted | State::Halted if moves || verb == Verb::Enable => ": `graver reset`",
+        State::Enabling if moves => ": wait until it is idle",
+        State::Running | State::Holding if moves => ": a job is under way",
+        State::Homing | State::Jogging | State::Probing | State::Pulsing if moves => {
+            ": wait until it is idle, or `graver stop`"
+        }
+        _ => "",
+    };
+    format!("not possible while the machine is {}{advice}", state.name())
 }
 
 /// The machine's axes by name.
@@ -54,13 +106,34 @@ fn names(machine: &Machine) -> String {
     machine.axes.iter().map(|axis| axis.name.as_str()).collect::<Vec<_>>().join(", ")
 }
 
-/// The number of the axis called `name`, from 1.
+/// The number of the axis called `name`, from 1, which must be moved in `unit` if one is given.
 ///
 /// # Errors
-/// No such axis, in words.
-pub(super) fn axis(machine: &Machine, name: &str) -> Result<u32, String> {
-    let index = machine.axes.iter().position(|axis| axis.name == name);
-    index
-        .map(|index| index as u32 + 1)
-        .ok_or_else(|| format!("there is no axis {name:?}; the machine has {}", names(machine)))
+/// No such axis, or another unit, in words.
+pub(super) fn axis(
+    machine: &Machine,
+    name: &str,
+    unit: Option<&str>,
+) -> Result<u32, (Refusal, String)> {
+    let found = machine.axes.iter().enumerate().find(|(_, axis)| axis.name == name);
+    let Some((index, axis)) = found else {
+        let words = format!("there is no axis {name:?}; the machine has {}", names(machine));
+        return Err((Refusal::NoAxis, words));
+    };
+    if unit.is_some_and(|unit| unit != axis.unit.name()) {
+        let (turns, needed) = match axis.unit {
+            JointUnit::Length => ("slides", "a length, such as \"10 mm\", and \"10 mm/s\""),
+            JointUnit::Angle => ("turns", "an angle, such as \"10 deg\", and \"10 deg/s\""),
+        };
+        return Err((Refusal::NotANumber, format!("axis {name} {turns}: write {needed}")));
+    }
+    Ok(index as u32 + 1)
+}
+
+/// That there is no input called `name`.
+pub(super) fn no_input(machine: &Machine, name: &str) -> String {
+    let inputs = &machine.operating.inputs;
+    let names: Vec<&str> = inputs.iter().map(|input| input.name.as_str()).collect();
+    let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+    format!("there is no input {name:?}; the machine has {known}")
 }

@@ -2,9 +2,9 @@
 
 use super::Latest;
 use machine::Machine;
-use messages::{ControllerState, Fault, Nanoseconds, PlannerPhase};
+use messages::{ControllerState, Fault, MotionEnd, Nanoseconds, PlannerPhase, Progress};
 use monitor::summary::FaultSummary;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -50,12 +50,17 @@ pub struct Status {
     pub homed: Vec<String>,
     /// Axes that have to be homed before a job.
     pub unhomed: Vec<String>,
-    /// Where the joints are, by name [m or rad].
-    pub axes: BTreeMap<String, f64>,
+    /// The axes by name.
+    pub axes: BTreeMap<String, AxisStatus>,
     /// The inputs of the machine file, and whether each is active.
     pub inputs: BTreeMap<String, bool>,
-    /// Where the joint that was probed last was when the probe touched; null before [m or rad].
-    pub probed: Option<f64>,
+    /// Where the probe touched last; null before it has.
+    pub probed: Option<Probed>,
+    /// How the newest motion by hand ended: `reached`, `stopped`, `soft_limit`, `dead_man`, `door_open`, `interlock`,
+    /// `not_touched`, `out_of_reach` or `fault`; `none` while it lasts and before the first.
+    pub motion_end: String,
+    /// How many requests the controller has accepted; a reply with a greater `number` does not show here yet.
+    pub requests: u32,
     /// The latched fault.
     pub fault: Option<String>,
     /// The faults since the start, the newest last, with the time of day.
@@ -68,8 +73,32 @@ pub struct Status {
     pub services: BTreeMap<String, Option<i32>>,
 }
 
+/// Where an axis is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct AxisStatus {
+    /// Where the joint is, in its unit.
+    pub position: f64,
+    /// `m` where it slides, `rad` where it turns.
+    pub unit: String,
+    /// Whether it knows its place.
+    pub homed: bool,
+    /// Its lower and its upper soft limit; null at an end that it does not have.
+    pub limits: [Option<f64>; 2],
+}
+
+/// Where the probe touched.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Probed {
+    /// The axis that was moved.
+    pub axis: String,
+    /// Where its joint was, in its unit.
+    pub position: f64,
+    /// `m` where it slides, `rad` where it turns.
+    pub unit: String,
+}
+
 /// A fault that was latched.
-#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PastFault {
     /// When, in seconds since 1970.
     pub time: u64,
@@ -132,21 +161,10 @@ impl StatusBoard {
         status.fault = fault.is_some().then(|| fault.code().name().to_owned());
         self.remember(&mut status, &fault);
         if let Some(machine) = locked(&self.machine).as_ref() {
-            let named = |is_homed: bool| {
-                let axes = machine.axes.iter().enumerate();
-                let own =
-                    axes.filter(move |(index, _)| (progress.homed >> index & 1 == 1) == is_homed);
-                own.map(|(_, axis)| axis.name.clone()).collect::<Vec<_>>()
-            };
-            (status.homed, status.unhomed) = (named(true), named(false));
-            let axes = machine.axes.iter().zip(&progress.position);
-            status.axes = axes.map(|(axis, place)| (axis.name.clone(), *place)).collect();
-            let inputs = machine.operating.bits();
-            let inputs =
-                inputs.map(|(bit, input)| (input.name.clone(), progress.inputs & bit != 0));
-            status.inputs = inputs.collect();
+            status.operated(progress, machine);
         }
-        status.probed = (progress.probed_axis != 0).then_some(progress.probed);
+        status.motion_end = MotionEnd::from_wire(progress.motion_end).name().to_owned();
+        status.requests = progress.requests;
         status.cycles = drives.cycle.0;
         status.overruns = drives.overruns;
         status.services = pids.iter().map(|(name, pid)| ((*name).to_owned(), *pid)).collect();
@@ -170,6 +188,34 @@ impl StatusBoard {
 
     fn lock(&self) -> MutexGuard<'_, Status> {
         locked(&self.status)
+    }
+}
+
+impl Status {
+    /// What concerns axes and inputs of `machine`.
+    fn operated(&mut self, progress: &Progress, machine: &Machine) {
+        let axes = machine.axes.iter().zip(&progress.position).enumerate();
+        let axes = axes.map(|(index, (axis, place))| {
+            let limits = axis.limits.position.map(|limit| limit.is_finite().then_some(limit));
+            let homed = progress.homed >> index & 1 == 1;
+            let unit = axis.unit.name().to_owned();
+            (axis.name.clone(), AxisStatus { position: *place, unit, homed, limits })
+        });
+        self.axes = axes.collect();
+        let named = |is_homed: bool| {
+            let axes = machine.axes.iter().map(|axis| &axis.name);
+            axes.filter(|name| self.axes[*name].homed == is_homed).cloned().collect()
+        };
+        (self.homed, self.unhomed) = (named(true), named(false));
+        let inputs = machine.operating.bits();
+        let inputs = inputs.map(|(bit, input)| (input.name.clone(), progress.inputs & bit != 0));
+        self.inputs = inputs.collect();
+        let axis = (progress.probed_axis as usize).checked_sub(1);
+        self.probed = axis.and_then(|index| machine.axes.get(index)).map(|axis| Probed {
+            axis: axis.name.clone(),
+            position: progress.probed,
+            unit: axis.unit.name().to_owned(),
+        });
     }
 }
 

@@ -157,6 +157,8 @@ impl Controller {
             homed: self.reference.homed(),
             probed_axis: self.probing.found_axis(),
             probed: self.probing.found(),
+            requests: self.requests,
+            motion_end: self.motion_end as u32,
             state: command.state,
             completed: u32::from(self.completed),
             fault: self.fault,

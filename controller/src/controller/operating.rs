@@ -9,7 +9,7 @@ use crate::state::{AfterRest, HomingStage, State};
 use crate::supervision::Finding;
 use machine::operating::{DoorAction, Side, StopCategory};
 use messages::{
-    CommandMode, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, Nanoseconds,
+    CommandMode, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, MotionEnd, Nanoseconds,
 };
 
 /// A way until the probe touches, and where it did.
@@ -39,6 +39,28 @@ impl Probing {
     }
 }
 
+/// An axis that is jogged for as long as somebody says so.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Jog {
+    /// The number of the request that began it.
+    number: u32,
+    /// For how many cycles it goes on without another word.
+    left: u32,
+}
+
+impl Jog {
+    pub(super) fn new(number: u32, left: u32) -> Self {
+        Self { number, left }
+    }
+
+    /// Goes on for so many cycles, if it is the jog with this number.
+    pub(super) fn go_on(&mut self, number: f64, left: u32) -> bool {
+        let is_meant = f64::from(self.number) == number;
+        self.left = if is_meant { left } else { self.left };
+        is_meant
+    }
+}
+
 impl Controller {
     /// Takes the references that were found in the cycle before: the same places have other numbers.
     pub(super) fn refer(&mut self) {
@@ -65,42 +87,66 @@ impl Controller {
         let weight = |planned: &mut Planned| is_reached = self.standing.bear(planned);
         let planned = self.travel.advance(weight).unwrap_or(standing);
         if !is_reached {
-            self.travel.stop_all();
+            self.give_up_travel(MotionEnd::OutOfReach);
         }
         planned
     }
 
     /// Stops the axes that nobody has spoken for.
     fn watch_dead_man(&mut self) {
-        for (axis, left) in self.dead_man.iter_mut().enumerate() {
-            *left = match *left {
-                Some(0) => {
+        for axis in 0..MAX_AXES {
+            match &mut self.jogs[axis] {
+                Some(Jog { left: 0, .. }) => {
                     self.travel.stop(axis);
-                    None
+                    self.jogs[axis] = None;
+                    self.end_motion(MotionEnd::DeadMan);
                 }
-                Some(left) => Some(left - 1),
-                None => None,
-            };
+                Some(jog) => jog.left -= 1,
+                None => {}
+            }
         }
     }
 
     /// Keeps jogged and probing axes within what they may go to.
     fn keep_within_limits(&mut self, standing: &Planned) {
         let bounded = self.bounded();
-        for (index, axis) in self.machine.axes.iter().enumerate().take(MAX_AXES) {
-            if bounded & bit(index) != 0 {
-                self.travel.keep_within(index, axis.limits.position, standing);
+        for index in 0..self.machine.axes.len().min(MAX_AXES) {
+            let limits = self.machine.axes[index].limits.position;
+            if bounded & bit(index) != 0 && self.travel.keep_within(index, limits, standing) {
+                self.jogs[index] = None;
+                self.end_motion(MotionEnd::SoftLimit);
             }
         }
-        if self.state == State::Probing {
-            self.travel.keep_within(self.probing.axis, self.probing.bounds, standing);
+        if self.state == State::Probing
+            && self.travel.keep_within(self.probing.axis, self.probing.bounds, standing)
+        {
+            self.end_motion(MotionEnd::NotTouched);
         }
     }
 
-    /// Whatever moves without a stream comes to rest, and light is out.
-    pub(super) fn give_up_travel(&mut self) {
+    /// A motion by hand begins.
+    pub(super) fn begin_motion(&mut self, state: State) {
+        (self.state, self.motion_end) = (state, MotionEnd::None);
+    }
+
+    /// A motion by hand comes to its end, for this reason unless there was one before.
+    fn end_motion(&mut self, end: MotionEnd) {
+        if self.state.is_by_hand() && self.motion_end == MotionEnd::None {
+            self.motion_end = end;
+        }
+    }
+
+    /// A motion by hand has ended.
+    pub(super) fn rest_by_hand(&mut self, end: MotionEnd) {
+        self.end_motion(end);
+        self.state = State::Idle;
+    }
+
+    /// Whatever moves without a stream comes to rest for this reason, and light is out.
+    pub(super) fn give_up_travel(&mut self, end: MotionEnd) {
+        self.end_motion(end);
         self.travel.stop_all();
-        self.dead_man = [None; MAX_AXES];
+        self.jogs = [None; MAX_AXES];
         self.pulse = Default::default();
     }
 
@@ -128,7 +174,12 @@ impl Controller {
                     self.state = State::Holding(AfterRest::Wait);
                 }
                 State::Pulsing => {
-                    self.give_up_travel();
+                    let is_open = self.safety.is_open();
+                    self.give_up_travel(if is_open {
+                        MotionEnd::DoorOpen
+                    } else {
+                        MotionEnd::Interlock
+                    });
                     self.state = State::Idle;
                 }
                 _ => {}
@@ -142,7 +193,7 @@ impl Controller {
             self.fail(Finding::sound(Fault::new(FaultCode::DoorOpened)), now);
         }
         if matches!(self.state, State::Homing(_) | State::Probing | State::Jogging) {
-            self.give_up_travel();
+            self.give_up_travel(MotionEnd::DoorOpen);
             self.state = State::Jogging;
         }
     }
@@ -222,7 +273,9 @@ impl Controller {
                     self.state = State::Homing(HomingStage::Returning);
                 }
             }
-            HomingStage::Returning if self.travel.is_at_rest() => self.state = State::Idle,
+            HomingStage::Returning if self.travel.is_at_rest() => {
+                self.rest_by_hand(MotionEnd::Reached);
+            }
             HomingStage::Squaring { .. } | HomingStage::Returning => {}
         }
     }
@@ -254,7 +307,8 @@ impl Controller {
         }
         self.probing.before = place;
         if self.travel.is_at_rest() {
-            self.state = State::Idle;
+            let is_found = self.probing.found.is_some();
+            self.rest_by_hand(if is_found { MotionEnd::Reached } else { MotionEnd::NotTouched });
         }
     }
 }

@@ -1,14 +1,15 @@
 //! What people ask of the controller.
 
 use super::Controller;
-use super::operating::Probing;
+use super::operating::{Jog, Probing};
 use crate::reference::bit;
 use crate::state::{AfterRest, HomingStage, State};
 use crate::test_pulse::TestPulse;
 use machine::operating::Side;
 use messages::feedback::status;
 use messages::{
-    Fault, Feedback, MAX_AXES, Nanoseconds, OperatorReply, OperatorRequest, OperatorVerb, Refusal,
+    Fault, Feedback, MAX_AXES, MotionEnd, Nanoseconds, OperatorReply, OperatorRequest,
+    OperatorVerb, Refusal,
 };
 
 /// Why a request is refused.
@@ -37,13 +38,13 @@ impl Refused {
     }
 }
 
-/// Refuses `value` unless it is 0 to `most`.
-fn at_most(value: f64, most: f64) -> Result<(), Refused> {
+/// The end of the range above 0 up to `most` that `value` is beyond, if it is; refused if it is no number.
+fn outside(value: f64, most: f64) -> Result<Option<f64>, Refused> {
     match value {
         value if !value.is_finite() => Err(Refusal::NotANumber.into()),
-        value if value > most => Err(Refused::from(Refusal::TooLarge).beyond(value, most)),
-        value if value <= 0.0 => Err(Refused::from(Refusal::TooSmall).beyond(value, 0.0)),
-        _ => Ok(()),
+        value if value > most => Ok(Some(most)),
+        value if value <= 0.0 => Ok(Some(0.0)),
+        _ => Ok(None),
     }
 }
 
@@ -55,10 +56,16 @@ impl Controller {
         feedback: &Feedback,
     ) -> OperatorReply {
         let met = self.state.to_wire();
+        // The number that the request will have if it is accepted.
+        let before = self.requests;
+        self.requests = before.wrapping_add(1);
         let outcome = match OperatorVerb::from_wire(request.verb) {
             Some(verb) => self.obey(verb, request, feedback),
             None => Err(Refusal::Unknown.into()),
         };
+        if outcome.is_err() {
+            self.requests = before;
+        }
         let Refused { refusal, axis, found, limit } = outcome.err().unwrap_or_default();
         OperatorReply {
             ticket: request.ticket,
@@ -66,7 +73,7 @@ impl Controller {
             state: met as u32,
             refusal: refusal as u32,
             axis,
-            reserved: 0,
+            number: self.requests,
             found,
             limit,
             value: self.player.asked_rate(),
@@ -108,7 +115,7 @@ impl Controller {
                 OperatorVerb::Stop | OperatorVerb::Hold,
                 State::Homing(_) | State::Jogging | State::Probing | State::Pulsing,
             ) => {
-                self.give_up_travel();
+                self.give_up_travel(MotionEnd::Stopped);
                 self.state = State::Jogging;
             }
             (
@@ -129,6 +136,7 @@ impl Controller {
             ) => self.start(request.value)?,
             (OperatorVerb::Home, State::Idle) => self.begin_homing(request.axis)?,
             (OperatorVerb::Jog, State::Idle | State::Jogging) => self.jog(request)?,
+            (OperatorVerb::JogOn, _) => self.jog_on(request)?,
             (OperatorVerb::Step, State::Idle | State::Jogging) => self.step_axis(request)?,
             (OperatorVerb::Probe, State::Idle) => self.begin_probing(request)?,
             (OperatorVerb::TestPulse, State::Idle) => self.begin_pulse(request, feedback)?,
@@ -176,7 +184,7 @@ impl Controller {
             }
         }
         self.homing.begin(axes);
-        self.state = State::Homing(HomingStage::Searching);
+        self.begin_motion(State::Homing(HomingStage::Searching));
         Ok(())
     }
 
@@ -186,20 +194,56 @@ impl Controller {
         let speed = request.value;
         if speed == 0.0 {
             self.travel.stop(axis);
-            self.dead_man[axis] = None;
+            self.jogs[axis] = None;
             return Ok(());
         }
         self.may_go(axis, speed, speed)?;
-        let standing = *self.feedforward.after();
         // One that comes to rest does so before it hears the next word: it would need more room.
-        if !self.travel.comes_to_rest(axis) {
-            self.travel.run(axis, speed, &standing);
+        if self.travel.comes_to_rest(axis) || self.is_given_up() {
+            return Err(Refusal::State.into());
         }
+        let standing = *self.feedforward.after();
+        if !self.travel.has_room(axis, speed, self.limits(axis), &standing) {
+            let [lower, upper] = self.limits(axis);
+            let limit = if speed < 0.0 { lower } else { upper };
+            let place = self.travel.place(axis, &standing);
+            return Err(Refused::on(Refusal::SoftLimit, axis).beyond(place, limit));
+        }
+        self.travel.run(axis, speed, &standing);
+        self.jogs[axis] = Some(Jog::new(self.requests, self.dead_man()));
+        self.begin_motion(State::Jogging);
+        Ok(())
+    }
+
+    /// Goes on with a jog that has not ended.
+    fn jog_on(&mut self, request: &OperatorRequest) -> Result<(), Refused> {
+        let axis = self.axis(request.axis)?;
+        let left = self.dead_man();
+        let jog = self.jogs[axis].as_mut();
+        if jog.is_some_and(|jog| jog.go_on(request.value, left)) {
+            Ok(())
+        } else {
+            Err(Refused::on(Refusal::Ended, axis))
+        }
+    }
+
+    /// For how many cycles a jog goes on without another word.
+    fn dead_man(&self) -> u32 {
         let dead_man = Nanoseconds::from_seconds(self.machine.operating.safety.dead_man);
         let cycles = self.machine.realtime.period.cycles_in(dead_man);
-        self.dead_man[axis] = Some(u32::try_from(cycles).unwrap_or(u32::MAX));
-        self.state = State::Jogging;
-        Ok(())
+        u32::try_from(cycles).unwrap_or(u32::MAX)
+    }
+
+    /// Whether what moves by hand was told to stop, and does so.
+    fn is_given_up(&self) -> bool {
+        self.state == State::Jogging && self.motion_end != MotionEnd::None
+    }
+
+    /// What the joint may go to: all where it does not know its place [m or rad].
+    fn limits(&self, axis: usize) -> [f64; 2] {
+        let known = self.reference.homed() & bit(axis) != 0;
+        let axis = self.machine.axes.get(axis).filter(|_| known);
+        axis.map_or([f64::NEG_INFINITY, f64::INFINITY], |axis| axis.limits.position)
     }
 
     /// Moves an axis on by a distance.
@@ -207,14 +251,14 @@ impl Controller {
         let axis = self.axis(request.axis)?;
         let distance = request.value;
         self.may_go(axis, request.second, distance)?;
-        if !self.travel.rests(axis) {
+        if !self.travel.rests(axis) || self.is_given_up() {
             return Err(Refusal::State.into());
         }
         let standing = *self.feedforward.after();
         self.is_within(axis, self.travel.place(axis, &standing) + distance, distance)?;
-        self.dead_man[axis] = None;
+        self.jogs[axis] = None;
         self.travel.go(axis, distance, request.second, &standing);
-        self.state = State::Jogging;
+        self.begin_motion(State::Jogging);
         Ok(())
     }
 
@@ -233,7 +277,7 @@ impl Controller {
         let bounds = [place.min(place + distance), place.max(place + distance)];
         self.probing = Probing::new(axis, bounds, place);
         self.travel.run(axis, speed.abs() * distance.signum(), &standing);
-        self.state = State::Probing;
+        self.begin_motion(State::Probing);
         Ok(())
     }
 
@@ -249,14 +293,20 @@ impl Controller {
         }
         let (power, time) = (request.value, request.second);
         let safety = &self.machine.operating.safety;
-        at_most(power, safety.test_power)?;
-        at_most(time, safety.test_time)?;
         let least = self.machine.laser.min_power;
+        let beyond =
+            |refusal: Refusal, found, limit| Err(Refused::from(refusal).beyond(found, limit));
+        if let Some(limit) = outside(power, safety.test_power)? {
+            return beyond(Refusal::Power, power, limit);
+        }
         if power < least {
-            return Err(Refused::from(Refusal::TooSmall).beyond(power, least));
+            return beyond(Refusal::Power, power, least);
+        }
+        if let Some(limit) = outside(time, safety.test_time)? {
+            return beyond(Refusal::Time, time, limit);
         }
         self.pulse = TestPulse::new(power, Nanoseconds::from_seconds(time));
-        self.state = State::Pulsing;
+        self.begin_motion(State::Pulsing);
         Ok(())
     }
 
@@ -273,8 +323,13 @@ impl Controller {
         if !way.is_finite() || way == 0.0 {
             return Err(Refused::on(Refusal::NotANumber, axis));
         }
-        at_most(speed.abs(), most)
-            .map_err(|refused| Refused { axis: axis as u32 + 1, ..refused })?;
+        match outside(speed.abs(), most)? {
+            Some(limit) if limit > 0.0 => {
+                return Err(Refused::on(Refusal::TooLarge, axis).beyond(speed.abs(), limit));
+            }
+            Some(_) => return Err(Refused::on(Refusal::TooSmall, axis).beyond(speed.abs(), 0.0)),
+            None => {}
+        }
         let side = if way < 0.0 { Side::Lower } else { Side::Upper };
         if self.safety.is_at_limit(axis, side) {
             return Err(Refused::on(Refusal::LimitSwitch, axis));
@@ -285,9 +340,7 @@ impl Controller {
 
     /// Whether the joint may be at `end`, having come in the direction of `way` [m or rad].
     fn is_within(&self, axis: usize, end: f64, way: f64) -> Result<(), Refused> {
-        let known = self.reference.homed() & bit(axis) != 0;
-        let Some(limits) = self.machine.axes.get(axis).filter(|_| known) else { return Ok(()) };
-        let [lower, upper] = limits.limits.position;
+        let [lower, upper] = self.limits(axis);
         let refuse = |limit| Err(Refused::on(Refusal::SoftLimit, axis).beyond(end, limit));
         match way {
             way if way > 0.0 && end > upper => refuse(upper),

@@ -8,7 +8,9 @@ use crate::state::{AfterRest, State};
 use crate::supervision::{Finding, Tracking};
 use messages::feedback::status;
 use messages::time::Period;
-use messages::{Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, Nanoseconds};
+use messages::{
+    Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, MotionEnd, Nanoseconds,
+};
 
 /// How long an axis stands still before it counts as at rest without a plan, and as enabled.
 const STANDING: Nanoseconds = Nanoseconds(20_000_000);
@@ -68,11 +70,11 @@ impl Controller {
             State::Homing(stage) => self.home(now, feedback, stage),
             State::Jogging if self.travel.is_at_rest() => {
                 // Nobody has to speak for an axis that rests.
-                self.dead_man = [None; MAX_AXES];
-                self.state = State::Idle;
+                self.jogs = [None; MAX_AXES];
+                self.rest_by_hand(MotionEnd::Reached);
             }
             State::Probing => self.probe(feedback),
-            State::Pulsing if self.pulse.is_over() => self.state = State::Idle,
+            State::Pulsing if self.pulse.is_over() => self.rest_by_hand(MotionEnd::Reached),
             State::Failing { tracking, waited } => {
                 let at_rest = match tracking {
                     Tracking::Sound => self.stands_on_plan() && self.alignment.is_done(),

@@ -6,8 +6,8 @@ use drives::{Bridge, Deadlines, PlantOptions, SimulatedPlant};
 use machine::Machine;
 use messages::time::SETPOINT_PERIOD;
 use messages::{
-    Command, ControllerState, Feedback, Nanoseconds, OperatorReply, OperatorRequest, OperatorVerb,
-    Progress, Refusal,
+    Command, ControllerState, Feedback, MotionEnd, Nanoseconds, OperatorReply, OperatorRequest,
+    OperatorVerb, Progress, Refusal,
 };
 
 const CARTESIAN: &str = include_str!("../../../machines/cartesian.toml");
@@ -172,6 +172,11 @@ impl Cell {
 
     pub fn state(&self) -> ControllerState {
         self.outputs.command.state()
+    }
+
+    /// How the newest motion by hand ended.
+    pub fn end(&self) -> MotionEnd {
+        MotionEnd::from_wire(self.progress.motion_end)
     }
 
     pub fn feedback(&self) -> &Feedback {

@@ -7,8 +7,10 @@ mod cell;
 mod random;
 
 use cell::{CHILLER, Cell, DOOR, ESTOP, X, Y, machine};
-use messages::OperatorVerb::{Enable, Home, Jog, Probe, Reset, Start, Step, Stop, TestPulse};
-use messages::{CommandMode, ControllerState as State, FaultCode, Refusal};
+use messages::OperatorVerb::{
+    Enable, Home, Jog, JogOn, Probe, Reset, Start, Step, Stop, TestPulse,
+};
+use messages::{CommandMode, ControllerState as State, FaultCode, MotionEnd, Refusal};
 
 #[test]
 fn a_machine_starts_unhomed_finds_its_references_and_goes_home() {
@@ -74,13 +76,16 @@ fn a_jog_lives_no_longer_than_its_dead_man_and_its_way_to_rest() {
     let mut cell = Cell::homed(&machine);
     let speed = 0.1;
     // Kept alive for half a second, and then left alone.
+    let number = f64::from(cell.ask(Jog, X, speed, 0.0).number);
     for _ in 0..10 {
-        cell.accept(Jog, X, speed, 0.0);
+        cell.accept(JogOn, X, number, 0.0);
         cell.run(49);
     }
     let place = cell.place(0);
     assert_eq!(cell.state(), State::Jogging);
     cell.until(State::Idle, 1000);
+    assert_eq!(cell.end(), MotionEnd::DeadMan);
+    assert_eq!(cell.refuse(JogOn, X, number, 0.0), Refusal::Ended, "it is not begun anew");
     let way = cell.place(0) - place;
     let pace = controller::travel::Pace::new(&machine, &machine.axes[0]);
     let stopping =
@@ -97,16 +102,43 @@ fn a_jog_lives_no_longer_than_its_dead_man_and_its_way_to_rest() {
 }
 
 #[test]
+fn a_jog_that_was_stopped_does_not_go_on_however_often_it_is_asked_for() {
+    let machine = machine("");
+    let mut cell = Cell::homed(&machine);
+    let number = f64::from(cell.ask(Jog, X, 0.1, 0.0).number);
+    cell.run(100);
+    cell.accept(Stop, 0, 0.0, 0.0);
+    assert_eq!(cell.refuse(Jog, X, 0.1, 0.0), Refusal::State, "it comes to rest first");
+    let mut cycles = 0;
+    while cell.state() != State::Idle {
+        assert_eq!(cell.refuse(JogOn, X, number, 0.0), Refusal::Ended);
+        cycles += 1;
+        assert!(cycles < 1000);
+    }
+    assert_eq!(cell.end(), MotionEnd::Stopped);
+    cell.run(6);
+    let place = cell.place(0);
+    assert_eq!(cell.refuse(JogOn, X, number, 0.0), Refusal::Ended);
+    cell.run(100);
+    assert_eq!(cell.place(0), place);
+    // Another jog is not kept up by who asked for the first.
+    cell.accept(Jog, X, -0.1, 0.0);
+    assert_eq!(cell.refuse(JogOn, X, number, 0.0), Refusal::Ended);
+}
+
+#[test]
 fn a_jog_stops_at_the_soft_limit_and_a_step_beyond_it_is_refused_with_the_limit() {
     let machine = machine("");
     let mut cell = Cell::homed(&machine);
     let upper = machine.axes[0].limits.position[1];
+    let number = f64::from(cell.ask(Jog, X, 0.1, 0.0).number);
     for _ in 0..40 {
-        cell.ask(Jog, X, 0.1, 0.0);
+        cell.ask(JogOn, X, number, 0.0);
         cell.run(49);
         assert!(cell.place(0) <= upper);
     }
     assert!(cell.place(0) > upper - 1e-3, "{}", cell.place(0));
+    assert_eq!((cell.state(), cell.end()), (State::Idle, MotionEnd::SoftLimit));
     let reply = cell.ask(Step, X, 0.01, 0.05);
     assert_eq!((reply.accepted, Refusal::from_wire(reply.refusal)), (0, Refusal::SoftLimit));
     assert!(reply.limit == upper && reply.axis == X && reply.found > upper);
@@ -125,11 +157,13 @@ fn a_jog_stops_at_the_soft_limit_and_a_step_beyond_it_is_refused_with_the_limit(
 fn an_unhomed_jog_is_stopped_by_the_limit_switch_and_gets_away_from_it() {
     let machine = machine("");
     let mut cell = Cell::enabled(&machine);
+    let number = f64::from(cell.ask(Jog, X, 0.1, 0.0).number);
     for _ in 0..100 {
-        cell.ask(Jog, X, 0.1, 0.0);
+        cell.ask(JogOn, X, number, 0.0);
         cell.run(49);
     }
     cell.until(State::Faulted, 100);
+    assert_eq!(cell.end(), MotionEnd::Fault);
     let fault = cell.outputs.command.fault;
     assert_eq!((fault.code(), fault.axis), (FaultCode::HardLimit, 1));
     assert!((0.206..0.21).contains(&cell.truth(0)), "{}", cell.truth(0));
@@ -178,6 +212,7 @@ fn an_open_door_stops_axes_and_test_pulses_and_refuses_both() {
     cell.run(200);
     cell.bridge.set_inputs(DOOR);
     cell.until(State::Idle, 500);
+    assert_eq!(cell.end(), MotionEnd::DoorOpen);
     assert!(cell.place(0) < 0.15 - 1e-3, "it did not go on");
     for (verb, axis, value, second) in
         [(Home, 0, 0.0, 0.0), (Jog, X, 0.1, 0.0), (TestPulse, 0, 0.05, 0.01), (Start, 0, 1.0, 0.0)]
@@ -194,9 +229,9 @@ fn an_open_door_stops_axes_and_test_pulses_and_refuses_both() {
 fn a_test_pulse_is_bounded_in_power_and_time_and_goes_out_with_the_door() {
     let machine = machine("");
     let mut cell = Cell::enabled(&machine);
-    assert_eq!(cell.refuse(TestPulse, 0, 0.11, 0.01), Refusal::TooLarge);
-    assert_eq!(cell.refuse(TestPulse, 0, 0.1, 0.11), Refusal::TooLarge);
-    assert_eq!(cell.refuse(TestPulse, 0, 0.1, -1.0), Refusal::TooSmall);
+    assert_eq!(cell.refuse(TestPulse, 0, 0.11, 0.01), Refusal::Power);
+    assert_eq!(cell.refuse(TestPulse, 0, 0.1, 0.11), Refusal::Time);
+    assert_eq!(cell.refuse(TestPulse, 0, 0.1, -1.0), Refusal::Time);
     cell.accept(TestPulse, 0, 0.1, 0.0125);
     let mut lit = 0.0;
     for _ in 0..40 {
@@ -231,11 +266,11 @@ fn a_probe_is_found_where_it_is_and_the_way_to_it_is_bounded() {
     let mut cell = Cell::homed(&machine);
     cell.accept(Probe, X, 0.03, 0.01);
     cell.until(State::Idle, 10_000);
-    assert_eq!(cell.progress.probed_axis, 0, "not reached");
+    assert_eq!((cell.progress.probed_axis, cell.end()), (0, MotionEnd::NotTouched));
     assert!((cell.place(0) - 0.13).abs() < 1e-3 && cell.place(0) <= 0.13);
     cell.accept(Probe, X, 0.03, 0.01);
     cell.until(State::Idle, 10_000);
-    assert_eq!(cell.progress.probed_axis, X);
+    assert_eq!((cell.progress.probed_axis, cell.end()), (X, MotionEnd::Reached));
     assert!((cell.progress.probed - 0.15).abs() < 15e-6, "{}", cell.progress.probed);
     assert_eq!(cell.refuse(Probe, X, 0.03, 0.01), Refusal::Touching);
 }

@@ -67,8 +67,8 @@ fn sequence(machine: &machine::Machine, seed: u64) -> u32 {
 fn wish(random: &mut SplitMix64, is_first: bool) -> OperatorRequest {
     use OperatorVerb::*;
     let verbs = [
-        Enable, Enable, Disable, Hold, Resume, Stop, Reset, Override, Start, Home, Jog, Jog, Jog,
-        Step, Step, TestPulse, TestPulse, Probe,
+        Enable, Enable, Disable, Hold, Resume, Stop, Reset, Override, Start, Home, Jog, Jog, JogOn,
+        JogOn, Jog, Step, Step, TestPulse, TestPulse, Probe,
     ];
     let verb = verbs[(random.fraction() * verbs.len() as f64) as usize];
     let verb = if is_first { Enable } else { verb };
@@ -79,6 +79,7 @@ fn wish(random: &mut SplitMix64, is_first: bool) -> OperatorRequest {
         Step | Probe => (sign * random.fraction() * 0.02, random.fraction() * 0.2),
         TestPulse => (random.fraction() * 0.12, random.fraction() * 0.11),
         Start => (1.0, 0.0),
+        JogOn => ((random.fraction() * 40.0).floor(), 0.0),
         _ => (random.fraction() * 2.0, 0.0),
     };
     let value = if odd {

@@ -85,6 +85,8 @@ fn without_value(code: FaultCode) -> &'static str {
         FaultCode::SupervisorLost => "the supervisor died or left",
         FaultCode::StaleCommand => "drives got no fresh command and stopped the axes by itself",
         FaultCode::DriveFault => "the drives or the motors refuse",
+        FaultCode::EmergencyStop => "it was pressed",
+        FaultCode::DoorOpened => "the door was opened while a job was under way",
         _ => "no value was reported",
     }
 }

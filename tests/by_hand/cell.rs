@@ -1,0 +1,130 @@
+//! A machine with switches, as services in a place of its own.
+
+use crate::support::{Ended, Place, Running, TERMINATE, source};
+use serde_json::Value;
+
+/// Switches next to where the machine stands at first, so that homing is short; a probe, a door, an interlock, an
+/// emergency stop.
+const SWITCHES: &str = r#"
+[inputs.x_home]
+function = "home"
+axis = "x"
+at = "90 mm"
+[inputs.x_max]
+function = "limit"
+axis = "x"
+side = "upper"
+at = "206 mm"
+[inputs.y_home]
+function = "home"
+axis = "y"
+side = "upper"
+at = "110 mm"
+[inputs.estop]
+function = "estop"
+active = "low"
+[inputs.door]
+function = "door"
+[inputs.chiller]
+function = "interlock"
+[inputs.probe]
+function = "probe"
+axis = "x"
+side = "upper"
+at = "105 mm"
+[axis.x.homing]
+position = "90 mm"
+speed = "100 mm/s"
+latch_speed = "10 mm/s"
+[axis.y.homing]
+direction = "upper"
+position = "110 mm"
+speed = "100 mm/s"
+latch_speed = "10 mm/s"
+order = 1
+"#;
+
+/// A domain with its services, all running.
+pub(crate) struct Cell {
+    pub(crate) place: Place,
+    pub(crate) domain: Running,
+    services: Vec<Running>,
+}
+
+impl Cell {
+    /// With `more` in its machine file.
+    pub(crate) fn new(more: &str) -> Self {
+        let machine = std::fs::read_to_string(source("machines/cartesian.toml")).unwrap();
+        Self::of(&format!("{machine}{SWITCHES}{more}"))
+    }
+
+    /// With this machine file.
+    pub(crate) fn of(machine: &str) -> Self {
+        let place = Place::new();
+        let file = place.file("cell.toml", machine);
+        let name = place.instance().name().to_owned();
+        let domain = ["domain", "--no-realtime", "--machine", file.to_str().unwrap()];
+        let mut domain = place.start(&[&domain[..], &["--instance", &name]].concat());
+        place.await_status(&mut domain, "domain", |_| true);
+        let roles = ["monitor", "drives", "planner", "controller"];
+        let services = roles.map(|role| place.start(&[role, "--instance", &name])).into();
+        let mut cell = Self { place, domain, services };
+        cell.until("services", |status| {
+            roles.iter().all(|role| status["services"][role].is_number())
+                && status["cycles"].as_u64() > Some(0)
+        });
+        cell
+    }
+
+    /// With its motors on.
+    pub(crate) fn enabled(more: &str) -> Self {
+        let cell = Self::new(more);
+        cell.ask(&["enable"]).accepted();
+        cell
+    }
+
+    /// At home.
+    pub(crate) fn homed(more: &str) -> Self {
+        let cell = Self::enabled(more);
+        cell.ask(&["home"]).accepted();
+        cell
+    }
+
+    /// What `graver` says to these arguments.
+    pub(crate) fn ask(&self, arguments: &[&str]) -> Ended {
+        self.place.ask(arguments)
+    }
+
+    /// A `graver` with these arguments that goes on.
+    pub(crate) fn start(&self, arguments: &[&str]) -> Running {
+        let instance = ["--instance", self.place.instance().name()];
+        self.place.start(&[arguments, &instance[..]].concat())
+    }
+
+    /// The first status of which this holds.
+    pub(crate) fn until(&mut self, what: &str, holds: impl Fn(&Value) -> bool) -> Value {
+        self.place.await_status(&mut self.domain, what, holds)
+    }
+
+    /// What the machine says of itself now.
+    pub(crate) fn status(&self) -> Value {
+        self.place.status().unwrap()
+    }
+
+    /// Where x is [m].
+    pub(crate) fn x(&self) -> f64 {
+        self.status()["axes"]["x"]["position"].as_f64().unwrap()
+    }
+
+    /// Ends it all, with the proof that nothing is left.
+    pub(crate) fn end(self) {
+        let Self { place, domain, services } = self;
+        domain.signal(TERMINATE);
+        assert_eq!(domain.wait().code, Some(0));
+        for service in services {
+            service.signal(TERMINATE);
+            service.wait();
+        }
+        place.assert_nothing_left(&[]);
+    }
+}
