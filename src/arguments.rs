@@ -2,6 +2,7 @@
 
 mod bench;
 mod examples;
+mod offset;
 mod operating;
 mod pipeline;
 mod planning;
@@ -12,8 +13,10 @@ pub use self::workbench::{
     NewArguments, SizeArguments, SizeGears, SizeOrder, TableFormat, TablesArguments,
 };
 pub use bench::{BenchArguments, BenchCommand, LatencyArguments, PlanBenchArguments};
+pub use offset::{OffsetArguments, OffsetClearArguments, OffsetCommand, OffsetPlace};
 pub use operating::{
-    HomeArguments, InputArguments, InputLevel, JogArguments, ProbeArguments, TestPulseArguments,
+    HomeArguments, InputArguments, InputLevel, JogArguments, OutputArguments, ProbeArguments,
+    TestPulseArguments,
 };
 pub use pipeline::{
     DomainArguments, DrivesArguments, DrivesKind, OverrideArguments, RunArguments,
@@ -104,8 +107,15 @@ pub enum Command {
     Probe(ProbeArguments),
     /// Set an input of a simulated machine, such as its door.
     Input(InputArguments),
+    /// Switch an output that a job could switch, such as the air assist.
+    Output(OutputArguments),
+    /// Set, clear and list offsets: origins of work coordinate systems, and of the tool.
+    #[command(subcommand)]
+    Offset(OffsetCommand),
     /// Say what a running pipeline is doing, with the process ids of its services.
     Status(InstanceArguments),
+    /// Say what faults an instance had, also before its start, whether or not it runs.
+    Faults(InstanceArguments),
     /// Compare machines on the same job: time, error, what their motors must give, stiffness, and who
     /// comes first.
     #[command(after_help = COMPARE_EXAMPLES)]

@@ -5,7 +5,7 @@ use crate::exit::Failure;
 use machine::Machine;
 use machine::document::{Document, Override};
 use machine::machine::{BUILTIN, BUILTIN_NAME};
-use planner::request::JobRequest;
+use planner::request::{JobRequest, OffsetsFile};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -63,6 +63,23 @@ impl MachineSource {
         }
     }
 
+    /// The path of the machine file, as it holds from anywhere; `None` for the built-in machine.
+    pub fn path(&self) -> Option<PathBuf> {
+        let path = &self.file.as_ref()?.path;
+        Some(std::path::absolute(path).unwrap_or_else(|_| path.clone()))
+    }
+
+    /// The offsets that people have set beside the machine file, as they are now.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn offsets(&self) -> Result<Option<OffsetsFile>, Failure> {
+        match &self.file {
+            Some(file) => Ok(OffsetsFile::beside(&file.path)?),
+            None => Ok(None),
+        }
+    }
+
     fn build(&self, machine: &[Override], plant: &[Override]) -> Result<Machine, Failure> {
         let name = self.file.as_ref().map(|file| file.path.display().to_string());
         let text = self.file.as_ref().map(|file| file.text.as_str());
@@ -116,6 +133,7 @@ pub fn job_request(
     JobRequest {
         job: job.map(Path::to_owned).or_else(sample),
         set: set.iter().map(|change| format!("{}={}", change.key, change.value)).collect(),
+        offsets: None,
     }
 }
 

@@ -15,8 +15,8 @@ pub mod pipeline;
 use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
-    bench, calibrate, check, compare, export, figures, kinematics, machine, manual, operating,
-    operator, plan, run, service, simulate, size, tables, verify,
+    bench, calibrate, check, compare, export, faults, figures, kinematics, machine, manual, offset,
+    operating, operator, plan, run, service, simulate, size, tables, verify,
 };
 use exit::{Exit, Failure};
 use pipeline::operators::Verb;
@@ -64,7 +64,10 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::TestPulse(arguments) => operating::test_pulse(arguments),
         Command::Probe(arguments) => operating::probe(arguments),
         Command::Input(arguments) => operating::input(arguments),
+        Command::Output(arguments) => operating::output(arguments),
+        Command::Offset(command) => offset::run(command),
         Command::Status(arguments) => operator::status(arguments),
+        Command::Faults(arguments) => faults::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Tables(arguments) => tables::run(arguments),
         Command::Domain(arguments) => run::domain(arguments),

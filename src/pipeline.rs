@@ -7,6 +7,7 @@
 mod caps;
 pub mod configuration;
 pub mod control;
+pub mod fault_history;
 pub mod job_run;
 pub mod operators;
 pub mod power_up;
@@ -161,7 +162,8 @@ impl Pipeline {
             // Its one job is under way from here on: an operator who says stop means it.
             control.begin(ONLY_JOB);
         }
-        board.know(&machine);
+        board.know(&machine, configuration.source.path().as_deref());
+        board.keep_faults(fault_history::path(instance.name()));
         let inputs = Arc::new(AtomicU64::new(0));
         let simulated = domain.publisher().map_err(Failure::service)?;
         let answers = operators::Answers::new(

@@ -113,7 +113,7 @@ fn judge(file: &File, text: &str, job: &Path, known: usize) -> Verdict {
     if machine.warnings.len() > known || SimulatedPlant::new(&machine, options).is_err() {
         return Verdict::Told;
     }
-    let request = JobRequest { job: Some(job.to_owned()), set: Vec::new() };
+    let request = JobRequest { job: Some(job.to_owned()), set: Vec::new(), offsets: None };
     let Ok(plan) = request.plan(&machine) else { return Verdict::NoJob };
     if plan.facts.duration > LONGEST {
         return Verdict::NoJob;

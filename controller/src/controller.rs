@@ -53,6 +53,7 @@ use crate::exchange::{Inputs, Outputs, Peers, Presence};
 use crate::feedforward::{Feedforward, Planned};
 use crate::homing::Homing;
 use crate::intake::Intake;
+use crate::outputs::Switching;
 use crate::player::{Event, Player};
 use crate::reference::Reference;
 use crate::safety::Safety;
@@ -63,13 +64,13 @@ use crate::statistics::Statistics;
 use crate::stream_time::{ONE, StreamTime};
 use crate::supervision::{Elapsed, Finding, Supervision, Tracking};
 use crate::test_pulse::TestPulse;
-use crate::travel::Travel;
+use crate::travel::{MOVERS, Travel};
 use answer::PROGRESS_INTERVAL;
 use machine::{Actuator, ActuatorMode, Machine};
 use messages::feedback::status;
 use messages::{
     ActuatorArray, Command, CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity,
-    Feedback, LaserCycle, MAX_ACTUATORS, MAX_AXES, MotionEnd, Nanoseconds, RealtimeFacts,
+    Feedback, LaserCycle, MAX_ACTUATORS, MotionEnd, Nanoseconds, RealtimeFacts,
 };
 use transitions::Waits;
 
@@ -107,11 +108,12 @@ pub struct Controller {
     squaring: Squaring,
     reference: Reference,
     safety: Safety,
+    switching: Switching,
     /// What moves without a stream.
     travel: Travel,
     homing: Homing,
-    /// Of each axis that is jogged for as long as it is asked for.
-    jogs: [Option<operating::Jog>; MAX_AXES],
+    /// Of each mover that is jogged for as long as it is asked for.
+    jogs: [Option<operating::Jog>; MOVERS],
     /// Requests of people that were accepted, and how the newest motion by hand ended.
     requests: u32,
     motion_end: MotionEnd,
@@ -161,9 +163,10 @@ impl Controller {
             squaring: Squaring::default(),
             reference: Reference::new(machine),
             safety: Safety::new(machine),
+            switching: Switching::new(machine),
             travel: Travel::new(machine, period.seconds()),
             homing: Homing::new(machine, period.seconds()),
-            jogs: [None; MAX_AXES],
+            jogs: [None; MOVERS],
             requests: 0,
             motion_end: MotionEnd::None,
             probing: operating::Probing::default(),
@@ -224,10 +227,12 @@ impl Controller {
             self.fail(finding, now);
         }
         self.command(now, inputs, &mut outputs.command);
+        outputs.command.outputs = self.switch_outputs();
         if let Some((index, target)) = not_finite(&outputs.command) {
             let fault = Fault::new(FaultCode::NotFinite).on_actuator(index);
             self.fail(Finding::lost(fault.with(FaultQuantity::Number, target)), now);
             self.command(now, inputs, &mut outputs.command);
+            outputs.command.outputs = self.switching.on();
         }
         if self.playing != 0 {
             let now = self.feedforward.now();
@@ -260,6 +265,7 @@ impl Controller {
         outputs.command.mode = self.state.mode() as u32;
         outputs.command.state = self.state.to_wire() as u32;
         outputs.command.fault = self.fault;
+        outputs.command.outputs = self.switch_outputs();
         outputs.progress = Some(self.progress(now, &outputs.command));
     }
 

@@ -16,6 +16,7 @@ pub mod homing;
 pub mod intake;
 pub mod lookahead;
 pub mod motion_limits;
+pub mod outputs;
 pub mod player;
 pub mod ramp;
 pub mod reference;

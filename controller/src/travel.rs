@@ -1,13 +1,17 @@
-//! Motions of single joints that no stream asks for: homing, jogging, probing.
+//! Motions of single joints that no stream asks for: homing, jogging, probing; and of the tool along x, y or z, where
+//! joints go straight with it.
 //!
-//! Each joint follows a `Course`: from rest to rest by a quintic, or from however it moves to another speed by
+//! Each of these movers follows a `Course`: from rest to rest by a quintic, or from however it moves to another speed by
 //! a cubic of the velocity. Both have their limits in closed form, end exactly, and need no memory. Limits are
 //! those of the axis and, where the joint slides, of the path; an axis without any takes `RISE` to its
 //! largest speed.
 
 use crate::feedforward::Planned;
-use machine::{Axis, JointUnit, Machine};
+use machine::{Axis, Directions, JointUnit, Machine};
 use messages::{ActuatorArray, MAX_ACTUATORS, MAX_AXES};
+
+/// What can be moved: the joints, and the tool along x, y and z, from [`MAX_AXES`] on.
+pub const MOVERS: usize = MAX_AXES + 3;
 
 /// The least time in which a joint comes to its largest speed [s], and to its largest acceleration.
 const RISE: f64 = 0.1;
@@ -16,6 +20,20 @@ const ONSET: f64 = 0.05;
 /// What of its largest speed a joint is asked for: told to go slower in the midst of speeding up, it goes on getting
 /// faster for a moment, by up to a ninth.
 const SPEED_SHARE: f64 = 0.85;
+
+/// What each mover may go to, `None` where nobody knows [m or rad].
+pub type Bounds = [Option<[f64; 2]>; MOVERS];
+
+/// A place that a motion would lead beyond.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beyond {
+    /// Which joint, or direction of the tool, would be there.
+    pub mover: usize,
+    /// Where it would be [m or rad].
+    pub end: f64,
+    /// Where it may be [m or rad].
+    pub limit: f64,
+}
 
 /// How far a joint has gone from where the travel began, and how it moves [joint units].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -50,6 +68,27 @@ impl Pace {
         let acceleration = axis.limits.acceleration.min(path[1]).min(velocity / RISE);
         let jerk = axis.limits.jerk.min(path[2]).min(acceleration / ONSET);
         Self { velocity, acceleration, jerk }
+    }
+
+    /// Of the tool in a direction in which each joint goes by its `lever`.
+    fn along(machine: &Machine, lever: &messages::AxisArray) -> Self {
+        let path = &machine.path;
+        let whole = Self {
+            velocity: SPEED_SHARE * path.rapid,
+            acceleration: path.acceleration,
+            jerk: path.jerk,
+        };
+        let joints = machine.axes.iter().zip(lever).filter(|(_, lever)| **lever != 0.0);
+        let pace = joints.fold(whole, |least, (axis, lever)| {
+            let own = Self::new(machine, axis);
+            Self {
+                velocity: least.velocity.min(own.velocity / lever.abs()),
+                acceleration: least.acceleration.min(own.acceleration / lever.abs()),
+                jerk: least.jerk.min(own.jerk / lever.abs()),
+            }
+        });
+        let acceleration = pace.acceleration.min(pace.velocity / RISE);
+        Self { acceleration, jerk: pace.jerk.min(acceleration / ONSET), ..pace }
     }
 
     /// Time in which a joint with acceleration `from` comes to a velocity that is `change` away, at rest in its
@@ -154,9 +193,11 @@ struct Driven {
 /// The joints' motions.
 #[derive(Debug, Clone)]
 pub struct Travel {
-    paces: Vec<Pace>,
+    /// `None` of what cannot be moved.
+    paces: [Option<Pace>; MOVERS],
+    directions: Directions,
     driven: Vec<Driven>,
-    courses: [Course; MAX_AXES],
+    courses: [Course; MOVERS],
     /// Where it began.
     base: Planned,
     is_moving: bool,
@@ -173,24 +214,42 @@ impl Travel {
             inertia: actuator.gains.inertia,
             viscous: actuator.friction.viscous,
         });
+        let directions = Directions::of(machine);
+        let paces = core::array::from_fn(|mover| match mover.checked_sub(MAX_AXES) {
+            None => machine.axes.get(mover).map(|axis| Pace::new(machine, axis)),
+            Some(direction) => directions.lever(direction).map(|it| Pace::along(machine, it)),
+        });
         Self {
-            paces: machine
-                .axes
-                .iter()
-                .take(MAX_AXES)
-                .map(|axis| Pace::new(machine, axis))
-                .collect(),
+            paces,
+            directions,
             driven: driven.collect(),
-            courses: [Course::default(); MAX_AXES],
+            courses: [Course::default(); MOVERS],
             base: Planned::default(),
             is_moving: false,
             period,
         }
     }
 
-    /// How fast the joint of `axis` may go; `None` where there is no such axis.
-    pub fn pace(&self, axis: usize) -> Option<&Pace> {
-        self.paces.get(axis)
+    /// How fast a mover may go; `None` where there is no such one.
+    pub fn pace(&self, mover: usize) -> Option<&Pace> {
+        self.paces.get(mover)?.as_ref()
+    }
+
+    /// The ways of tool and joints that belong together.
+    pub fn directions(&self) -> &Directions {
+        &self.directions
+    }
+
+    /// Way of a joint, or of the tool in a direction, for each way of `mover`.
+    pub fn share(&self, of: usize, mover: usize) -> f64 {
+        match (of.checked_sub(MAX_AXES), mover.checked_sub(MAX_AXES)) {
+            (None, Some(direction)) => {
+                self.directions.lever(direction).map_or(0.0, |lever| lever[of])
+            }
+            (Some(direction), None) => self.directions.tool(direction)[mover],
+            _ if of == mover => 1.0,
+            _ => 0.0,
+        }
     }
 
     /// Whether no joint moves.
@@ -208,17 +267,70 @@ impl Travel {
         self.courses.get(axis).map_or(Motion::default(), |it| it.at(it.elapsed, self.period))
     }
 
-    /// Where the joint of `axis` is [m or rad].
-    pub fn place(&self, axis: usize, standing: &Planned) -> f64 {
+    /// How all movers together move a joint, or the tool in a direction, since the travel began.
+    fn moved(&self, of: usize) -> Motion {
+        let movers = (0..MOVERS).filter(|mover| self.share(of, *mover) != 0.0);
+        movers.fold(Motion::default(), |sum, mover| {
+            let (share, motion) = (self.share(of, mover), self.motion(mover));
+            Motion {
+                position: sum.position + share * motion.position,
+                velocity: sum.velocity + share * motion.velocity,
+                acceleration: sum.acceleration + share * motion.acceleration,
+            }
+        })
+    }
+
+    /// Where a joint is, or the tool in a direction [m or rad].
+    pub fn place(&self, mover: usize, standing: &Planned) -> f64 {
         let base = if self.is_moving { &self.base } else { standing };
-        let own = self.driven.iter().zip(&base.angle).filter(|(it, _)| it.axis == axis);
-        let joint: f64 = own.map(|(it, angle)| it.share * (angle * it.ratio)).sum();
-        if self.is_moving { joint + self.motion(axis).position } else { joint }
+        let from = match mover.checked_sub(MAX_AXES) {
+            Some(direction) => base.tool.get(direction).copied().unwrap_or_default(),
+            None => {
+                let own = self.driven.iter().zip(&base.angle).filter(|(it, _)| it.axis == mover);
+                own.map(|(it, angle)| it.share * (angle * it.ratio)).sum()
+            }
+        };
+        if self.is_moving { from + self.moved(mover).position } else { from }
+    }
+
+    /// The first place beyond `bounds` to which another `way` of `mover` would lead, with whatever else comes to rest
+    /// meanwhile.
+    pub fn beyond(
+        &self,
+        mover: usize,
+        way: f64,
+        bounds: &Bounds,
+        standing: &Planned,
+    ) -> Option<Beyond> {
+        (0..MOVERS).find_map(|of| {
+            let own = self.share(of, mover) * way;
+            let [lower, upper] = bounds[of].filter(|_| own != 0.0)?;
+            let others = (0..MOVERS).filter(|other| *other != mover);
+            let others: f64 = others.map(|it| self.share(of, it) * self.way_to_rest(it)).sum();
+            let end = self.place(of, standing) + others + own;
+            match own > 0.0 {
+                true if end > upper => Some(Beyond { mover: of, end, limit: upper }),
+                false if end < lower => Some(Beyond { mover: of, end, limit: lower }),
+                _ => None,
+            }
+        })
+    }
+
+    /// How far a mover goes yet if it is stopped in the next cycle, or comes to rest already.
+    fn way_to_rest(&self, mover: usize) -> f64 {
+        let (Some(pace), false) = (self.pace(mover), self.rests(mover)) else { return 0.0 };
+        let course = &self.courses[mover];
+        let from = self.motion(mover).position;
+        if course.speed == 0.0 {
+            return course.end(self.period) - from;
+        }
+        let next = course.at(course.elapsed + 1, self.period);
+        Course::to_speed(next, 0.0, pace, self.period).end(self.period) - from
     }
 
     /// Forgets all motion: the axes rest where somebody else says.
     pub fn reset(&mut self) {
-        (self.courses, self.is_moving) = ([Course::default(); MAX_AXES], false);
+        (self.courses, self.is_moving) = ([Course::default(); MOVERS], false);
     }
 
     fn begin(&mut self, standing: &Planned) {
@@ -233,7 +345,8 @@ impl Travel {
     pub fn go(&mut self, axis: usize, distance: f64, speed: f64, standing: &Planned) {
         self.begin(standing);
         let from = self.motion(axis).position;
-        let (Some(pace), Some(course)) = (self.paces.get(axis), self.courses.get_mut(axis)) else {
+        let (Some(Some(pace)), Some(course)) = (self.paces.get(axis), self.courses.get_mut(axis))
+        else {
             return;
         };
         let pace = Pace { velocity: pace.velocity.min(speed.abs()), ..*pace };
@@ -244,7 +357,8 @@ impl Travel {
     pub fn run(&mut self, axis: usize, speed: f64, standing: &Planned) {
         self.begin(standing);
         let from = self.motion(axis);
-        let (Some(pace), Some(course)) = (self.paces.get(axis), self.courses.get_mut(axis)) else {
+        let (Some(Some(pace)), Some(course)) = (self.paces.get(axis), self.courses.get_mut(axis))
+        else {
             return;
         };
         let speed = speed.clamp(-pace.velocity, pace.velocity);
@@ -265,7 +379,8 @@ impl Travel {
             return;
         }
         let from = self.motion(axis);
-        let (Some(pace), Some(course)) = (self.paces.get(axis), self.courses.get_mut(axis)) else {
+        let (Some(Some(pace)), Some(course)) = (self.paces.get(axis), self.courses.get_mut(axis))
+        else {
             return;
         };
         let rest = Course::to_speed(from, 0.0, pace, self.period);
@@ -281,43 +396,36 @@ impl Travel {
         (0..self.paces.len()).for_each(|axis| self.stop(axis));
     }
 
-    /// Stops the joint of `axis` where another cycle would take it beyond `upper`, or `lower`, before it rests
-    /// [m or rad], and tells whether it did; the axes stand at `standing` where none moves.
-    pub fn keep_within(&mut self, axis: usize, bounds: [f64; 2], standing: &Planned) -> bool {
-        if self.rests(axis) || self.comes_to_rest(axis) {
-            return false;
-        }
-        let Some(course) = self.courses.get(axis) else { return false };
-        let goes_out = !self.comes_to_rest_within(axis, course, bounds, standing);
-        if goes_out {
-            self.stop(axis);
-        }
-        goes_out
-    }
-
-    /// Whether the joint of `axis`, told to go on at `speed`, could do so for a cycle and come to rest within
-    /// `bounds` [m or rad]; the axes stand at `standing` where none moves.
-    pub fn has_room(&self, axis: usize, speed: f64, bounds: [f64; 2], standing: &Planned) -> bool {
-        let Some(pace) = self.paces.get(axis) else { return false };
-        let speed = speed.clamp(-pace.velocity, pace.velocity);
-        let course = Course::to_speed(self.motion(axis), speed, pace, self.period);
-        self.comes_to_rest_within(axis, &course, bounds, standing)
-    }
-
-    /// Whether the joint of `axis` comes to rest between `lower` and `upper` if it follows `course` for another cycle.
-    fn comes_to_rest_within(
-        &self,
-        axis: usize,
-        course: &Course,
-        [lower, upper]: [f64; 2],
+    /// Stops a mover where another cycle would lead beyond `bounds`, and says beyond which; the axes stand at
+    /// `standing` where none moves.
+    pub fn keep_within(
+        &mut self,
+        mover: usize,
+        bounds: &Bounds,
         standing: &Planned,
-    ) -> bool {
-        let Some(pace) = self.paces.get(axis) else { return false };
-        let next = course.at(course.elapsed + 1, self.period);
+    ) -> Option<Beyond> {
+        if self.rests(mover) || self.comes_to_rest(mover) {
+            return None;
+        }
+        let beyond = self.beyond(mover, self.way_to_rest(mover), bounds, standing)?;
+        self.stop(mover);
+        Some(beyond)
+    }
+
+    /// What a mover that is told to go on at `speed` for a cycle, and then to rest, would lead beyond.
+    pub fn lacks_room(
+        &self,
+        mover: usize,
+        speed: f64,
+        bounds: &Bounds,
+        standing: &Planned,
+    ) -> Option<Beyond> {
+        let pace = self.pace(mover)?;
+        let speed = speed.clamp(-pace.velocity, pace.velocity);
+        let from = self.motion(mover);
+        let next = Course::to_speed(from, speed, pace, self.period).at(1, self.period);
         let rest = Course::to_speed(next, 0.0, pace, self.period);
-        let way = rest.end(self.period) - self.motion(axis).position;
-        let end = self.place(axis, standing) + way;
-        !((way > 0.0 && end > upper) || (way < 0.0 && end < lower))
+        self.beyond(mover, rest.end(self.period) - from.position, bounds, standing)
     }
 
     /// Goes on by one cycle, to where `weight` [N·m] has to be borne; where that is, `None` where nothing moves.
@@ -325,11 +433,10 @@ impl Travel {
         if !self.is_moving {
             return None;
         }
-        let mut motions = [Motion::default(); MAX_AXES];
-        for (motion, course) in motions.iter_mut().zip(&mut self.courses) {
-            course.elapsed = course.elapsed.saturating_add(1);
-            *motion = course.at(course.elapsed, self.period);
-        }
+        self.courses
+            .iter_mut()
+            .for_each(|course| course.elapsed = course.elapsed.saturating_add(1));
+        let motions: [Motion; MAX_AXES] = core::array::from_fn(|axis| self.moved(axis));
         let mut planned = self.base;
         for (index, driven) in self.driven.iter().enumerate() {
             let Some(motion) = motions.get(driven.axis) else { continue };
@@ -406,18 +513,54 @@ mod tests {
     #[test]
     fn a_joint_that_is_kept_within_stops_before_the_end_and_close_to_it() {
         let machine = Machine::builtin();
+        let mut bounds = [None; MOVERS];
+        bounds[0] = Some([-0.1, 0.1]);
         for speed in [0.01, 0.1, 0.2] {
             let mut travel = Travel::new(&machine, PERIOD);
             let mut standing = Planned::default();
             travel.run(0, speed, &standing);
             for _ in 0..20_000 {
-                travel.keep_within(0, [-0.1, 0.1], &standing);
+                travel.keep_within(0, &bounds, &standing);
                 standing = travel.advance(|_| {}).unwrap_or(standing);
                 assert!(travel.place(0, &standing) <= 0.1);
             }
             assert!(travel.is_at_rest());
             assert!(travel.place(0, &standing) > 0.1 - 1.1e-3 * speed.max(0.1), "{speed}");
         }
+    }
+
+    #[test]
+    fn the_tool_of_a_corexy_goes_straight_and_no_joint_leads_it_out_of_the_area() {
+        let machine = Machine::builtin();
+        let [x, y] = [MAX_AXES, MAX_AXES + 1];
+        let mut travel = Travel::new(&machine, PERIOD);
+        let mut standing = Planned::default();
+        travel.go(y, 0.02, 0.1, &standing);
+        while let Some(mut planned) = travel.advance(|_| {}) {
+            let joint = |index: usize| planned.angle[index] * machine.actuators[index].ratio;
+            assert!((joint(0) + joint(1)).abs() < 1e-12, "x stays");
+            planned.tool[1] = (joint(0) - joint(1)) / 2.0;
+            standing = planned;
+        }
+        assert!((travel.place(y, &standing) - 0.02).abs() < 1e-12);
+        assert!((travel.place(0, &standing) - 0.02).abs() < 1e-12);
+        // Belt a takes the tool along x and y at once: x ends it.
+        let mut bounds = [None; MOVERS];
+        bounds[x] = Some([-0.01, 0.03]);
+        let far = travel.beyond(0, 0.1, &bounds, &standing).unwrap();
+        assert_eq!((far.mover, far.limit), (x, 0.03));
+        assert!((far.end - 0.05).abs() < 1e-12);
+        travel.run(0, 0.1, &standing);
+        let mut told = None;
+        for _ in 0..5000 {
+            told = told.or(travel.keep_within(0, &bounds, &standing));
+            assert!(travel.place(x, &standing) <= 0.03);
+            let Some(mut planned) = travel.advance(|_| {}) else { break };
+            planned.tool[0] = 0.5 * (planned.angle[0] * machine.actuators[0].ratio - 0.02);
+            standing = planned;
+        }
+        assert_eq!(told.map(|it| it.mover), Some(x));
+        assert!(travel.is_at_rest());
     }
 
     #[test]

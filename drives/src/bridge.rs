@@ -140,6 +140,13 @@ impl Bridge {
         }
     }
 
+    /// Opens the holding brakes by these outputs, one bit each, while the motors are powered.
+    #[must_use]
+    pub fn with_brakes(mut self, brakes: u64) -> Self {
+        self.watchdog.set_brakes(brakes);
+        self
+    }
+
     /// Says whether the gate may open, from the next begin on until said otherwise.
     pub fn permit(&mut self, permission: GatePermission) {
         self.permission = permission;

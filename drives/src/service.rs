@@ -14,7 +14,7 @@
 
 use crate::bridge::{Bridge, BridgeOptions, Deadlines, GatePermission};
 use crate::port::{Freshness, Port, PortError};
-use machine::{Machine, Timing};
+use machine::Machine;
 use messages::feedback::status;
 use messages::report::refused;
 use messages::time::Period;
@@ -72,7 +72,7 @@ pub fn run(
     port: Box<dyn Port>,
     options: &ServiceOptions,
 ) -> Result<(), ServiceError> {
-    let mut cycle = ServiceCycle::open(domain, port, options, machine.realtime)?;
+    let mut cycle = ServiceCycle::open(domain, port, options, machine)?;
     let result = cycle.drive(machine, options);
     let closed = cycle.bridge.close().map_err(work);
     result.and(closed)
@@ -121,15 +121,16 @@ impl ServiceCycle {
         domain: &Domain,
         port: Box<dyn Port>,
         options: &ServiceOptions,
-        timing: Timing,
+        machine: &Machine,
     ) -> Result<Self, ServiceError> {
+        let timing = machine.realtime;
         let bridge_options = BridgeOptions {
             epoch: clock::now().0.unsigned_abs(),
             deadlines: options.deadlines,
             timing,
         };
         Ok(Self {
-            bridge: Bridge::new(port, bridge_options),
+            bridge: Bridge::new(port, bridge_options).with_brakes(machine.operating.brakes()),
             period: timing.period,
             deadlines: options.deadlines,
             peers: Peers::watch(domain, &[Role::Domain, Role::Planner, Role::Controller])?,

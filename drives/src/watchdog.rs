@@ -10,6 +10,7 @@
 //!   fresh command, or at once for a command that makes no sense, a fault of the port or a lost controller,
 //!   they are stopped by the drive's own brake, in the dark and with all outputs off. Until then they
 //!   go on with the last command.
+//! - **Holding brakes**: open while the motors are powered, whatever the command says of their outputs.
 //! - **Skipped cycles**, for whose deadlines drives was too late, are cycles without a fresh command.
 //! - **Latch**: a stop stays, with its first cause, until a person has asked for a reset (its
 //!   ticket travels in the command) and the controller starts again from disabled.
@@ -72,6 +73,8 @@ pub struct Counts {
 #[derive(Debug, Clone)]
 pub struct Watchdog {
     actuators: usize,
+    /// Outputs that open the holding brakes, one bit each.
+    brakes: u64,
     period: Period,
     tolerated: u64,
     watch: Watch,
@@ -91,6 +94,7 @@ impl Watchdog {
     pub fn new(actuators: usize, timing: Timing) -> Self {
         Self {
             actuators: actuators.min(MAX_ACTUATORS),
+            brakes: 0,
             period: timing.period,
             tolerated: timing.stalled_cycles(),
             watch: Watch::Waiting,
@@ -101,6 +105,17 @@ impl Watchdog {
             gate: 0,
             counts: Counts::default(),
         }
+    }
+
+    /// Opens holding brakes by these outputs, one bit each.
+    pub fn set_brakes(&mut self, brakes: u64) {
+        self.brakes = brakes;
+    }
+
+    /// The holding brakes go with the power.
+    fn switch_brakes(&mut self) {
+        let open = if self.last.mode == CommandMode::Disabled { 0 } else { self.brakes };
+        self.last.outputs = self.last.outputs & !self.brakes | open;
     }
 
     /// Its state.
@@ -131,6 +146,7 @@ impl Watchdog {
         let most = self.period.cycles_for(MOST_PASSED);
         for _ in 0..cycles.min(most) {
             self.missed(lacking, now);
+            self.switch_brakes();
             self.watch_gate(GatePermission::Granted);
             passed(&self.last);
         }
@@ -157,6 +173,7 @@ impl Watchdog {
         if permission == GatePermission::Inhibited {
             self.last.laser = LaserCycle::OFF;
         }
+        self.switch_brakes();
         self.watch_gate(permission);
         self.last
     }
@@ -236,6 +253,7 @@ impl Watchdog {
                 self.counts.stops += 1;
                 Actuation::QUICK_STOP
             };
+            self.switch_brakes();
         }
         self.last
     }

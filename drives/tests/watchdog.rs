@@ -326,6 +326,53 @@ fn a_fault_word_of_a_drive_stops_the_axes_and_is_told() {
 }
 
 #[test]
+fn holding_brakes_go_with_the_power_and_all_other_outputs_off_with_the_commands() {
+    const BRAKE: u64 = 4;
+    let told = Arc::default();
+    let port = Stub::new(&told, 0);
+    let bridge = Bridge::new(port, options(Deadlines::Strict)).with_brakes(BRAKE);
+    let mut run = Run { bridge, deadline: Nanoseconds(5_000_000_000) };
+    // Whatever the command says of the brake; the outputs beside it are its own.
+    let with = |mode, outputs| {
+        move |feedback: &Feedback| {
+            Some(Command { outputs, ..command(feedback, mode, LaserCycle::OFF) })
+        }
+    };
+    run.cycle(with(CommandMode::Disabled, BRAKE | 1));
+    run.cycle(with(CommandMode::Driven, 3));
+    run.cycle(with(CommandMode::Driven, BRAKE | 2));
+    for _ in 0..TOLERATED + 3 {
+        run.missed();
+    }
+    for _ in 0..100 {
+        run.cycle(with(CommandMode::Disabled, BRAKE | 3));
+    }
+    let told = told.lock().unwrap();
+    let on: Vec<(CommandMode, u64)> = told.iter().map(|it| (it.mode, it.outputs)).collect();
+    let driven = CommandMode::Driven;
+    assert_eq!(
+        on[..4],
+        [
+            (CommandMode::Disabled, 0),
+            (CommandMode::Disabled, 1),
+            (driven, BRAKE | 3),
+            (driven, BRAKE | 2),
+        ]
+    );
+    // Within the tolerated stall the axes go on with the last command, then they are braked, and rest.
+    let stopped = on.iter().position(|(mode, _)| *mode == CommandMode::QuickStop).unwrap();
+    assert!(on[4..stopped].iter().all(|it| *it == (driven, BRAKE | 2)), "{on:?}");
+    assert!(
+        on[stopped..].iter().all(|(mode, outputs)| match mode {
+            CommandMode::QuickStop => *outputs == BRAKE,
+            _ => *outputs == 0,
+        }),
+        "{on:?}"
+    );
+    assert_eq!(on.last(), Some(&(CommandMode::Disabled, 0)));
+}
+
+#[test]
 fn a_dead_peer_closes_the_gate_and_leaves_the_axes_to_the_controller() {
     let mut run = Run::moving();
     run.answered(CommandMode::Driven, lit());

@@ -178,8 +178,12 @@ pub struct GcodeSettings {
     /// Origins of the work coordinate systems G54 to G59, then G59.1 to G59.3, in the machine
     /// frame [m].
     pub origins: [[f64; 3]; 9],
-    /// Whether M7 and M8 switch an air assist (bit 0 of the outputs).
+    /// By how much a program goes elsewhere that asks for the tool's offset with G43 [m]: see [`crate::offsets`].
+    pub tool_offset: [f64; 3],
+    /// Whether M7 and M8 switch an air assist.
     pub air_assist: bool,
+    /// How many digital outputs M62 to M65 switch; `None` where the machine file has no outputs, and it is not known.
+    pub digital_outputs: Option<usize>,
 }
 
 crate::keyword! {

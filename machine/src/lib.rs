@@ -10,6 +10,7 @@
 pub mod actuator;
 pub mod analysis;
 pub mod axis;
+pub mod directions;
 pub mod document;
 pub mod drives;
 pub mod equation_of_motion;
@@ -23,6 +24,7 @@ pub mod limits;
 pub mod machine;
 pub mod mechanisms;
 pub mod motor;
+pub mod offsets;
 pub mod operating;
 pub mod path_check;
 pub mod pulses;
@@ -34,6 +36,7 @@ pub mod trip;
 
 pub use actuator::{Actuator, Encoder, Friction, HoldingBrake, LoopGains};
 pub use axis::{Axis, JointUnit};
+pub use directions::Directions;
 pub use document::{DocumentError, Override};
 pub use drives::{ActuatorMode, Drives, DrivesKind};
 pub use equation_of_motion::EquationOfMotion;

@@ -35,6 +35,33 @@ impl Operating {
         meant.fold(0, |mask, (bit, _)| mask | bit)
     }
 
+    /// The bit of each output with its function.
+    pub fn output_bits(&self) -> impl Iterator<Item = (u64, &Output)> {
+        self.outputs.iter().take(MAX_INPUTS).enumerate().map(|(index, output)| (1 << index, output))
+    }
+
+    /// The bits of the outputs that open brakes.
+    pub fn brakes(&self) -> u64 {
+        let brakes = self.output_bits().filter(|(_, it)| it.function == OutputFunction::Brake);
+        brakes.fold(0, |bits, (bit, _)| bits | bit)
+    }
+
+    /// The output with this name, and its index.
+    pub fn output(&self, name: &str) -> Option<(usize, &Output)> {
+        self.outputs.iter().enumerate().find(|(_, output)| output.name == name)
+    }
+
+    /// Whether the machine has the air assist that a job asks for: it has no outputs to speak of, or one for it.
+    pub fn may_have_air(&self) -> bool {
+        self.outputs.is_empty() || self.outputs.iter().any(|it| it.function == OutputFunction::Air)
+    }
+
+    /// How many digital outputs a job can switch beside the air assist; `None` where the file has no outputs.
+    pub fn general_outputs(&self) -> Option<usize> {
+        let general = self.outputs.iter().filter(|it| it.function == OutputFunction::General);
+        (!self.outputs.is_empty()).then(|| general.count())
+    }
+
     /// The input with this name, and its index.
     pub fn input(&self, name: &str) -> Option<(usize, &Input)> {
         self.inputs.iter().enumerate().find(|(_, input)| input.name == name)
@@ -133,13 +160,23 @@ pub enum InputFunction {
 }
 
 /// What an output switches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum OutputFunction {
-    /// The air assist.
+    /// The air assist, as a job says.
     Air,
-    /// The holding brakes: on opens them.
+    /// The extraction: on while a job is under way, and for so long after it [s].
+    Extraction {
+        /// How long after a job.
+        after: f64,
+    },
+    /// The holding brakes: on opens them, and they are open while the motors are powered.
     Brake,
-    /// Nothing that Graver knows of.
+    /// A lamp, a horn, a relay: on in some states of the controller, one bit each by their number.
+    Signal {
+        /// The states.
+        states: u32,
+    },
+    /// Anything else, as a job says: of these the first is its digital output 0.
     General,
 }
 

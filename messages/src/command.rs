@@ -30,7 +30,7 @@ impl CommandMode {
 
 sample! {
     /// The answer to one feedback. Drives latches it and applies it at the next deadline, always.
-    Command = "graver.Command.v4" {
+    Command = "graver.Command.v5" {
         /// The `Feedback::epoch` this answers: a command for another run of drives is not fresh.
         epoch: u64,
         /// The feedback this answers; it takes effect at the deadline of `cycle + 1`.
@@ -52,7 +52,7 @@ sample! {
         mode: u32,
         /// A [`ControllerState`](crate::ControllerState).
         state: u32,
-        /// Digital outputs, one bit each; bit 0 is the air assist.
+        /// Digital outputs in the order of the machine file, one bit each: 1 is on, whichever level that is.
         outputs: u64,
         /// Stream time at the instant of the feedback [s].
         stream_time: f64,

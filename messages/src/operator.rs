@@ -37,6 +37,8 @@ pub enum OperatorVerb {
     /// Go on with the jog of axis `axis` whose reply had the number `value`. One that has ended, for whatever
     /// reason, is not begun anew.
     JogOn = 14,
+    /// Switch output `axis`, from 1, on for a `value` of 1 and off for 0.
+    Output = 15,
 }
 
 impl OperatorVerb {
@@ -57,6 +59,7 @@ impl OperatorVerb {
             12 => Self::TestPulse,
             13 => Self::Probe,
             14 => Self::JogOn,
+            15 => Self::Output,
             _ => return None,
         })
     }
@@ -69,7 +72,8 @@ sample! {
         verb: u32,
         /// Numbers requests, so that an answer can be told from an older one.
         ticket: u32,
-        /// The axis from 1, or bits of axes, where the verb is about axes; else 0.
+        /// The axis from 1, or bits of axes, where the verb is about axes; else 0. [`MAX_AXES`](crate::MAX_AXES) + 1 to
+        /// + 3 is the tool along x, y and z.
         axis: u32,
         /// Always 0; keeps the sample free of padding.
         reserved: u32,

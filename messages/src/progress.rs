@@ -30,6 +30,8 @@ sample! {
         position: crate::AxisArray,
         /// Digital inputs in the order of the machine file, one bit each: 1 is active.
         inputs: u64,
+        /// Digital outputs in the order of the machine file, one bit each: 1 is on.
+        outputs: u64,
         /// Axes that know their place, one bit each.
         homed: u32,
         /// The axis that was probed last, from 1; 0 before the probe has touched.

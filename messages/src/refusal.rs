@@ -46,10 +46,14 @@ pub enum Refusal {
     Time = 18,
     /// The jog has ended.
     Ended = 19,
+    /// The output is none that people switch.
+    NotByHand = 20,
+    /// The tool of this machine does not go straight with its joints.
+    NoDirection = 21,
 }
 
 impl Refusal {
-    const ALL: [Self; 20] = [
+    const ALL: [Self; 22] = [
         Self::None,
         Self::State,
         Self::Unknown,
@@ -70,6 +74,8 @@ impl Refusal {
         Self::Power,
         Self::Time,
         Self::Ended,
+        Self::NotByHand,
+        Self::NoDirection,
     ];
 
     /// The refusal with this number in a sample; an unknown number reads as [`Self::State`].
@@ -100,6 +106,8 @@ impl Refusal {
             Self::Power => "power",
             Self::Time => "time",
             Self::Ended => "ended",
+            Self::NotByHand => "not_by_hand",
+            Self::NoDirection => "no_direction",
         }
     }
 }

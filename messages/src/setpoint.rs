@@ -32,7 +32,7 @@ sample! {
         published: Nanoseconds,
         /// Bits of [`flags`].
         flags: u64,
-        /// Digital outputs, one bit each; bit 0 is the air assist.
+        /// What the job has switched on: bit 0 is the air assist, bit P + 1 its digital output P.
         outputs: u64,
         /// The stroke being marked from here to the next setpoint, from 1; 0 for none.
         stroke: u64,

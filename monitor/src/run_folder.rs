@@ -43,6 +43,13 @@ impl From<FileError> for io::Error {
     }
 }
 
+/// The local time of `seconds` since 1970, as people write it: `2026-11-28 09:12:03`.
+pub fn local_time(seconds: u64) -> String {
+    let time = i64::try_from(seconds).ok().and_then(|it| jiff::Timestamp::from_second(it).ok());
+    let local = time.unwrap_or_default().to_zoned(jiff::tz::TimeZone::system());
+    local.strftime("%Y-%m-%d %H:%M:%S").to_string()
+}
+
 /// A folder that exists.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunFolder {

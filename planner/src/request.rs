@@ -4,7 +4,8 @@
 use crate::job::{Job, JobError};
 use crate::{Plan, PlanError};
 use machine::Machine;
-use machine::document::{DocumentError, Override};
+use machine::document::{Document, DocumentError, Override};
+use machine::offsets::Offsets;
 use miette::Diagnostic;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -16,6 +17,42 @@ pub struct JobRequest {
     pub job: Option<PathBuf>,
     /// Changes of the job, `KEY=VALUE`.
     pub set: Vec<String>,
+    /// The offsets that people have set at the machine; null where there are none.
+    #[serde(default)]
+    pub offsets: Option<OffsetsFile>,
+}
+
+/// A file of offsets as it was when the job was asked for: see [`machine::offsets`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OffsetsFile {
+    /// Its path.
+    pub path: PathBuf,
+    /// What it says.
+    pub text: String,
+}
+
+impl OffsetsFile {
+    /// The one beside the machine file at `machine`, if there is one.
+    ///
+    /// # Errors
+    /// One that cannot be read.
+    pub fn beside(machine: &Path) -> Result<Option<Self>, Refusal> {
+        let path = Offsets::path(machine);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let text = Document::text(&path).map_err(|error| Refusal::of_document(&error))?;
+        Ok(Some(Self { path, text }))
+    }
+
+    /// What it says.
+    ///
+    /// # Errors
+    /// One that is damaged, with the place.
+    pub fn offsets(&self) -> Result<Offsets, Refusal> {
+        let offsets = Offsets::parse(&self.path.display().to_string(), &self.text);
+        offsets.map_err(|error| Refusal::of_document(&error))
+    }
 }
 
 /// Why a job was refused, as `refused.json` in the run folder.
@@ -68,6 +105,11 @@ impl JobRequest {
             .map(|text| text.parse())
             .collect::<Result<_, _>>()
             .map_err(|error| Refusal::of_diagnostic(&error))?;
+        let applied = match &self.offsets {
+            Some(file) => Some(file.offsets()?.applied(machine)),
+            None => None,
+        };
+        let machine = applied.as_ref().unwrap_or(machine);
         match &self.job {
             Some(path) => read(path, &overrides, machine),
             None => Job::builtin(&overrides, machine),

@@ -69,7 +69,19 @@ pub struct InputArguments {
     pub instance: InstanceArguments,
 }
 
-/// Whether an input is active.
+/// Arguments of `output`.
+#[derive(Debug, Clone, Args)]
+pub struct OutputArguments {
+    /// The output's name in the machine file.
+    pub name: String,
+    /// Whether it is on.
+    pub level: InputLevel,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub instance: InstanceArguments,
+}
+
+/// Whether an input is active, or an output on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum InputLevel {
     /// It is.

@@ -102,7 +102,8 @@ struct Planned {
 }
 
 fn plan(input: &MachineInput, path: &Path) -> Result<Planned, Failure> {
-    let request = inputs::job_request(Some(path), &input.machine, None, &input.job_overrides);
+    let mut request = inputs::job_request(Some(path), &input.machine, None, &input.job_overrides);
+    request.offsets = input.source.offsets()?;
     let job = request.read(&input.machine)?;
     let plan = planner::plan(&input.machine, &job).map_err(|error| request.refuse(&error))?;
     Ok(Planned { request, files: job.files, plan })

@@ -139,6 +139,7 @@ fn subjects(
                 let request = planner::request::JobRequest {
                     job: Some(path.to_owned()),
                     set: arguments.set.clone(),
+                    offsets: None,
                 };
                 subject.jobs = vec![subject_job(&request, &subject.machine)?];
             }

@@ -183,7 +183,7 @@ fn reply(status: &Value) -> MotionReply {
     // Told before it was remembered: then its name is all that is known.
     let fault = code.map(|code| {
         let known = faults.into_iter().rev().find(|fault| fault.code == code);
-        known.unwrap_or_else(|| PastFault { time: 0, detail: code.clone(), code })
+        known.unwrap_or_else(|| PastFault { time: 0, detail: code.clone(), code, job: None })
     });
     MotionReply {
         accepted: true,

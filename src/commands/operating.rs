@@ -3,8 +3,8 @@
 use super::motion::{Motion, nearest_limit, operate, place, places};
 use super::operator::{connect, send_checked};
 use crate::arguments::{
-    HomeArguments, InputArguments, InputLevel, InstanceArguments, JogArguments, ProbeArguments,
-    TestPulseArguments,
+    HomeArguments, InputArguments, InputLevel, InstanceArguments, JogArguments, OutputArguments,
+    ProbeArguments, TestPulseArguments,
 };
 use crate::exit::{Exit, Failure};
 use crate::output::{self, say};
@@ -138,16 +138,32 @@ pub fn probe(arguments: &ProbeArguments) -> Result<Exit, Failure> {
 pub fn input(arguments: &InputArguments) -> Result<Exit, Failure> {
     let is_active = arguments.level == InputLevel::On;
     let request = Request::Input { name: arguments.name.clone(), is_active };
-    let reply = send_checked(&request, &mut connect(&arguments.instance)?, ANSWER_PATIENCE)?;
-    if arguments.instance.json {
+    let done = format!("{} is {}", arguments.name, if is_active { "active" } else { "not active" });
+    switch(&request, &arguments.instance, &done)
+}
+
+/// Switches an output.
+///
+/// # Errors
+/// No pipeline.
+pub fn output(arguments: &OutputArguments) -> Result<Exit, Failure> {
+    let is_on = arguments.level == InputLevel::On;
+    let request = Request::Output { name: arguments.name.clone(), is_on };
+    let done = format!("{} is {}", arguments.name, if is_on { "on" } else { "off" });
+    switch(&request, &arguments.instance, &done)
+}
+
+fn switch(request: &Request, arguments: &InstanceArguments, done: &str) -> Result<Exit, Failure> {
+    let reply = send_checked(request, &mut connect(arguments)?, ANSWER_PATIENCE)?;
+    if arguments.json {
         output::json(&reply)?;
     }
     if reply["accepted"].as_bool() != Some(true) {
         message::tell(&format!("refused: {}", reply["refusal"].as_str().unwrap_or_default()));
         return Ok(Exit::Stopped);
     }
-    if !arguments.instance.json {
-        say!("{} is {}", arguments.name, if is_active { "active" } else { "not active" });
+    if !arguments.json {
+        say!("{done}");
     }
     Ok(Exit::Done)
 }

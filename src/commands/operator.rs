@@ -1,11 +1,12 @@
 //! Requests to a running pipeline: hold, resume, override, stop, status, submit.
 
-use super::motion;
+use super::{faults, motion};
 use crate::arguments::{InstanceArguments, OverrideArguments, SubmitArguments};
 use crate::exit::{Exit, Failure};
 use crate::output::say;
 use crate::output::{self, ProgressLine};
 use crate::pipeline::operators::{Part, Request, Verb, VerbReply};
+use crate::pipeline::status::PastFault;
 use machine::quantity;
 use monitor::summary::Summary;
 use planner::request::JobRequest;
@@ -20,6 +21,9 @@ use std::time::Duration;
 /// How long the supervisor may take to answer a stop or a hold, before the controller is asked past
 /// it.
 const URGENT_PATIENCE: Duration = Duration::from_secs(1);
+
+/// Faults of before that a status shows.
+const FAULTS_SHOWN: usize = 3;
 
 /// Asks for a verb without argument.
 ///
@@ -131,13 +135,20 @@ pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
     if status["inputs"].as_object().is_some_and(|inputs| !inputs.is_empty()) {
         say!("inputs     {}", if active.is_empty() { "none active" } else { &active });
     }
+    let on = status["outputs"].as_object().into_iter().flatten();
+    let on = on.filter(|(_, level)| level.as_bool() == Some(true));
+    let on = on.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+    if status["outputs"].as_object().is_some_and(|outputs| !outputs.is_empty()) {
+        say!("outputs    {}", if on.is_empty() { "none on" } else { &on });
+    }
     say!("fault      {}", text("fault"));
-    for past in status["faults"].as_array().into_iter().flatten() {
-        say!(
-            "  {} UTC  {}",
-            clock(past["time"].as_u64()),
-            past["detail"].as_str().unwrap_or_default()
-        );
+    let faults: Vec<PastFault> =
+        serde_json::from_value(status["faults"].clone()).unwrap_or_default();
+    for past in faults.iter().skip(faults.len().saturating_sub(FAULTS_SHOWN)) {
+        say!("  {}", faults::line(past));
+    }
+    if faults.len() > FAULTS_SHOWN {
+        say!("  and others before them: graver faults");
     }
     say!("cycles     {}, {} overruns", status["cycles"], status["overruns"]);
     for (name, pid) in status["services"].as_object().into_iter().flatten() {
@@ -147,12 +158,6 @@ pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
         }
     }
     Ok(Exit::Done)
-}
-
-/// The time of day of `seconds` since 1970.
-fn clock(seconds: Option<u64>) -> String {
-    let seconds = seconds.unwrap_or_default() % 86_400;
-    format!("{:02}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
 }
 
 /// Hands a job to a running pipeline and follows it to its end.
@@ -174,7 +179,9 @@ pub fn submit(arguments: &SubmitArguments) -> Result<Exit, Failure> {
             folder.map_err(Failure::bad_input)?.path().to_owned()
         }
     };
-    let job = JobRequest { job: Some(whole(&arguments.job)), set: arguments.set.clone() };
+    // The offsets are those of the pipeline's machine, when the job's turn comes.
+    let set = arguments.set.clone();
+    let job = JobRequest { job: Some(whole(&arguments.job)), set, offsets: None };
     let request = Request::Submit { job, out: Some(out) };
     let mut follower = Follower { instance: &instance, job: None, told: 0 };
     let line = ProgressLine::on_terminal();

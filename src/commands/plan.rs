@@ -54,12 +54,13 @@ enum Planned {
 /// A machine or job that does not hold, or a file that cannot be written.
 pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
     let input = inputs::machine(&arguments.machine)?;
-    let request = inputs::job_request(
+    let mut request = inputs::job_request(
         arguments.job.as_deref(),
         &input.machine,
         input.folder.as_deref(),
         &input.job_overrides,
     );
+    request.offsets = input.source.offsets()?;
     refuse_contradictions(arguments, &input.machine)?;
     let counts = arguments.pulses.is_some() || arguments.pulse_path.is_some();
     let started = Instant::now();

@@ -3,6 +3,7 @@
 use crate::arguments::{DomainArguments, RunArguments};
 use crate::exit::{Exit, Failure};
 use crate::files::Claim;
+use crate::inputs::MachineSource;
 use crate::pipeline::configuration::Configuration;
 use crate::pipeline::job_run::JobRun;
 use crate::pipeline::operators::{self, Submission};
@@ -21,12 +22,13 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let started = Instant::now();
     let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
     let input = inputs::machine(&arguments.machine)?;
-    let request = inputs::job_request(
+    let mut request = inputs::job_request(
         arguments.job.as_deref(),
         &input.machine,
         input.folder.as_deref(),
         &input.job_overrides,
     );
+    request.offsets = input.source.offsets()?;
     // Read here only to refuse early; the planner reads it again.
     let job = request.read(&input.machine)?;
     let configuration = Configuration::new(input.source, &arguments.drives)?;
@@ -58,14 +60,18 @@ fn run_folder(out: Option<&Path>, job: &str) -> Result<RunFolder, Failure> {
 pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
     let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
     let source = inputs::machine(&arguments.machine)?.source;
-    let configuration = Configuration::new(source, &arguments.drives)?;
+    // A damaged file of offsets is told before anything starts, and again with each job.
+    if let Some(file) = source.offsets()? {
+        file.offsets()?;
+    }
+    let configuration = Configuration::new(source.clone(), &arguments.drives)?;
     signal::install().map_err(Failure::service)?;
     let mut pipeline = Pipeline::start(&instance, &configuration, ServiceOwner::Others)?;
     message::tell(&format!("instance {} waits for its services and jobs", instance.name()));
     while signal::termination().is_none() {
         pipeline.poll()?;
         if let Some(submission) = pipeline.submission() {
-            run_submission(&mut pipeline, submission);
+            run_submission(&mut pipeline, &source, submission);
         }
         std::thread::sleep(POLL_INTERVAL);
     }
@@ -74,12 +80,13 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
 }
 
 /// Runs a submitted job to its end; whoever submitted it hears of it in any case.
-fn run_submission(pipeline: &mut Pipeline, submission: Submission) {
+fn run_submission(pipeline: &mut Pipeline, source: &MachineSource, submission: Submission) {
     let started = Instant::now();
     let (number, events) = (submission.number, submission.events.clone());
-    let (job, out) = (submission.job.clone(), submission.out.clone());
+    let (mut job, out) = (submission.job.clone(), submission.out.clone());
     let ran = if pipeline.control.begin(number) {
         run_folder(out.as_deref(), "job").and_then(|folder| {
+            job.offsets = source.offsets()?;
             let _claim = Claim::of(&folder)?;
             let run = JobRun::prepare(pipeline, &job, folder, started, Some(submission))?;
             Ok(run.follow())

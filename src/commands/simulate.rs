@@ -26,12 +26,13 @@ use workbench::simulation::{SimulationError, simulate};
 pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     let started = Instant::now();
     let input = inputs::machine(&arguments.machine)?;
-    let request = inputs::job_request(
+    let mut request = inputs::job_request(
         arguments.job.as_deref(),
         &input.machine,
         input.folder.as_deref(),
         &input.job_overrides,
     );
+    request.offsets = input.source.offsets()?;
     let plan = request.plan(&input.machine)?;
     let plan_time = started.elapsed().as_secs_f64();
 

@@ -69,6 +69,13 @@ pub enum Request {
         /// Whether it is active from now on.
         is_active: bool,
     },
+    /// Switches an output.
+    Output {
+        /// Its name in the machine file.
+        name: String,
+        /// Whether it is on from now on.
+        is_on: bool,
+    },
     /// What is going on?
     Status,
     /// A job to run. The first part of the answer is [`Part::Accepted`].
@@ -125,6 +132,8 @@ pub enum Verb {
     Probe,
     /// Go on with a jog.
     JogOn,
+    /// Switch an output.
+    Output,
 }
 
 /// The machine's answer to a verb, as `graver hold --json` and its like print it.
@@ -196,6 +205,7 @@ impl From<Verb> for OperatorVerb {
             Verb::TestPulse => Self::TestPulse,
             Verb::Probe => Self::Probe,
             Verb::JogOn => Self::JogOn,
+            Verb::Output => Self::Output,
         }
     }
 }
@@ -272,6 +282,7 @@ impl Operators {
                     answers.operate(verb, &axes, unit.as_deref(), [value, second])
                 }
                 Request::Input { name, is_active } => answers.set_input(&name, is_active),
+                Request::Output { name, is_on } => answers.set_output(&name, is_on),
             }
         };
         let server = OperatorServer::bind(domain, answer).map_err(Failure::service)?;
@@ -343,7 +354,7 @@ impl Answers {
     ) -> Value {
         let mut numbers = Vec::with_capacity(axes.len());
         for name in axes {
-            match refusals::axis(&self.machine, name, unit) {
+            match refusals::axis(&self.machine, name, unit, verb) {
                 Ok(number) => numbers.push(number),
                 Err((code, words)) => {
                     return json!(VerbReply::refused(code, words, self.board.read().state));
@@ -354,12 +365,9 @@ impl Answers {
             Verb::Home => numbers.iter().fold(0, |bits, number| bits | 1 << (number - 1)),
             _ => numbers.first().copied().unwrap_or_default(),
         };
-        let (asked, verb) = (verb, OperatorVerb::from(verb) as u32);
-        let request = OperatorRequest { verb, axis, value, second, ..OperatorRequest::default() };
-        match self.link.ask_within(request, STOP_PATIENCE) {
-            Ok(reply) => json!(VerbReply::of(&reply, asked, &self.machine)),
-            Err(error) => json!({ "error": error.to_string() }),
-        }
+        let number = OperatorVerb::from(verb) as u32;
+        let request = OperatorRequest { verb: number, axis, value, second, ..Default::default() };
+        self.tell(request, verb)
     }
 
     /// Sets an input of a simulated machine.
@@ -380,6 +388,28 @@ impl Answers {
             inputs.fetch_and(!bit, Ordering::Relaxed);
         }
         json!(VerbReply::accepted(&state))
+    }
+
+    /// Switches an output.
+    fn set_output(&self, name: &str, is_on: bool) -> Value {
+        let Some((index, _)) = self.machine.operating.output(name) else {
+            let words = refusals::no_output(&self.machine, name);
+            return json!(VerbReply::refused(Refusal::Unknown, words, self.board.read().state));
+        };
+        let request = OperatorRequest {
+            verb: OperatorVerb::Output as u32,
+            axis: index as u32 + 1,
+            value: f64::from(u8::from(is_on)),
+            ..OperatorRequest::default()
+        };
+        self.tell(request, Verb::Output)
+    }
+
+    fn tell(&self, request: OperatorRequest, verb: Verb) -> Value {
+        match self.link.ask_within(request, STOP_PATIENCE) {
+            Ok(reply) => json!(VerbReply::of(&reply, verb, &self.machine)),
+            Err(error) => json!({ "error": error.to_string() }),
+        }
     }
 
     fn carry_out(&self, verb: Verb, value: f64) -> Value {

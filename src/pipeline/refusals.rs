@@ -2,16 +2,19 @@
 
 use super::operators::Verb;
 use machine::{JointUnit, Machine};
-use messages::{ControllerState, OperatorReply, Refusal};
+use messages::{ControllerState, MAX_AXES, OperatorReply, Refusal};
 
 /// What `reply` of the controller for `machine` to `verb` says; `None` where it is no refusal.
 pub(super) fn words(reply: &OperatorReply, verb: Verb, machine: &Machine) -> Option<String> {
     if reply.accepted == 1 {
         return None;
     }
-    let axis = (reply.axis as usize).checked_sub(1).and_then(|index| machine.axes.get(index));
-    let name = axis.map_or("", |axis| axis.name.as_str());
-    let quantity = |value: f64| match axis.map(|axis| axis.unit) {
+    let mover = (reply.axis as usize).checked_sub(1);
+    let axis = mover.and_then(|index| machine.axes.get(index));
+    let direction = mover.and_then(|index| DIRECTIONS.get(index.checked_sub(MAX_AXES)?));
+    let name = axis.map(|axis| axis.name.as_str()).or(direction.copied()).unwrap_or_default();
+    let unit = axis.map(|axis| axis.unit).or(direction.map(|_| JointUnit::Length));
+    let quantity = |value: f64| match unit {
         Some(JointUnit::Length) => format!("{:.3} mm", value * 1e3),
         Some(JointUnit::Angle) => format!("{:.3} deg", value.to_degrees()),
         None => format!("{value}"),
@@ -22,23 +25,23 @@ pub(super) fn words(reply: &OperatorReply, verb: Verb, machine: &Machine) -> Opt
         Refusal::None | Refusal::State => by_state(ControllerState::from_wire(reply.state), verb),
         Refusal::Unknown => "the controller knows no such request".to_owned(),
         Refusal::NoAxis => format!("there is no such axis; the machine has {}", names(machine)),
-        Refusal::TooLarge if axis.is_some() => {
-            format!(
-                "axis {name} is moved by hand at {} at most, not {}",
-                speed(limit),
-                speed(found)
-            )
+        Refusal::TooLarge if unit.is_some() => {
+            format!("{name} is moved by hand at {} at most, not {}", speed(limit), speed(found))
         }
         Refusal::TooLarge => format!("{found} is too much: at most {limit}"),
         Refusal::TooSmall => format!("a speed of {} leads nowhere", speed(found)),
         Refusal::NotANumber => "a way or speed of 0, or none, leads nowhere".to_owned(),
         Refusal::NotHomed => format!("axis {name} is not homed: `graver home`"),
         Refusal::SoftLimit if (found - limit).abs() < LIMIT_REACHED => {
-            format!("axis {name} is at its soft limit of {}", quantity(limit))
+            format!("{name} is at its soft limit of {}", quantity(limit))
+        }
+        Refusal::SoftLimit if direction.is_some() => {
+            let (found, limit) = (quantity(found), quantity(limit));
+            format!("the tool would be at {name} {found}, beyond its area, which ends at {limit}")
         }
         Refusal::SoftLimit => {
             let (found, limit) = (quantity(found), quantity(limit));
-            format!("axis {name} would be at {found}, beyond its soft limit of {limit}")
+            format!("{name} would be at {found}, beyond its soft limit of {limit}")
         }
         Refusal::EmergencyStop => {
             "the emergency stop is pressed: release it, then `graver reset`".to_owned()
@@ -69,7 +72,16 @@ pub(super) fn words(reply: &OperatorReply, verb: Verb, machine: &Machine) -> Opt
             short(found * 1e3)
         ),
         Refusal::Time => "a test pulse lasts longer than 0 s".to_owned(),
-        Refusal::Ended => format!("the jog of axis {name} has ended"),
+        Refusal::NotByHand => {
+            "the machine switches this output by itself: people switch those with the functions `air` and \
+             `general`"
+                .to_owned()
+        }
+        Refusal::NoDirection => format!(
+            "the tool of this machine does not go straight along {name} with its joints: jog its axes {}",
+            names(machine)
+        ),
+        Refusal::Ended => format!("the jog of {name} has ended"),
     })
 }
 
@@ -86,7 +98,13 @@ fn by_state(state: ControllerState, verb: Verb) -> String {
     use ControllerState as State;
     let moves = matches!(
         verb,
-        Verb::Home | Verb::Jog | Verb::JogOn | Verb::Step | Verb::Probe | Verb::TestPulse
+        Verb::Home
+            | Verb::Jog
+            | Verb::JogOn
+            | Verb::Step
+            | Verb::Probe
+            | Verb::TestPulse
+            | Verb::Output
     );
     let advice = match state {
         State::Disabled if moves => ": `graver enable`",
@@ -106,7 +124,11 @@ fn names(machine: &Machine) -> String {
     machine.axes.iter().map(|axis| axis.name.as_str()).collect::<Vec<_>>().join(", ")
 }
 
-/// The number of the axis called `name`, from 1, which must be moved in `unit` if one is given.
+/// Directions of the tool, for who names no axis.
+pub(super) const DIRECTIONS: [&str; 3] = ["x", "y", "z"];
+
+/// The number of the axis called `name`, from 1, or of the direction of the tool, which must be moved in `unit` if
+/// one is given.
 ///
 /// # Errors
 /// No such axis, or another unit, in words.
@@ -114,26 +136,41 @@ pub(super) fn axis(
     machine: &Machine,
     name: &str,
     unit: Option<&str>,
+    verb: Verb,
 ) -> Result<u32, (Refusal, String)> {
     let found = machine.axes.iter().enumerate().find(|(_, axis)| axis.name == name);
-    let Some((index, axis)) = found else {
+    let direction = DIRECTIONS.iter().position(|direction| *direction == name);
+    let (index, own) = if let Some((index, axis)) = found {
+        (index, axis.unit)
+    } else if let Some(direction) = direction.filter(|_| verb != Verb::Home) {
+        (MAX_AXES + direction, JointUnit::Length)
+    } else {
         let words = format!("there is no axis {name:?}; the machine has {}", names(machine));
         return Err((Refusal::NoAxis, words));
     };
-    if unit.is_some_and(|unit| unit != axis.unit.name()) {
-        let (turns, needed) = match axis.unit {
+    if unit.is_some_and(|unit| unit != own.name()) {
+        let (turns, needed) = match own {
             JointUnit::Length => ("slides", "a length, such as \"10 mm\", and \"10 mm/s\""),
             JointUnit::Angle => ("turns", "an angle, such as \"10 deg\", and \"10 deg/s\""),
         };
-        return Err((Refusal::NotANumber, format!("axis {name} {turns}: write {needed}")));
+        return Err((Refusal::NotANumber, format!("{name} {turns}: write {needed}")));
     }
     Ok(index as u32 + 1)
 }
 
 /// That there is no input called `name`.
 pub(super) fn no_input(machine: &Machine, name: &str) -> String {
-    let inputs = &machine.operating.inputs;
-    let names: Vec<&str> = inputs.iter().map(|input| input.name.as_str()).collect();
-    let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-    format!("there is no input {name:?}; the machine has {known}")
+    let inputs = machine.operating.inputs.iter().map(|input| input.name.as_str());
+    format!("there is no input {name:?}; the machine has {}", known(inputs))
+}
+
+/// That there is no output called `name`.
+pub(super) fn no_output(machine: &Machine, name: &str) -> String {
+    let outputs = machine.operating.outputs.iter().map(|output| output.name.as_str());
+    format!("there is no output {name:?}; the machine has {}", known(outputs))
+}
+
+fn known<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }

@@ -1,8 +1,10 @@
 //! What operators see of a running pipeline.
 
 use super::Latest;
-use machine::Machine;
-use messages::{ControllerState, Fault, MotionEnd, Nanoseconds, PlannerPhase, Progress};
+use super::fault_history::FaultHistory;
+use super::refusals::DIRECTIONS;
+use machine::{Directions, Machine};
+use messages::{ControllerState, Fault, MAX_AXES, MotionEnd, Nanoseconds, PlannerPhase, Progress};
 use monitor::summary::FaultSummary;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -16,10 +18,11 @@ pub struct StatusBoard {
     status: Mutex<Status>,
     /// The run folder of the job.
     folder: Mutex<Option<PathBuf>>,
-    /// The machine, once it is known.
-    machine: Mutex<Option<Machine>>,
+    /// The machine, once it is known, with the directions of its tool.
+    machine: Mutex<Option<(Machine, Directions)>>,
     /// When the newest fault was found.
     newest: Mutex<Nanoseconds>,
+    history: Mutex<FaultHistory>,
 }
 
 /// What a pipeline is doing, as `graver status --json` prints it.
@@ -29,6 +32,8 @@ pub struct Status {
     pub state: String,
     /// What the planner is doing.
     pub planner: String,
+    /// The machine file; null for the built-in machine.
+    pub machine_file: Option<String>,
     /// The stream being played, 0 for none.
     pub stream: u64,
     /// Its job, when it has one.
@@ -50,10 +55,12 @@ pub struct Status {
     pub homed: Vec<String>,
     /// Axes that have to be homed before a job.
     pub unhomed: Vec<String>,
-    /// The axes by name.
+    /// The axes by name, and the directions of the tool that can be jogged and are no axis.
     pub axes: BTreeMap<String, AxisStatus>,
     /// The inputs of the machine file, and whether each is active.
     pub inputs: BTreeMap<String, bool>,
+    /// The outputs of the machine file, and whether each is on.
+    pub outputs: BTreeMap<String, bool>,
     /// Where the probe touched last; null before it has.
     pub probed: Option<Probed>,
     /// How the newest motion by hand ended: `reached`, `stopped`, `soft_limit`, `dead_man`, `door_open`, `interlock`,
@@ -63,8 +70,10 @@ pub struct Status {
     pub requests: u32,
     /// The latched fault.
     pub fault: Option<String>,
-    /// The faults since the start, the newest last, with the time of day.
+    /// The newest faults, the newest last; also those of before the start where they are kept.
     pub faults: Vec<PastFault>,
+    /// Where all of them are kept; null where they are not.
+    pub faults_file: Option<String>,
     /// Cycles since drives started.
     pub cycles: u64,
     /// Overruns since drives started.
@@ -106,15 +115,18 @@ pub struct PastFault {
     pub code: String,
     /// What was found, in words.
     pub detail: String,
+    /// The job that was under way; null without one.
+    pub job: Option<String>,
 }
 
-/// The most faults that are remembered.
+/// The most faults in a status.
 const MOST_FAULTS: usize = 32;
 
 impl StatusBoard {
-    /// Learns the names of the machine's axes and inputs.
-    pub fn know(&self, machine: &Machine) {
-        *locked(&self.machine) = Some(machine.clone());
+    /// Learns the names of the machine's axes and inputs, and where its file is.
+    pub fn know(&self, machine: &Machine, file: Option<&Path>) {
+        self.lock().machine_file = file.map(|file| file.display().to_string());
+        *locked(&self.machine) = Some((machine.clone(), Directions::of(machine)));
     }
 
     /// Adds a fault that is new to those that are remembered.
@@ -125,14 +137,20 @@ impl StatusBoard {
         }
         *newest = fault.at;
         let machine = locked(&self.machine);
-        let told = machine.as_ref().and_then(|machine| FaultSummary::of(fault, machine));
+        let told = machine.as_ref().and_then(|(machine, _)| FaultSummary::of(fault, machine));
         let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
         let code = fault.code().name().to_owned();
         let detail = told.map_or_else(|| code.clone(), |told| told.to_string());
-        if status.faults.len() >= MOST_FAULTS {
-            status.faults.remove(0);
-        }
-        status.faults.push(PastFault { time, code, detail });
+        let mut history = locked(&self.history);
+        history.add(PastFault { time, code, detail, job: status.job.clone() });
+        status.note_faults(&history);
+    }
+
+    /// Goes on with the faults in the file at `path`.
+    pub fn keep_faults(&self, path: Option<PathBuf>) {
+        let history = FaultHistory::open(path);
+        self.lock().note_faults(&history);
+        *locked(&self.history) = history;
     }
 
     /// Writes the latest samples; `held` when a person holds a job that is not played yet.
@@ -160,8 +178,8 @@ impl StatusBoard {
         let fault = progress.fault;
         status.fault = fault.is_some().then(|| fault.code().name().to_owned());
         self.remember(&mut status, &fault);
-        if let Some(machine) = locked(&self.machine).as_ref() {
-            status.operated(progress, machine);
+        if let Some((machine, directions)) = locked(&self.machine).as_ref() {
+            status.operated(progress, machine, directions);
         }
         status.motion_end = MotionEnd::from_wire(progress.motion_end).name().to_owned();
         status.requests = progress.requests;
@@ -192,8 +210,13 @@ impl StatusBoard {
 }
 
 impl Status {
+    fn note_faults(&mut self, history: &FaultHistory) {
+        self.faults = history.newest(MOST_FAULTS);
+        self.faults_file = history.path().map(|path| path.display().to_string());
+    }
+
     /// What concerns axes and inputs of `machine`.
-    fn operated(&mut self, progress: &Progress, machine: &Machine) {
+    fn operated(&mut self, progress: &Progress, machine: &Machine, directions: &Directions) {
         let axes = machine.axes.iter().zip(&progress.position).enumerate();
         let axes = axes.map(|(index, (axis, place))| {
             let limits = axis.limits.position.map(|limit| limit.is_finite().then_some(limit));
@@ -202,6 +225,17 @@ impl Status {
             (axis.name.clone(), AxisStatus { position: *place, unit, homed, limits })
         });
         self.axes = axes.collect();
+        let is_homed = machine.axes.iter().all(|axis| self.axes[&axis.name].homed);
+        for (direction, name) in DIRECTIONS.iter().enumerate() {
+            let is_axis = machine.axes.iter().any(|axis| axis.name == *name);
+            if directions.lever(direction).is_none() || is_axis {
+                continue;
+            }
+            let area = [machine.area.lower[direction], machine.area.upper[direction]];
+            let (position, unit) = (progress.tool[direction], "m".to_owned());
+            let place = AxisStatus { position, unit, homed: is_homed, limits: area.map(Some) };
+            self.axes.insert((*name).to_owned(), place);
+        }
         let named = |is_homed: bool| {
             let axes = machine.axes.iter().map(|axis| &axis.name);
             axes.filter(|name| self.axes[*name].homed == is_homed).cloned().collect()
@@ -210,11 +244,19 @@ impl Status {
         let inputs = machine.operating.bits();
         let inputs = inputs.map(|(bit, input)| (input.name.clone(), progress.inputs & bit != 0));
         self.inputs = inputs.collect();
+        let outputs = machine.operating.output_bits();
+        let outputs =
+            outputs.map(|(bit, output)| (output.name.clone(), progress.outputs & bit != 0));
+        self.outputs = outputs.collect();
         let axis = (progress.probed_axis as usize).checked_sub(1);
-        self.probed = axis.and_then(|index| machine.axes.get(index)).map(|axis| Probed {
-            axis: axis.name.clone(),
+        let probed = |name: &str, unit: &str| Probed {
+            axis: name.to_owned(),
             position: progress.probed,
-            unit: axis.unit.name().to_owned(),
+            unit: unit.to_owned(),
+        };
+        self.probed = axis.and_then(|index| match machine.axes.get(index) {
+            Some(axis) => Some(probed(&axis.name, axis.unit.name())),
+            None => Some(probed(DIRECTIONS.get(index.checked_sub(MAX_AXES)?)?, "m")),
         });
     }
 }

@@ -61,7 +61,12 @@ impl Cell {
     /// With this machine file.
     pub(crate) fn of(machine: &str) -> Self {
         let place = Place::new();
-        let file = place.file("cell.toml", machine);
+        place.file("cell.toml", machine);
+        Self::start_in(place)
+    }
+
+    fn start_in(place: Place) -> Self {
+        let file = place.path("cell.toml");
         let name = place.instance().name().to_owned();
         let domain = ["domain", "--no-realtime", "--machine", file.to_str().unwrap()];
         let mut domain = place.start(&[&domain[..], &["--instance", &name]].concat());
@@ -116,8 +121,18 @@ impl Cell {
         self.status()["axes"]["x"]["position"].as_f64().unwrap()
     }
 
+    /// Ends it all, and starts it again in the same place.
+    pub(crate) fn again(self) -> Self {
+        Self::start_in(self.stop())
+    }
+
     /// Ends it all, with the proof that nothing is left.
     pub(crate) fn end(self) {
+        self.stop();
+    }
+
+    /// The same; the place is left.
+    pub(crate) fn stop(self) -> Place {
         let Self { place, domain, services } = self;
         domain.signal(TERMINATE);
         assert_eq!(domain.wait().code, Some(0));
@@ -126,5 +141,6 @@ impl Cell {
             service.wait();
         }
         place.assert_nothing_left(&[]);
+        place
     }
 }

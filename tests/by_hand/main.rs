@@ -4,11 +4,13 @@
 #![allow(clippy::unwrap_used)]
 
 mod cell;
+mod kept;
+mod outputs;
 #[path = "../support/mod.rs"]
 mod support;
 
 use cell::Cell;
-use support::{Ended, INTERRUPT, KILL, assert_valid, lines};
+use support::{Ended, INTERRUPT, KILL, assert_valid, lines, source};
 
 /// Asserts that a request was refused with these words.
 fn refused(ended: &Ended, words: &str) {
@@ -51,10 +53,7 @@ fn a_jog_goes_as_far_as_it_is_asked_to_and_as_it_may() {
         &cell.ask(&["jog", "x", "1 m", "--speed", "100 mm/s"]),
         "x would be at 1110.000 mm, beyond its soft limit of 201.000 mm",
     );
-    refused(
-        &cell.ask(&["jog", "x", "10 deg", "--speed", "1 deg/s"]),
-        "axis x slides: write a length",
-    );
+    refused(&cell.ask(&["jog", "x", "10 deg", "--speed", "1 deg/s"]), "x slides: write a length");
     refused(&cell.ask(&["jog", "x", "1 mm", "--speed", "9 m/s"]), "moved by hand at");
     refused(&cell.ask(&["jog", "x", "0 mm", "--speed", "9 mm/s"]), "leads nowhere");
     says(&cell.ask(&["jog", "x", "1 mm", "--speed", "9 deg/s"]), 2, "do not fit");
@@ -73,6 +72,34 @@ fn a_jog_goes_as_far_as_it_is_asked_to_and_as_it_may() {
         again.error
     );
     assert!(cell.x() <= 0.201);
+    cell.end();
+}
+
+#[test]
+fn x_and_y_of_a_corexy_are_jogged_and_no_belt_leads_out_of_its_area() {
+    let machine = |name: &str| std::fs::read_to_string(source(name)).unwrap();
+    let cell = Cell::of(&machine("machines/corexy.toml"));
+    cell.ask(&["enable"]).accepted();
+    let jog = |axis, distance| ["jog", axis, distance, "--speed", "150 mm/s"];
+    says(&cell.ask(&jog("x", "10 mm")), 0, "x at 110.000 mm\n");
+    let axes = cell.status()["axes"].clone();
+    let at = |axis: &str| axes[axis]["position"].as_f64().unwrap();
+    // Both belts went on by as much: a is x + y, b is x - y.
+    for (axis, place) in [("y", 0.1), ("a", 0.21), ("b", 0.01)] {
+        assert!((at(axis) - place).abs() < 1e-6, "{axes:#}");
+    }
+    let area = "the tool would be at x 202.500 mm, beyond its area, which ends at 200.000 mm";
+    refused(&cell.ask(&jog("a", "185 mm")), area);
+    refused(&cell.ask(&jog("y", "-101 mm")), "the tool would be at y -1.000 mm");
+    refused(&cell.ask(&["home", "x"]), "there is no axis \"x\"; the machine has a, b");
+    says(&cell.ask(&["jog", "x", "--speed", "200 mm/s"]), 0, "its soft limit is 200.000 mm\n");
+    cell.end();
+    let cell = Cell::of(&machine("machines/five_bar.toml"));
+    cell.ask(&["enable"]).accepted();
+    refused(
+        &cell.ask(&jog("x", "1 mm")),
+        "does not go straight along x with its joints: jog its axes",
+    );
     cell.end();
 }
 

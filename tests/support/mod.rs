@@ -86,6 +86,7 @@ impl Place {
         command
             .args(arguments)
             .env("XDG_RUNTIME_DIR", self.directory.path())
+            .env("XDG_STATE_HOME", self.directory.path().join("state"))
             .current_dir(self.directory.path())
             .stdin(Stdio::null());
         command

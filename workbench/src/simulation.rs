@@ -89,7 +89,7 @@ impl Pipeline {
             BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, timing: machine.realtime };
         Ok(Self {
             controller: Controller::new(machine),
-            bridge: Bridge::new(port, options),
+            bridge: Bridge::new(port, options).with_brakes(machine.operating.brakes()),
             period: machine.realtime.period.time(),
             now: Nanoseconds(0),
             outputs: Outputs::default(),

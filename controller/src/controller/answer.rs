@@ -3,6 +3,7 @@
 use super::Controller;
 use crate::cascade::{Drive, Measurement, Reference};
 use crate::exchange::Inputs;
+use crate::outputs::JobOutputs;
 use crate::state::State;
 use crate::supervision::Finding;
 use machine::ActuatorMode;
@@ -41,10 +42,24 @@ impl Controller {
             let lookahead = self.intake.lookahead();
             let sequence = self.player.after().time.sequence();
             command.setpoint_published = lookahead.setpoint(sequence).published;
-            command.outputs = lookahead.setpoint(self.player.outputs_at().sequence()).outputs;
         }
         self.close_loops(feedback, command);
         self.reference.command(command);
+    }
+
+    /// Switches the outputs of the cycle in which the command acts. What a job has switched on goes off with a fault,
+    /// and while a door is open.
+    pub(super) fn switch_outputs(&mut self) -> u64 {
+        let is_played = matches!(self.state, State::Running | State::Holding(_) | State::Stopping);
+        let job = match self.playing {
+            0 => JobOutputs::None,
+            _ if !is_played || self.safety.is_open() => JobOutputs::Held,
+            _ => {
+                let at = self.player.outputs_at().sequence();
+                JobOutputs::On(self.intake.lookahead().setpoint(at).outputs)
+            }
+        };
+        self.switching.cycle(job, self.state.to_wire(), self.state.mode())
     }
 
     /// What the laser shall do in the cycle in which the command acts.
@@ -154,6 +169,7 @@ impl Controller {
             tool: command.tool,
             position,
             inputs: self.safety.inputs(),
+            outputs: self.switching.on(),
             homed: self.reference.homed(),
             probed_axis: self.probing.found_axis(),
             probed: self.probing.found(),

@@ -7,6 +7,7 @@ use crate::reference::bit;
 use crate::squaring::Squaring;
 use crate::state::{AfterRest, HomingStage, State};
 use crate::supervision::Finding;
+use crate::travel::{Bounds, MOVERS};
 use machine::operating::{DoorAction, Side, StopCategory};
 use messages::{
     CommandMode, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, MotionEnd, Nanoseconds,
@@ -15,22 +16,24 @@ use messages::{
 /// A way until the probe touches, and where it did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Probing {
-    axis: usize,
-    /// How far the joint may go [m or rad].
+    mover: usize,
+    /// How far it may go [m or rad].
     bounds: [f64; 2],
-    /// Where the joint was in the measurement before [m or rad].
+    /// What is added to the ways of the joints: where the tool is with them at zero.
+    offset: f64,
+    /// Where it was in the measurement before [m or rad].
     before: f64,
     found: Option<f64>,
 }
 
 impl Probing {
-    pub(super) fn new(axis: usize, bounds: [f64; 2], place: f64) -> Self {
-        Self { axis, bounds, before: place, found: None }
+    pub(super) fn new(mover: usize, bounds: [f64; 2], place: f64, offset: f64) -> Self {
+        Self { mover, bounds, offset, before: place, found: None }
     }
 
-    /// The axis that was probed last, from 1; 0 for none.
+    /// What was moved to probe last, from 1; 0 for none.
     pub(super) fn found_axis(&self) -> u32 {
-        if self.found.is_some() { self.axis as u32 + 1 } else { 0 }
+        if self.found.is_some() { self.mover as u32 + 1 } else { 0 }
     }
 
     /// Where the joint was when the probe touched [m or rad].
@@ -94,7 +97,7 @@ impl Controller {
 
     /// Stops the axes that nobody has spoken for.
     fn watch_dead_man(&mut self) {
-        for axis in 0..MAX_AXES {
+        for axis in 0..MOVERS {
             match &mut self.jogs[axis] {
                 Some(Jog { left: 0, .. }) => {
                     self.travel.stop(axis);
@@ -107,20 +110,41 @@ impl Controller {
         }
     }
 
-    /// Keeps jogged and probing axes within what they may go to.
-    fn keep_within_limits(&mut self, standing: &Planned) {
+    /// What jogged and probing movers may go to: joints to their soft limits, where they know their place; and the
+    /// tool to the ends of its area, where several joints move it and all know their place.
+    pub(super) fn bounds(&self) -> Bounds {
         let bounded = self.bounded();
-        for index in 0..self.machine.axes.len().min(MAX_AXES) {
-            let limits = self.machine.axes[index].limits.position;
-            if bounded & bit(index) != 0 && self.travel.keep_within(index, limits, standing) {
-                self.jogs[index] = None;
+        let axes = self.machine.axes.len().min(MAX_AXES);
+        let is_known = (0..axes).all(|axis| bounded & bit(axis) != 0);
+        core::array::from_fn(|mover| match mover.checked_sub(MAX_AXES) {
+            None => {
+                let axis = self.machine.axes.get(mover).filter(|_| bounded & bit(mover) != 0);
+                axis.map(|axis| axis.limits.position)
+            }
+            Some(direction) => {
+                let is_bounded = is_known && self.travel.directions().is_crossed(direction);
+                let area = &self.machine.area;
+                is_bounded.then(|| [area.lower[direction], area.upper[direction]])
+            }
+        })
+    }
+
+    /// Keeps jogged and probing movers within what they may go to.
+    fn keep_within_limits(&mut self, standing: &Planned) {
+        let bounds = self.bounds();
+        for mover in 0..MOVERS {
+            if self.travel.keep_within(mover, &bounds, standing).is_some() {
+                self.jogs[mover] = None;
                 self.end_motion(MotionEnd::SoftLimit);
             }
         }
-        if self.state == State::Probing
-            && self.travel.keep_within(self.probing.axis, self.probing.bounds, standing)
-        {
-            self.end_motion(MotionEnd::NotTouched);
+        if self.state == State::Probing {
+            let mover = self.probing.mover;
+            let mut own = [None; MOVERS];
+            own[mover] = Some(self.probing.bounds);
+            if self.travel.keep_within(mover, &own, standing).is_some() {
+                self.end_motion(MotionEnd::NotTouched);
+            }
         }
     }
 
@@ -146,7 +170,7 @@ impl Controller {
     pub(super) fn give_up_travel(&mut self, end: MotionEnd) {
         self.end_motion(end);
         self.travel.stop_all();
-        self.jogs = [None; MAX_AXES];
+        self.jogs = [None; MOVERS];
         self.pulse = Default::default();
     }
 
@@ -297,13 +321,14 @@ impl Controller {
 
     /// Goes on with probing.
     pub(super) fn probe(&mut self, feedback: &Feedback) {
-        let Probing { axis, before, found, .. } = self.probing;
-        let own =
-            self.machine.actuators.iter().zip(&feedback.position).filter(|(it, _)| it.axis == axis);
-        let place: f64 = own.map(|(it, angle)| it.share * (angle * it.ratio)).sum();
+        let Probing { mover, offset, before, found, .. } = self.probing;
+        let actuators = self.machine.actuators.iter().zip(&feedback.position);
+        let place = actuators.fold(offset, |place, (it, angle)| {
+            place + self.travel.share(mover, it.axis) * (it.share * (angle * it.ratio))
+        });
         if found.is_none() && self.safety.probe() == Some(true) {
             self.probing.found = Some((before + place) / 2.0);
-            self.travel.stop(axis);
+            self.travel.stop(mover);
         }
         self.probing.before = place;
         if self.travel.is_at_rest() {

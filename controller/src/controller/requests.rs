@@ -2,9 +2,10 @@
 
 use super::Controller;
 use super::operating::{Jog, Probing};
-use crate::reference::bit;
+use crate::feedforward::Planned;
 use crate::state::{AfterRest, HomingStage, State};
 use crate::test_pulse::TestPulse;
+use crate::travel::{Beyond, MOVERS};
 use machine::operating::Side;
 use messages::feedback::status;
 use messages::{
@@ -35,6 +36,12 @@ impl Refused {
 
     fn beyond(self, found: f64, limit: f64) -> Self {
         Self { found, limit, ..self }
+    }
+}
+
+impl From<Beyond> for Refused {
+    fn from(beyond: Beyond) -> Self {
+        Self::on(Refusal::SoftLimit, beyond.mover).beyond(beyond.end, beyond.limit)
     }
 }
 
@@ -137,6 +144,9 @@ impl Controller {
             (OperatorVerb::Home, State::Idle) => self.begin_homing(request.axis)?,
             (OperatorVerb::Jog, State::Idle | State::Jogging) => self.jog(request)?,
             (OperatorVerb::JogOn, _) => self.jog_on(request)?,
+            (OperatorVerb::Output, State::Disabled | State::Idle | State::Jogging) => {
+                self.switch_output(request)?;
+            }
             (OperatorVerb::Step, State::Idle | State::Jogging) => self.step_axis(request)?,
             (OperatorVerb::Probe, State::Idle) => self.begin_probing(request)?,
             (OperatorVerb::TestPulse, State::Idle) => self.begin_pulse(request, feedback)?,
@@ -190,7 +200,7 @@ impl Controller {
 
     /// Moves an axis for as long as it is asked to.
     fn jog(&mut self, request: &OperatorRequest) -> Result<(), Refused> {
-        let axis = self.axis(request.axis)?;
+        let axis = self.mover(request.axis)?;
         let speed = request.value;
         if speed == 0.0 {
             self.travel.stop(axis);
@@ -202,13 +212,9 @@ impl Controller {
         if self.travel.comes_to_rest(axis) || self.is_given_up() {
             return Err(Refusal::State.into());
         }
-        let standing = *self.feedforward.after();
-        if !self.travel.has_room(axis, speed, self.limits(axis), &standing) {
-            let [lower, upper] = self.limits(axis);
-            let limit = if speed < 0.0 { lower } else { upper };
-            let place = self.travel.place(axis, &standing);
-            return Err(Refused::on(Refusal::SoftLimit, axis).beyond(place, limit));
-        }
+        let standing = self.stood();
+        let beyond = self.travel.lacks_room(axis, speed, &self.bounds(), &standing);
+        beyond.map_or(Ok(()), |beyond| Err(Refused::from(beyond)))?;
         self.travel.run(axis, speed, &standing);
         self.jogs[axis] = Some(Jog::new(self.requests, self.dead_man()));
         self.begin_motion(State::Jogging);
@@ -217,7 +223,7 @@ impl Controller {
 
     /// Goes on with a jog that has not ended.
     fn jog_on(&mut self, request: &OperatorRequest) -> Result<(), Refused> {
-        let axis = self.axis(request.axis)?;
+        let axis = self.mover(request.axis)?;
         let left = self.dead_man();
         let jog = self.jogs[axis].as_mut();
         if jog.is_some_and(|jog| jog.go_on(request.value, left)) {
@@ -239,23 +245,16 @@ impl Controller {
         self.state == State::Jogging && self.motion_end != MotionEnd::None
     }
 
-    /// What the joint may go to: all where it does not know its place [m or rad].
-    fn limits(&self, axis: usize) -> [f64; 2] {
-        let known = self.reference.homed() & bit(axis) != 0;
-        let axis = self.machine.axes.get(axis).filter(|_| known);
-        axis.map_or([f64::NEG_INFINITY, f64::INFINITY], |axis| axis.limits.position)
-    }
-
     /// Moves an axis on by a distance.
     fn step_axis(&mut self, request: &OperatorRequest) -> Result<(), Refused> {
-        let axis = self.axis(request.axis)?;
+        let axis = self.mover(request.axis)?;
         let distance = request.value;
         self.may_go(axis, request.second, distance)?;
         if !self.travel.rests(axis) || self.is_given_up() {
             return Err(Refusal::State.into());
         }
-        let standing = *self.feedforward.after();
-        self.is_within(axis, self.travel.place(axis, &standing) + distance, distance)?;
+        let standing = self.stood();
+        self.may_reach(axis, distance, &standing)?;
         self.jogs[axis] = None;
         self.travel.go(axis, distance, request.second, &standing);
         self.begin_motion(State::Jogging);
@@ -263,7 +262,7 @@ impl Controller {
     }
 
     fn begin_probing(&mut self, request: &OperatorRequest) -> Result<(), Refused> {
-        let axis = self.axis(request.axis)?;
+        let axis = self.mover(request.axis)?;
         let (distance, speed) = (request.value, request.second);
         self.may_go(axis, speed, distance)?;
         match self.safety.probe() {
@@ -271,11 +270,14 @@ impl Controller {
             Some(true) => return Err(Refusal::Touching.into()),
             Some(false) => {}
         }
-        let standing = *self.feedforward.after();
+        let standing = self.stood();
+        self.may_reach(axis, distance, &standing)?;
         let place = self.travel.place(axis, &standing);
-        self.is_within(axis, place + distance, distance)?;
         let bounds = [place.min(place + distance), place.max(place + distance)];
-        self.probing = Probing::new(axis, bounds, place);
+        let joints = (0..MAX_AXES)
+            .map(|joint| self.travel.share(axis, joint) * self.travel.place(joint, &standing));
+        let offset = place - joints.sum::<f64>();
+        self.probing = Probing::new(axis, bounds, place, offset);
         self.travel.run(axis, speed.abs() * distance.signum(), &standing);
         self.begin_motion(State::Probing);
         Ok(())
@@ -310,6 +312,14 @@ impl Controller {
         Ok(())
     }
 
+    /// Switches an output, where no job does.
+    fn switch_output(&mut self, request: &OperatorRequest) -> Result<(), Refused> {
+        self.may_move()?;
+        let index = (request.axis as usize).checked_sub(1);
+        let is_switched = |index| self.switching.switch(index, request.value != 0.0);
+        if index.is_some_and(is_switched) { Ok(()) } else { Err(Refusal::NotByHand.into()) }
+    }
+
     /// Whether axes may be moved, or the laser tested, without a stream.
     fn may_move(&self) -> Result<(), Refused> {
         self.is_closed()?;
@@ -330,30 +340,47 @@ impl Controller {
             Some(_) => return Err(Refused::on(Refusal::TooSmall, axis).beyond(speed.abs(), 0.0)),
             None => {}
         }
-        let side = if way < 0.0 { Side::Lower } else { Side::Upper };
-        if self.safety.is_at_limit(axis, side) {
-            return Err(Refused::on(Refusal::LimitSwitch, axis));
+        for joint in 0..self.machine.axes.len().min(MAX_AXES) {
+            let way = self.travel.share(joint, axis) * way;
+            let side = if way < 0.0 { Side::Lower } else { Side::Upper };
+            if way != 0.0 && self.safety.is_at_limit(joint, side) {
+                return Err(Refused::on(Refusal::LimitSwitch, joint));
+            }
+            // Two that move one joint would go beyond its speed together.
+            let others = (0..MOVERS).filter(|it| *it != axis && !self.travel.rests(*it));
+            if way != 0.0 && others.into_iter().any(|it| self.travel.share(joint, it) != 0.0) {
+                return Err(Refusal::State.into());
+            }
         }
-        let place = self.travel.place(axis, self.feedforward.after());
-        self.is_within(axis, place, way)
+        Ok(())
     }
 
-    /// Whether the joint may be at `end`, having come in the direction of `way` [m or rad].
-    fn is_within(&self, axis: usize, end: f64, way: f64) -> Result<(), Refused> {
-        let [lower, upper] = self.limits(axis);
-        let refuse = |limit| Err(Refused::on(Refusal::SoftLimit, axis).beyond(end, limit));
-        match way {
-            way if way > 0.0 && end > upper => refuse(upper),
-            way if way < 0.0 && end < lower => refuse(lower),
-            _ => Ok(()),
-        }
+    /// Whether another `distance` of a mover leads beyond nothing.
+    fn may_reach(&self, mover: usize, distance: f64, standing: &Planned) -> Result<(), Refused> {
+        let beyond = self.travel.beyond(mover, distance, &self.bounds(), standing);
+        beyond.map_or(Ok(()), |beyond| Err(beyond.into()))
     }
 
-    /// The index of the axis that is number `axis` from 1.
-    fn axis(&self, axis: u32) -> Result<usize, Refused> {
+    /// Where the plan has the axes rest or move now, and the tool with them.
+    fn stood(&mut self) -> Planned {
+        let mut standing = *self.feedforward.after();
+        let mut borne = standing;
+        if self.standing.bear(&mut borne) {
+            standing.tool = borne.tool;
+        }
+        standing
+    }
+
+    /// The index of the mover that is number `number` from 1: an axis, or the tool along x, y or z.
+    fn mover(&self, number: u32) -> Result<usize, Refused> {
         let axes = self.machine.axes.len().min(MAX_AXES);
-        let index = (axis as usize).checked_sub(1).filter(|index| *index < axes);
-        index.ok_or(Refused::from(Refusal::NoAxis).beyond(f64::from(axis), axes as f64))
+        let mover = (number as usize).checked_sub(1);
+        match mover {
+            Some(axis) if axis < axes => Ok(axis),
+            Some(mover @ MAX_AXES..MOVERS) if self.travel.pace(mover).is_some() => Ok(mover),
+            Some(mover @ MAX_AXES..MOVERS) => Err(Refused::on(Refusal::NoDirection, mover)),
+            _ => Err(Refused::from(Refusal::NoAxis).beyond(f64::from(number), axes as f64)),
+        }
     }
 
     fn is_not_stopped(&self) -> Result<(), Refused> {

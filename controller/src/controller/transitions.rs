@@ -6,11 +6,10 @@ use crate::squaring::Squaring;
 use crate::standing::Strayed;
 use crate::state::{AfterRest, State};
 use crate::supervision::{Finding, Tracking};
+use crate::travel::MOVERS;
 use messages::feedback::status;
 use messages::time::Period;
-use messages::{
-    Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, MotionEnd, Nanoseconds,
-};
+use messages::{Cycle, Fault, FaultCode, FaultQuantity, Feedback, MotionEnd, Nanoseconds};
 
 /// How long an axis stands still before it counts as at rest without a plan, and as enabled.
 const STANDING: Nanoseconds = Nanoseconds(20_000_000);
@@ -70,7 +69,7 @@ impl Controller {
             State::Homing(stage) => self.home(now, feedback, stage),
             State::Jogging if self.travel.is_at_rest() => {
                 // Nobody has to speak for an axis that rests.
-                self.jogs = [None; MAX_AXES];
+                self.jogs = [None; MOVERS];
                 self.rest_by_hand(MotionEnd::Reached);
             }
             State::Probing => self.probe(feedback),

@@ -2,6 +2,7 @@
 
 use controller::{Controller, Inputs, Outputs, Peers};
 use drives::bridge::BridgeOptions;
+use drives::port::Port;
 use drives::{Bridge, Deadlines, PlantOptions, SimulatedPlant};
 use machine::Machine;
 use messages::time::SETPOINT_PERIOD;
@@ -85,12 +86,16 @@ pub struct Cell {
 
 impl Cell {
     pub fn new(machine: &Machine) -> Self {
-        let port = SimulatedPlant::new(machine, PlantOptions::default()).unwrap();
+        Self::of(machine, SimulatedPlant::new(machine, PlantOptions::default()).unwrap())
+    }
+
+    /// With the hardware behind `port`.
+    pub fn of(machine: &Machine, port: Box<dyn Port>) -> Self {
         let options =
             BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, timing: machine.realtime };
         Self {
             controller: Controller::new(machine),
-            bridge: Bridge::new(port, options),
+            bridge: Bridge::new(port, options).with_brakes(machine.operating.brakes()),
             outputs: Outputs::default(),
             progress: Progress::default(),
             now: Nanoseconds(0),
@@ -101,10 +106,15 @@ impl Cell {
     /// Enabled, and idle.
     pub fn enabled(machine: &Machine) -> Self {
         let mut cell = Self::new(machine);
-        cell.run(3);
-        cell.accept(OperatorVerb::Enable, 0, 0.0, 0.0);
-        cell.until(ControllerState::Idle, 3000);
+        cell.enable();
         cell
+    }
+
+    /// Enables it.
+    pub fn enable(&mut self) {
+        self.run(3);
+        self.accept(OperatorVerb::Enable, 0, 0.0, 0.0);
+        self.until(ControllerState::Idle, 3000);
     }
 
     /// Homed, and at home.

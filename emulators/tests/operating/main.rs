@@ -4,6 +4,7 @@
 #![allow(missing_docs, unreachable_pub, clippy::unwrap_used)]
 
 mod cell;
+mod homing;
 mod random;
 
 use cell::{CHILLER, Cell, DOOR, ESTOP, X, Y, machine};

@@ -14,6 +14,7 @@ use crate::operating::{
 };
 use crate::quantity as unit;
 use crate::table;
+use messages::ControllerState;
 
 /// Share of an axis' largest speed at which it looks for its reference where the file does not say.
 const SEARCH_SHARE: f64 = 0.1;
@@ -23,6 +24,12 @@ const LATCH_SHARE: f64 = 0.1;
 
 /// Share of a motor's largest current that counts as a stop where the file does not say.
 const STOP_SHARE: f64 = 0.5;
+
+/// In which an axis that was found to stand against its stop is brought to rest, pressing on meanwhile [s].
+const STOP_TIME: f64 = 0.1;
+
+/// How long an extraction goes on after a job where the file does not say [s].
+const EXTRACTION_AFTER: f64 = 10.0;
 
 /// The most places in the order of homing.
 const MOST_ORDERS: f64 = 100.0;
@@ -50,8 +57,12 @@ table! {
 table! {
     /// A digital output.
     pub struct OutputTable {
-        /// What it switches: the `air` assist, the `brake`s, or `general`.
-        pub function: Spanned<OutputFunction>,
+        /// What it switches: the `air` assist, the `extraction`, the `brake`s, a `signal` to people, or `general`.
+        pub function: Spanned<OutputKind>,
+        /// The states of the machine in which a `signal` is on.
+        pub states: Option<Vec<Spanned<SignalState>>>,
+        /// How long an `extraction` goes on after a job; 10 s when left out.
+        pub after: Option<Quantity<unit::Duration, NonNegative>>,
         /// Which level is on.
         pub active: Spanned<Level> = "high",
     }
@@ -117,6 +128,25 @@ pub enum InputKind {
     General,
 }
 
+/// The function of an output as the file says it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OutputKind {
+    /// The air assist.
+    Air,
+    /// The extraction.
+    Extraction,
+    /// The brakes.
+    Brake,
+    /// A lamp, a horn, a relay.
+    Signal,
+    /// Anything else.
+    General,
+}
+
+/// A state in which a signal is on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SignalState(ControllerState);
+
 /// A level of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Level {
@@ -139,10 +169,28 @@ crate::keyword! {
 }
 
 crate::keyword! {
-    OutputFunction, "a function of an output",
+    OutputKind, "a function of an output",
     "air" => Self::Air,
+    "extraction" => Self::Extraction,
     "brake" => Self::Brake,
+    "signal" => Self::Signal,
     "general" => Self::General,
+}
+
+crate::keyword! {
+    SignalState, "a state of the machine",
+    "disabled" => Self(ControllerState::Disabled),
+    "enabling" => Self(ControllerState::Enabling),
+    "idle" => Self(ControllerState::Idle),
+    "running" => Self(ControllerState::Running),
+    "holding" => Self(ControllerState::Holding),
+    "stopping" => Self(ControllerState::Stopping),
+    "faulted" => Self(ControllerState::Faulted),
+    "homing" => Self(ControllerState::Homing),
+    "jogging" => Self(ControllerState::Jogging),
+    "probing" => Self(ControllerState::Probing),
+    "pulsing" => Self(ControllerState::Pulsing),
+    "halted" => Self(ControllerState::Halted),
 }
 
 crate::keyword! { Level, "a level", "high" => Self::High, "low" => Self::Low }
@@ -184,12 +232,8 @@ pub(super) fn operating(
         }
     }
     let outputs = tables.outputs.iter().flat_map(|named| &named.entries);
-    let outputs = outputs.map(|(name, table)| Output {
-        name: name.value.clone(),
-        function: table.function.value,
-        is_active_low: table.active.value == Level::Low,
-    });
-    let outputs: Vec<Output> = outputs.collect();
+    let outputs: Vec<Output> =
+        outputs.filter_map(|(name, table)| output(name, table, diagnostics)).collect();
     let counts = [
         (tables.inputs.map(|named| named.span), inputs.len(), "inputs"),
         (tables.outputs.map(|named| named.span), outputs.len(), "outputs"),
@@ -213,6 +257,48 @@ pub(super) fn operating(
         outputs,
         safety: safety(tables.safety, diagnostics),
     }
+}
+
+/// The output of this table.
+fn output(
+    name: &Spanned<String>,
+    table: &OutputTable,
+    diagnostics: &mut Diagnostics,
+) -> Option<Output> {
+    let kind = table.function.value;
+    if let Some(after) = table.after.as_ref().filter(|_| kind != OutputKind::Extraction) {
+        let message = "`after` has no effect: this output is no `extraction`".to_owned();
+        diagnostics.contradict(after.span, message, "remove `after`");
+    }
+    let states = table.states.as_deref().unwrap_or_default();
+    if let Some(state) = states.first().filter(|_| kind != OutputKind::Signal) {
+        let message = "`states` has no effect: this output is no `signal`".to_owned();
+        diagnostics.contradict(state.span, message, "remove `states`");
+    }
+    let function = match kind {
+        OutputKind::Air => OutputFunction::Air,
+        OutputKind::Brake => OutputFunction::Brake,
+        OutputKind::General => OutputFunction::General,
+        OutputKind::Extraction => {
+            let after = table.after.as_ref().map_or(EXTRACTION_AFTER, |after| after.value);
+            OutputFunction::Extraction { after }
+        }
+        OutputKind::Signal if states.is_empty() => {
+            diagnostics.refuse(
+                ProblemKind::MissingKey,
+                name.span,
+                format!("`states` is missing in the output `{}`", name.value),
+                Some("add `states = [\"running\"]`".to_owned()),
+            );
+            return None;
+        }
+        OutputKind::Signal => {
+            let states = states.iter().fold(0, |bits, state| bits | 1 << state.value.0 as u32);
+            OutputFunction::Signal { states }
+        }
+    };
+    let is_active_low = table.active.value == Level::Low;
+    Some(Output { name: name.value.clone(), function, is_active_low })
 }
 
 fn safety(table: &SafetyTable, diagnostics: &mut Diagnostics) -> Safety {
@@ -386,9 +472,26 @@ impl Known<'_> {
             }
             given.value
         };
-        let search = speed(&table.speed, SEARCH_SHARE * limits.velocity);
+        let is_hard_stop = table.method.value == HomingMethod::HardStop;
+        let stoppable = limits.following_error / STOP_TIME;
+        let mut otherwise = SEARCH_SHARE * limits.velocity;
+        if is_hard_stop {
+            otherwise = otherwise.min(stoppable);
+        }
+        let search = speed(&table.speed, otherwise);
         let latch_speed = speed(&table.latch_speed, LATCH_SHARE * search);
         let method = table.method.value;
+        if let Some(given) =
+            table.speed.as_ref().filter(|it| fits && is_hard_stop && it.value > stoppable)
+        {
+            let message = format!(
+                "axis `{}` would press on against its stop for more than its following error",
+                axis.name
+            );
+            let help =
+                format!("{stoppable} {}/s at most: the following error in 0.1 s", unit.name());
+            diagnostics.contradict(given.span, message, &help);
+        }
         let end = match side {
             Side::Lower => limits.position[0],
             Side::Upper => limits.position[1],

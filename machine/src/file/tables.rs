@@ -385,6 +385,14 @@ table! {
     }
 }
 
+impl OriginsTable {
+    /// The origins in the order of the systems.
+    pub(crate) fn each(&self) -> [Option<Point>; 9] {
+        let Self { g54, g55, g56, g57, g58, g59, g59_1, g59_2, g59_3, .. } = self;
+        [*g54, *g55, *g56, *g57, *g58, *g59, *g59_1, *g59_2, *g59_3]
+    }
+}
+
 table! {
     /// The job that belongs to the machine.
     pub struct JobTable {

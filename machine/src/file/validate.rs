@@ -79,15 +79,17 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         },
         corners: corners.value,
         realtime,
-        operating,
         drives,
         laser,
         gcode: GcodeSettings {
             words: gcode.over(Dialect::Standard.meanings()),
             z: gcode.z.value,
             origins: origins(&gcode.origins, home),
-            air_assist: gcode.air_assist.value,
+            air_assist: gcode.air_assist.value && operating.may_have_air(),
+            tool_offset: [0.0; 3],
+            digital_outputs: operating.general_outputs(),
         },
+        operating,
         sample_job: table.job.as_ref().map(|job| PathBuf::from(&job.sample.value)),
         warnings: warnings::warnings(&mut diagnostics),
     };
@@ -376,16 +378,5 @@ fn unknown_axis(name: &str, span: Span, help: String, diagnostics: &mut Diagnost
 }
 
 fn origins(table: &OriginsTable, home: [f64; 3]) -> [[f64; 3]; 9] {
-    [
-        table.g54,
-        table.g55,
-        table.g56,
-        table.g57,
-        table.g58,
-        table.g59,
-        table.g59_1,
-        table.g59_2,
-        table.g59_3,
-    ]
-    .map(|origin| origin.map_or(home, |point| point.value))
+    table.each().map(|origin| origin.map_or(home, |point| point.value))
 }

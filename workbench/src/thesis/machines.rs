@@ -102,6 +102,7 @@ impl SeriesLetter {
                 format!("letters.style={style}"),
                 format!("marking.speed={speed}"),
             ],
+            offsets: None,
         }
     }
 }

@@ -44,6 +44,8 @@ struct Modal {
     origins: [[f64; 3]; 9],
     /// That of the one in force [m].
     origin: Vector3<f64>,
+    /// The tool's offset that is in force, and that of the machine.
+    tool: Vector3<f64>,
     /// What G92 adds to it [m].
     shift: Vector3<f64>,
     /// What G92.3 brings back [m].
@@ -57,6 +59,13 @@ struct Modal {
     /// Outputs that are on, a bit for each.
     outputs: u64,
     corners: Corners,
+}
+
+impl Modal {
+    /// Where the program zero is, machine frame [m].
+    fn zero(&self) -> Vector3<f64> {
+        self.origin + self.shift + self.tool
+    }
 }
 
 /// Where the program zero was at its moves, machine frame [m].
@@ -105,6 +114,10 @@ pub(super) struct Interpreter {
     pub(super) words: WordMeanings,
     z: ZMeaning,
     has_air_assist: bool,
+    /// The tool's offset of the machine.
+    tool_offset: Vector3<f64>,
+    /// Digital outputs that there are; `None` where nobody has said.
+    digital_outputs: Option<usize>,
     home: Vector3<f64>,
     modal: Modal,
     said: u32,
@@ -121,6 +134,8 @@ impl Interpreter {
             words: settings.gcode.words,
             z: settings.gcode.z,
             has_air_assist: settings.gcode.air_assist,
+            tool_offset: Vector3::from(settings.gcode.tool_offset),
+            digital_outputs: settings.gcode.digital_outputs,
             home: settings.home,
             modal: Modal {
                 motion: None,
@@ -132,6 +147,7 @@ impl Interpreter {
                 system: 0,
                 origins: settings.gcode.origins,
                 origin: Vector3::from(settings.gcode.origins[0]),
+                tool: Vector3::zeros(),
                 shift: Vector3::zeros(),
                 kept_shift: Vector3::zeros(),
                 feed: None,
@@ -223,7 +239,7 @@ impl Interpreter {
             self.switch(bit, false);
         }
         self.note_powers();
-        let end = self.tracer.position - self.modal.origin - self.modal.shift;
+        let end = self.tracer.position - self.modal.zero();
         self.tracer.facts.end = end.into();
     }
 
@@ -359,8 +375,10 @@ impl Interpreter {
         }
         for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
             if let Some(length) = block.coordinate(letter, self.modal.unit) {
-                self.modal.shift[axis] =
-                    self.tracer.position[axis] - self.modal.origin[axis] - length;
+                self.modal.shift[axis] = self.tracer.position[axis]
+                    - self.modal.origin[axis]
+                    - self.modal.tool[axis]
+                    - length;
             }
         }
         self.modal.kept_shift = self.modal.shift;
@@ -397,7 +415,7 @@ impl Interpreter {
             return Ok(());
         }
         if frame.is_none() && now.is_some() {
-            self.zeros.add(self.modal.origin + self.modal.shift);
+            self.zeros.add(self.modal.zero());
         }
         match now {
             None => Ok(()),
@@ -466,7 +484,7 @@ impl Interpreter {
             } else if self.modal.distance == Reference::Incremental {
                 to[axis] + length
             } else {
-                self.modal.origin[axis] + self.modal.shift[axis] + length
+                self.modal.zero()[axis] + length
             };
         }
         to

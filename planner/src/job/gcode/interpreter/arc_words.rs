@@ -86,11 +86,8 @@ impl Interpreter {
             let Some(number) = block.number(letters[axis]) else { continue };
             given += 1;
             let length = number * self.modal.unit;
-            centre[axis] = if absolute {
-                self.modal.origin[axis] + self.modal.shift[axis] + length
-            } else {
-                centre[axis] + length
-            };
+            centre[axis] =
+                if absolute { self.modal.zero()[axis] + length } else { centre[axis] + length };
         }
         if given == 0 || absolute && given < 2 {
             let wanted = if absolute { "and" } else { "or" };

@@ -76,7 +76,7 @@ impl Interpreter {
         Ok(())
     }
 
-    /// M62 to M65: digital output P is the bit after it of the outputs, whose first is the air assist.
+    /// M62 to M65: digital output P is bit P + 1 of what a job switches; the first bit is the air assist.
     fn digital_output(&mut self, block: &mut Block) -> Result<(), Box<Refusal>> {
         let Some(chosen) = &block.codes.digital_output else { return Ok(()) };
         let (on, span) = (chosen.code, chosen.span.clone());
@@ -90,6 +90,14 @@ impl Interpreter {
                 format!("there is no digital output P{number}"),
                 "output",
                 help,
+            ));
+        }
+        if let Some(count) = self.digital_outputs.filter(|count| number >= *count as f64) {
+            return Err(Refusal::new(
+                block.span(b'P'),
+                format!("there is no digital output P{number}: the machine file has {count}"),
+                "output",
+                "P counts the outputs with the function `general` of the machine file, from 0",
             ));
         }
         self.switch(FIRST_OUTPUT + number as u32, on);

@@ -47,7 +47,7 @@ impl Interpreter {
         for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
             let Some(length) = block.coordinate(letter, self.modal.unit) else { continue };
             self.modal.origins[system][axis] = if from_here {
-                self.tracer.position[axis] - self.modal.shift[axis] - length
+                self.tracer.position[axis] - self.modal.shift[axis] - self.modal.tool[axis] - length
             } else {
                 length
             };
@@ -86,9 +86,16 @@ impl Interpreter {
         let Some(chosen) = &codes.tool_length else { return Ok(()) };
         let (code, span) = (chosen.code, chosen.span.clone());
         match code {
-            ToolLength::Cancelled => return Ok(()),
+            ToolLength::Cancelled => {
+                self.modal.tool = Vector3::zeros();
+                return Ok(());
+            }
             ToolLength::FromTable => {
                 block.number(b'H');
+                self.modal.tool = self.tool_offset;
+                if self.tool_offset != Vector3::zeros() {
+                    return Ok(());
+                }
             }
             ToolLength::Given => {
                 if block.has_axes()

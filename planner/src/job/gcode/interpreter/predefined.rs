@@ -64,7 +64,7 @@ impl Parameters for Interpreter {
 impl Interpreter {
     /// Where the program is along `axis`, in its own coordinates and units.
     fn here(&self, axis: usize) -> f64 {
-        let Modal { origin, shift, unit, .. } = &self.modal;
-        (self.tracer.position[axis] - origin[axis] - shift[axis]) / unit
+        let (zero, unit) = (self.modal.zero(), self.modal.unit);
+        (self.tracer.position[axis] - zero[axis]) / unit
     }
 }

@@ -30,7 +30,9 @@ impl Remark {
             Self::ToolChange => {
                 "M6 has no effect: a marking head has no tool to change; M0 waits for a person"
             }
-            Self::ToolLength => "G43 has no effect: there are no tool lengths",
+            Self::ToolLength => {
+                "G43 has no effect: the tool has no offset (`graver offset set tool`)"
+            }
             Self::Motors => {
                 "M17, M18 and M84 have no effect: the motors stay on until the job ends"
             }

@@ -91,6 +91,15 @@ fn digital_outputs_are_the_bits_after_the_air_assist() {
 }
 
 #[test]
+fn a_digital_output_that_the_machine_file_does_not_have_is_refused() {
+    let mut machine = machine(ZMeaning::Ignored);
+    machine.gcode.digital_outputs = Some(2);
+    assert!(read("job.ngc", "M64 P0\nM62 P1", &machine).is_ok());
+    let error = read("job.ngc", "M64 P2", &machine).unwrap_err().to_string();
+    assert!(error.contains("P2: the machine file has 2"), "{error}");
+}
+
+#[test]
 fn a_cluster_is_the_power_of_equal_parts() {
     let program = flat("M4 F600 G1 X3 Y6 S100:0:300\nX4");
     let power = |level| Power { level, follows_speed: true };
