@@ -153,13 +153,14 @@ impl<'a> Motion<'a> {
                 }
                 return Ok(Exit::Done);
             }
+            Some("stopped") if self.heeded > 0 => "as it was told to",
             Some("soft_limit") => "at the soft limit",
             Some("dead_man") => "because nobody asked for it any more",
             Some("door_open") => "because the door was opened",
             Some("interlock") => "because an interlock is missing",
             Some("not_touched") => "because the probe did not touch on its way",
             Some("out_of_reach") => "where the mechanism cannot go on",
-            _ => "because somebody said so",
+            _ => "because somebody else said so",
         };
         message::tell(&format!("stopped {cause}; {}", places(&reply.axes, &[])));
         Ok(Exit::Stopped)

@@ -16,7 +16,7 @@ use messages::{ControllerState, OperatorReply, OperatorRequest, OperatorVerb, Re
 use monitor::summary::Summary;
 use planner::request::JobRequest;
 use runtime::Domain;
-use runtime::operator::OperatorLink;
+use runtime::operator::{OperatorError, OperatorLink};
 use runtime::socket::{Conversation, OperatorServer};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -370,6 +370,13 @@ impl Answers {
         self.tell(request, verb)
     }
 
+    /// Why the controller does not answer: one that has died cannot.
+    fn silent(&self, error: &OperatorError) -> Value {
+        let is_gone = self.board.read().services.get("controller") == Some(&None);
+        let error = if is_gone { &OperatorError::NoController } else { error };
+        json!({ "error": error.to_string() })
+    }
+
     /// Sets an input of a simulated machine.
     fn set_input(&self, name: &str, is_active: bool) -> Value {
         let state = self.board.read().state;
@@ -408,7 +415,7 @@ impl Answers {
     fn tell(&self, request: OperatorRequest, verb: Verb) -> Value {
         match self.link.ask_within(request, STOP_PATIENCE) {
             Ok(reply) => json!(VerbReply::of(&reply, verb, &self.machine)),
-            Err(error) => json!({ "error": error.to_string() }),
+            Err(error) => self.silent(&error),
         }
     }
 
@@ -424,7 +431,7 @@ impl Answers {
                     let capped_by = folder.and_then(|folder| caps(&folder, reply.value));
                     json!(VerbReply { capped_by, ..VerbReply::of(&reply, verb, &self.machine) })
                 }
-                Err(error) => json!({ "error": error.to_string() }),
+                Err(error) => self.silent(&error),
             },
             verb => self.ask(verb, value),
         }
@@ -433,7 +440,7 @@ impl Answers {
     fn ask(&self, verb: Verb, value: f64) -> Value {
         match self.link.request(verb.into(), value) {
             Ok(reply) => json!(VerbReply::of(&reply, verb, &self.machine)),
-            Err(error) => json!({ "error": error.to_string() }),
+            Err(error) => self.silent(&error),
         }
     }
 
@@ -447,7 +454,7 @@ impl Answers {
             (Phase::Preparing, _) => json!(VerbReply::accepted("preparing")),
             (_, Ok(reply)) => json!(VerbReply { accepted: true, ..reply }),
             (Phase::Playing, Err(_)) => json!(VerbReply::accepted("running")),
-            (Phase::None, Err(error)) => json!({ "error": error.to_string() }),
+            (Phase::None, Err(error)) => self.silent(&error),
         }
     }
 
@@ -457,7 +464,7 @@ impl Answers {
         loop {
             let reply = match self.link.request_within(OperatorVerb::Hold, 0.0, STOP_PATIENCE) {
                 Ok(reply) => VerbReply::of(&reply, Verb::Hold, &self.machine),
-                Err(error) => return json!({ "error": error.to_string() }),
+                Err(error) => return self.silent(&error),
             };
             let starting = !reply.accepted
                 && reply.state == ControllerState::Idle.name()

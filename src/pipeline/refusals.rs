@@ -43,9 +43,10 @@ pub(super) fn words(reply: &OperatorReply, verb: Verb, machine: &Machine) -> Opt
             let (found, limit) = (quantity(found), quantity(limit));
             format!("{name} would be at {found}, beyond its soft limit of {limit}")
         }
-        Refusal::EmergencyStop => {
-            "the emergency stop is pressed: release it, then `graver reset`".to_owned()
+        Refusal::EmergencyStop if verb == Verb::Reset => {
+            "the emergency stop is pressed: release it first".to_owned()
         }
+        Refusal::EmergencyStop => "the emergency stop is pressed".to_owned(),
         Refusal::DoorOpen => "the door is open".to_owned(),
         Refusal::Interlock => "an interlock is missing".to_owned(),
         Refusal::LimitSwitch => {

@@ -176,6 +176,12 @@ impl StatusBoard {
         status.rate = progress.rate;
         status.tool = progress.tool;
         let fault = progress.fault;
+        // A controller that has died says nothing more: drives has stopped the machine, and says why.
+        let is_lost = pids.contains(&("controller", None)) && drives.fault.is_some();
+        let fault = if is_lost { drives.fault } else { fault };
+        if is_lost {
+            status.state = ControllerState::Faulted.name().to_owned();
+        }
         status.fault = fault.is_some().then(|| fault.code().name().to_owned());
         self.remember(&mut status, &fault);
         if let Some((machine, directions)) = locked(&self.machine).as_ref() {
@@ -183,6 +189,9 @@ impl StatusBoard {
         }
         status.motion_end = MotionEnd::from_wire(progress.motion_end).name().to_owned();
         status.requests = progress.requests;
+        if is_lost {
+            status.outputs.values_mut().for_each(|on| *on = false);
+        }
         status.cycles = drives.cycle.0;
         status.overruns = drives.overruns;
         status.services = pids.iter().map(|(name, pid)| ((*name).to_owned(), *pid)).collect();

@@ -124,7 +124,7 @@ fn a_jog_ends_when_its_client_dies_and_when_anybody_stops_it() {
     let client = cell.start(&jog);
     cell.until("a jog", moves(place));
     cell.ask(&["stop"]).accepted();
-    says(&client.wait(), 1, "stopped because somebody said so; x at ");
+    says(&client.wait(), 1, "stopped because somebody else said so; x at ");
     let status = cell.until("rest", |status| status["state"] == "idle");
     assert_eq!(status["motion_end"], "stopped");
 

@@ -65,6 +65,40 @@ fn a_job_switches_what_is_its_own_and_leaves_nothing_on() {
     cell.end();
 }
 
+/// Two layers, of which the second has air.
+const LAYERS: &str = r#"
+[drawing]
+file = "lines.svg"
+[layers.first]
+colors = ["blue"]
+speed = "20 mm/s"
+[layers.second]
+colors = ["red"]
+speed = "20 mm/s"
+air = true
+"#;
+
+#[test]
+fn the_air_of_a_layer_is_switched_with_it() {
+    let mut cell = Cell::homed(OUTPUTS);
+    let line = |color, y| format!("<path stroke='{color}' fill='none' d='M0 {y} H30'/>");
+    let svg = "xmlns='http://www.w3.org/2000/svg' width='30mm' height='20mm' viewBox='0 0 30 20'";
+    let drawing = format!("<svg {svg}>{}{}</svg>", line("blue", 5), line("red", 15));
+    cell.place.file("lines.svg", &drawing);
+    let (job, out) = (cell.place.file("job.toml", LAYERS), cell.place.path("run"));
+    let submit = ["submit", job.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()];
+    let submitted = cell.start(&submit);
+    cell.until("the first layer", |status| {
+        status["stroke"] == 1 && are_on(status, &["fan", "green", "brake"])
+    });
+    cell.until("the second", |status| {
+        status["stroke"] == 2 && are_on(status, &["air", "fan", "green", "brake"])
+    });
+    assert_eq!(submitted.wait().json(0)["outcome"], "completed");
+    assert_eq!(cell.status()["outputs"]["air"], false);
+    cell.end();
+}
+
 #[test]
 fn what_a_job_has_switched_on_goes_off_when_it_is_stopped_and_when_its_planner_dies() {
     for kills in [false, true] {
@@ -85,4 +119,22 @@ fn what_a_job_has_switched_on_goes_off_when_it_is_stopped_and_when_its_planner_d
         }
         cell.end();
     }
+}
+
+#[test]
+fn a_controller_that_dies_leaves_the_machine_stopped_and_the_status_says_so() {
+    let mut cell = Cell::homed(OUTPUTS);
+    cell.ask(&["output", "valve", "on"]).accepted();
+    let jog = cell.start(&["jog", "x", "--speed", "10 mm/s"]);
+    let status = cell.until("a jog", |status| {
+        status["state"] == "jogging" && are_on(status, &["valve", "brake"])
+    });
+    service(&status, "controller").signal(KILL).unwrap();
+    assert_eq!(jog.wait().code, Some(4));
+    let status = cell.until("a stop", |status| status["state"] == "faulted");
+    assert_eq!(status["fault"], "controller_lost");
+    assert!(are_on(&status, &[]), "{status:#}");
+    says(&cell.ask(&["enable"]), 4, "the controller is not running");
+    says(&cell.ask(&["faults"]), 0, "controller_lost: ");
+    cell.end();
 }
