@@ -48,6 +48,9 @@ pub struct RunArguments {
     /// Run folder; without it `runs/DATE-TIME-JOB`.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Find the references of axes that have to be homed, before the job; without it such a machine refuses it.
+    #[arg(long)]
+    pub home: bool,
 }
 
 /// Arguments of `simulate`.

@@ -38,8 +38,8 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let folder = run_folder(arguments.out.as_deref(), &job.drawing.name)?;
     let claim = Claim::of(&folder)?;
     let request = request.absolute();
-    let summary =
-        JobRun::prepare(&mut pipeline, &request, folder, started, None).map(JobRun::follow);
+    let run = JobRun::prepare(&mut pipeline, &request, folder, started, None);
+    let summary = run.map(|run| run.homing_first(arguments.home).follow());
     pipeline.shut_down();
     drop(claim);
     Ok(output::summary(&summary?, arguments.instance.json))

@@ -1,6 +1,7 @@
 //! One job in a pipeline, from the start of the machine to the summary.
 
 mod conclude;
+mod homing;
 mod progress;
 mod watch;
 
@@ -9,7 +10,7 @@ use watch::WORD_PATIENCE;
 use super::control::JobControl;
 use super::operators::{JobEvent, Submission};
 use super::power_up::{NotReady, PowerUp};
-use super::{POLL_INTERVAL, Pipeline, ServiceOwner};
+use super::{POLL_INTERVAL, Pipeline};
 use crate::exit::Failure;
 use crate::output::ProgressLine;
 use messages::{Cycle, Fault, OperatorVerb, PlannerPhase, run_folder};
@@ -30,6 +31,8 @@ const OPENING_PATIENCE: Duration = Duration::from_secs(2);
 enum Stage {
     /// Waiting for the services and the motors.
     Starting(PowerUp),
+    /// Homing, accepted under this number.
+    Homing(u32),
     /// Offered to the planner.
     Planning,
     /// Checked; waiting for the recording to be open, and for a person who holds it.
@@ -46,6 +49,8 @@ pub struct JobRun<'a> {
     control: Arc<JobControl>,
     folder: RunFolder,
     name: String,
+    /// Whether axes that do not know their place are homed first.
+    homes: bool,
     /// Its number for planner and controller; `None` before it was offered.
     stream: Option<u64>,
     stage: Stage,
@@ -87,6 +92,7 @@ impl<'a> JobRun<'a> {
             pipeline,
             folder,
             name,
+            homes: false,
             stream: None,
             stage: Stage::Starting(PowerUp::begin()),
             played: false,
@@ -149,42 +155,21 @@ impl<'a> JobRun<'a> {
                 self.stage = Stage::Starting(power_up);
                 match ready {
                     Ok(false) => {}
-                    Ok(true) => match self.unhomed() {
-                        Some(axis) => self.refuse_unhomed(&axis),
-                        None => self.offer()?,
-                    },
+                    Ok(true) => self.home_or_offer()?,
                     Err(NotReady::Faulted(fault)) => self.fail(fault),
                     Err(other) => self.end_with(other.to_string()),
                 }
             }
-            Stage::Planning | Stage::Ready(_) if self.latched().is_some() => {
+            Stage::Homing(_) | Stage::Planning | Stage::Ready(_) if self.latched().is_some() => {
                 self.fail(self.latched());
             }
+            Stage::Homing(number) => self.heed_homing(number)?,
             Stage::Planning => return self.heed_planner(),
             Stage::Ready(_) | Stage::Playing if self.is_refused_late() => self.give_up(),
             Stage::Ready(since) => self.play(since),
             Stage::Playing | Stage::Resting(_) => return Ok(self.is_over()),
         }
         Ok(false)
-    }
-
-    /// The first axis that has to be homed before a job.
-    fn unhomed(&self) -> Option<String> {
-        let homed = self.pipeline.latest.progress.homed;
-        let mut axes = self.pipeline.machine.axes.iter().enumerate();
-        axes.find(|(index, _)| homed >> index & 1 == 0).map(|(_, axis)| axis.name.clone())
-    }
-
-    /// A job is refused while an axis does not know its place.
-    fn refuse_unhomed(&mut self, axis: &str) {
-        let advice = match self.pipeline.owner() {
-            ServiceOwner::Others => "`graver home` finds its place",
-            ServiceOwner::Own => {
-                "`graver home` finds its place, in a pipeline that stays: see `graver domain --help`"
-            }
-        };
-        self.end_with(format!("axis {axis} is not homed: {advice}"));
-        self.run_outcome.outcome = Some(Outcome::Refused);
     }
 
     fn offer(&mut self) -> Result<(), Failure> {
@@ -277,8 +262,9 @@ impl<'a> JobRun<'a> {
         }
         if !matches!(self.stage, Stage::Resting(_)) {
             self.run_outcome.outcome = Some(Outcome::Stopped);
+            let moves = self.played || matches!(self.stage, Stage::Homing(_));
             self.rest();
-            if self.played {
+            if moves {
                 self.pipeline.ask(OperatorVerb::Stop, 0.0);
             }
         }

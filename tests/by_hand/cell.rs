@@ -44,6 +44,12 @@ latch_speed = "10 mm/s"
 order = 1
 "#;
 
+/// The machine file with the switches, and `more`.
+pub(crate) fn machine(more: &str) -> String {
+    let machine = std::fs::read_to_string(source("machines/cartesian.toml")).unwrap();
+    format!("{machine}{SWITCHES}{more}")
+}
+
 /// A domain with its services, all running.
 pub(crate) struct Cell {
     pub(crate) place: Place,
@@ -54,8 +60,7 @@ pub(crate) struct Cell {
 impl Cell {
     /// With `more` in its machine file.
     pub(crate) fn new(more: &str) -> Self {
-        let machine = std::fs::read_to_string(source("machines/cartesian.toml")).unwrap();
-        Self::of(&format!("{machine}{SWITCHES}{more}"))
+        Self::of(&machine(more))
     }
 
     /// With this machine file.

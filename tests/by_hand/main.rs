@@ -10,7 +10,7 @@ mod outputs;
 mod support;
 
 use cell::Cell;
-use support::{Ended, INTERRUPT, KILL, assert_valid, lines, source};
+use support::{Ended, INTERRUPT, KILL, Place, assert_valid, lines, source};
 
 /// Asserts that a request was refused with these words.
 fn refused(ended: &Ended, words: &str) {
@@ -43,6 +43,29 @@ fn a_job_is_refused_until_every_axis_is_homed() {
     says(&cell.ask(&["home"]), 0, "homed; x at 100.000 mm, y at 100.000 mm\n");
     assert_eq!(cell.ask(&submit).json(0)["outcome"], "completed");
     cell.end();
+}
+
+#[test]
+fn a_run_of_its_own_homes_first_if_it_is_told_to() {
+    let place = Place::new();
+    let machine = place.file("cell.toml", &cell::machine("[safety]\ndoor = \"stop\"\n"));
+    let job = place.file("job.ngc", &lines(1));
+    let of = ["--machine", machine.to_str().unwrap()];
+    let summary = place.run(&job, "refused", &of).wait().json(2);
+    assert_eq!(summary["outcome"], "refused");
+    let message = summary["error"]["message"].as_str().unwrap();
+    assert!(message.contains("x is not homed: `graver run --home`"), "{message}");
+    let homing = [&of[..], &["--home"]].concat();
+    let summary = place.run(&job, "homed", &homing).wait().json(0);
+    assert_eq!(summary["outcome"], "completed");
+    assert!(summary["marks"]["error_max"].as_f64().unwrap() < 20e-6, "{summary:#}");
+    // A signal while it homes stops it, and nothing of the job was played.
+    let mut running = place.run(&job, "stopped", &homing);
+    place.await_status(&mut running, "homing", |status| status["state"] == "homing");
+    running.signal(INTERRUPT);
+    let summary = running.wait().json(1);
+    assert_eq!((&summary["outcome"], &summary["cycles"]), (&"stopped".into(), &0.into()));
+    place.assert_nothing_left(&[]);
 }
 
 #[test]

@@ -9,6 +9,7 @@ impl JobRun<'_> {
         let latest = &self.pipeline.latest;
         let what = match self.stage {
             Stage::Starting(_) => "starting".to_owned(),
+            Stage::Homing(_) => "homing".to_owned(),
             Stage::Planning => "planning".to_owned(),
             Stage::Ready(_) if self.control.is_held() => "held".to_owned(),
             Stage::Ready(_) => "starting".to_owned(),
