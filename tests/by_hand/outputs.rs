@@ -44,6 +44,14 @@ fn a_job_switches_what_is_its_own_and_leaves_nothing_on() {
     assert!(are_on(&cell.status(), &[]));
     says(&cell.ask(&["output", "valve", "on"]), 0, "valve is on\n");
     cell.until("a valve", |status| are_on(status, &["valve"]));
+    // Off it goes at any time, on with a closed door only.
+    cell.ask(&["input", "door", "on"]).accepted();
+    cell.until("a door", |status| status["inputs"]["door"] == true);
+    says(&cell.ask(&["output", "valve", "off"]), 0, "valve is off\n");
+    refused(&cell.ask(&["output", "valve", "on"]), "the door is open");
+    cell.ask(&["input", "door", "off"]).accepted();
+    cell.until("a closed door", |status| status["inputs"]["door"] == false);
+    cell.ask(&["output", "valve", "on"]).accepted();
     cell.ask(&["enable"]).accepted();
     cell.ask(&["home"]).accepted();
     cell.until("the brake", |status| are_on(status, &["valve", "brake"]));

@@ -144,9 +144,7 @@ impl Controller {
             (OperatorVerb::Home, State::Idle) => self.begin_homing(request.axis)?,
             (OperatorVerb::Jog, State::Idle | State::Jogging) => self.jog(request)?,
             (OperatorVerb::JogOn, _) => self.jog_on(request)?,
-            (OperatorVerb::Output, State::Disabled | State::Idle | State::Jogging) => {
-                self.switch_output(request)?;
-            }
+            (OperatorVerb::Output, _) => self.switch_output(request)?,
             (OperatorVerb::Step, State::Idle | State::Jogging) => self.step_axis(request)?,
             (OperatorVerb::Probe, State::Idle) => self.begin_probing(request)?,
             (OperatorVerb::TestPulse, State::Idle) => self.begin_pulse(request, feedback)?,
@@ -312,11 +310,17 @@ impl Controller {
         Ok(())
     }
 
-    /// Switches an output, where no job does.
+    /// Switches an output on, where no job does and no fault is latched, or off, at any time.
     fn switch_output(&mut self, request: &OperatorRequest) -> Result<(), Refused> {
-        self.may_move()?;
+        let is_on = request.value != 0.0;
+        if is_on {
+            self.may_move()?;
+            if self.fault.is_some() {
+                return Err(Refusal::State.into());
+            }
+        }
         let index = (request.axis as usize).checked_sub(1);
-        let is_switched = |index| self.switching.switch(index, request.value != 0.0);
+        let is_switched = |index| self.switching.switch(index, is_on);
         if index.is_some_and(is_switched) { Ok(()) } else { Err(Refusal::NotByHand.into()) }
     }
 
