@@ -42,6 +42,7 @@
 //! - *Finding*: something wrong, not yet a fault. The first finding becomes the latched fault.
 
 mod answer;
+mod by_hand;
 mod operating;
 mod requests;
 mod transitions;
