@@ -7,5 +7,6 @@
 // Units stand in brackets throughout, `[m]`, which rustdoc takes for links.
 #![allow(rustdoc::broken_intra_doc_links)]
 
+pub mod cable;
 pub mod ethercat;
 pub mod hostmot2;

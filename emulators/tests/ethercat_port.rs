@@ -1,172 +1,31 @@
 //! The EtherCAT port against the emulated line of drives and terminals, in virtual time: it comes to act, moves
 //! the motors, opens the gate, and bears frames that are lost, late, doubled or damaged.
 
-use std::sync::{Arc, Mutex, PoisonError};
+mod line;
 
-use drives::ethercat::EthercatPort;
-use drives::link::Link as _;
-use drives::{Actuation, Freshness, Measurement, PlantOptions, Port, Power};
+use drives::{Actuation, Port as _, Power};
 use emulators::ethercat::faults::Rates;
-use emulators::ethercat::{Framing, Layout, Link, Segment};
-use machine::{DrivesKind, Machine};
-use messages::{CommandMode, GateEdge, LaserCycle, Nanoseconds};
+use line::Line;
+use messages::{GateEdge, LaserCycle, Nanoseconds};
 
 const PERIOD: i64 = 1_000_000;
 const LATENCY: i64 = 500_000;
 /// Samples of the gate in a cycle.
 const SAMPLES: i64 = 100;
 
-struct World {
-    link: Link,
-    now: Nanoseconds,
+fn line(seed: u64) -> Line {
+    line::open(line::corexy("position"), Rates::default(), seed)
 }
 
-/// The cable between port and line, whose time is that of the test.
-#[derive(Clone)]
-struct Cable(Arc<Mutex<World>>);
-
-impl Cable {
-    fn with<T>(&self, look: impl FnOnce(&mut World) -> T) -> T {
-        look(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    fn until(&self, at: Nanoseconds) {
-        self.with(|world| {
-            world.now = world.now.max(at);
-            world.link.segment.advance(world.now);
-        });
-    }
-
-    /// When there was light, in the line's time.
-    fn lit(&self) -> Vec<[i64; 2]> {
-        self.with(|world| {
-            let mut spans = Vec::new();
-            let mut since = None;
-            for edge in world.link.segment.light() {
-                if edge.power > 0.0 {
-                    since.get_or_insert(edge.at.0);
-                } else if let Some(from) = since.take() {
-                    spans.push([from, edge.at.0]);
-                }
-            }
-            spans.extend(since.map(|from| [from, world.now.0]));
-            spans
-        })
-    }
-}
-
-impl drives::link::Link for Cable {
-    fn send(&mut self, frame: &[u8]) {
-        self.with(|world| world.link.send(frame, Framing::Ethernet, world.now));
-    }
-
-    fn receive(&mut self, buffer: &mut [u8], until: Nanoseconds) -> Option<usize> {
-        self.with(|world| {
-            loop {
-                if let Some(frame) = world.link.receive(world.now) {
-                    let length = frame.len().min(buffer.len());
-                    buffer[..length].copy_from_slice(&frame[..length]);
-                    return Some(length);
-                }
-                let next = world.link.next().filter(|next| *next <= until);
-                world.now = world.now.max(next.unwrap_or(until));
-                world.link.segment.advance(world.now);
-                next?;
-            }
-        })
-    }
-
-    fn now(&self) -> Nanoseconds {
-        self.with(|world| world.now)
-    }
-}
-
-/// The built-in machine, whose motors follow targets of `mode` by drives on a bus.
-fn machine(mode: &str) -> Machine {
-    let mut text = include_str!("../../machines/corexy.toml").to_owned();
-    for axis in ["a", "b"] {
-        let own = format!("[axis.{axis}]\n");
-        text = text.replace(&own, &format!("{own}mode = \"{mode}\"\n"));
-    }
-    text += "
-[drives.ethercat]
-udp = \"127.0.0.1:34980\"
-gate = { slave = 2, oversampling = 100 }
-power = { slave = 3 }
-
-[drives.ethercat.actuators]
-a = { slave = 0 }
-b = { slave = 1 }
-";
-    Machine::parse("bus.toml", &text, &[]).expect("the machine")
-}
-
-struct Bench {
-    machine: Machine,
-    cable: Cable,
-    port: EthercatPort,
-    deadline: Nanoseconds,
-    measurement: Measurement,
-}
-
-impl Bench {
-    fn new(mode: &str, rates: Rates) -> Self {
-        Self::on(mode, rates, 0)
-    }
-
-    /// The same, with the slaves' clocks drawn by `seed`; 0 for clocks that run right.
-    fn on(mode: &str, rates: Rates, seed: u64) -> Self {
-        let machine = machine(mode);
-        assert!(matches!(machine.drives.kind, DrivesKind::Ethercat(_)));
-        let layout = Layout { seed, ..Layout::default() };
-        let segment = Segment::new(&machine, &layout, PlantOptions::default()).expect("a line");
-        let link = Link::new(segment, rates, 7);
-        let cable = Cable(Arc::new(Mutex::new(World { link, now: Nanoseconds(0) })));
-        let port = EthercatPort::of(&machine).expect("a port");
-        let mut port = port.with_link(Box::new(cable.clone()));
-        port.open().expect("an open port");
-        drives::port::check(port.profile(), &machine).expect("what the machine file says");
-        let deadline = port.first_deadline(cable.now() + Nanoseconds(PERIOD));
-        Self { machine, cable, port, deadline, measurement: Measurement::default() }
-    }
-
-    /// One cycle; the deadline that it began at.
-    fn cycle(&mut self, actuation: &Actuation) -> i64 {
-        let at = self.deadline;
-        self.cable.until(at);
-        self.port.send(actuation);
-        self.port.receive(&mut self.measurement);
-        self.deadline = Nanoseconds(at.0 + PERIOD);
-        at.0
-    }
-
-    /// All motors stand at home but the first, which is `angle` [rad] from it.
-    fn driven(&self, angle: f64, speed: f64, laser: LaserCycle) -> Actuation {
-        let mut actuation = Actuation {
-            freshness: Freshness::Fresh,
-            mode: CommandMode::Driven,
-            laser,
-            ..Actuation::DISABLED
-        };
-        for (row, actuator) in self.machine.actuators.iter().enumerate() {
-            let home = self.machine.home_joints[actuator.axis] / actuator.ratio;
-            actuation.position[row] = home + if row == 0 { angle } else { 0.0 };
-        }
-        actuation.velocity[0] = speed;
-        actuation
-    }
-
-    /// Until the drives follow.
-    fn enable(&mut self) {
-        for _ in 0..200 {
-            self.cycle(&Actuation::DISABLED);
-        }
-        for _ in 0..200 {
-            self.cycle(&self.driven(0.0, 0.0, LaserCycle::OFF));
-        }
-        assert_eq!(self.measurement.power, Power::On, "{:?}", self.port.link());
-        assert!(!self.measurement.fault.is_some(), "{:?}", self.measurement.fault);
-    }
+/// A line whose drives follow.
+fn enabled(seed: u64) -> Line {
+    let mut line = line(seed);
+    line.cycles(&Actuation::DISABLED, 200);
+    let standing = line.driven(0.0, 0.0, LaserCycle::OFF);
+    line.cycles(&standing, 200);
+    assert_eq!(line.measurement.power, Power::On, "{:?}", line.port.link());
+    assert!(!line.measurement.fault.is_some(), "{:?}", line.measurement.fault);
+    line
 }
 
 fn laser(gate: u32, edges: &[(u32, u32)]) -> LaserCycle {
@@ -179,8 +38,7 @@ fn laser(gate: u32, edges: &[(u32, u32)]) -> LaserCycle {
 
 #[test]
 fn a_motor_follows_its_target() {
-    let mut bench = Bench::new("position", Rates::default());
-    bench.enable();
+    let mut bench = enabled(0);
     let before = bench.measurement.position[0];
     let rate = core::f64::consts::TAU;
     let mut worst: f64 = 0.0;
@@ -200,8 +58,7 @@ fn a_motor_follows_its_target() {
 
 #[test]
 fn an_edge_of_the_gate_is_within_the_resolution_that_the_port_declares() {
-    let mut bench = Bench::new("position", Rates::default());
-    bench.enable();
+    let mut bench = enabled(0);
     let resolution = bench.port.profile().gate_resolution.0;
     assert_eq!(resolution, PERIOD / SAMPLES);
     let mut asked = Vec::new();
@@ -225,11 +82,10 @@ fn an_edge_of_the_gate_is_within_the_resolution_that_the_port_declares() {
 
 #[test]
 fn a_bad_line_costs_no_order_and_lights_nothing_that_was_not_asked() {
-    let mut bench = Bench::new("position", Rates::default());
-    bench.enable();
+    let mut bench = enabled(0);
     let delay = Nanoseconds(3_000_000);
     let rates = Rates { lost: 0.01, late: 0.01, delay, duplicated: 0.01, corrupted: 0.0 };
-    bench.cable.with(|world| world.link.set_rates(rates));
+    bench.cable.with(|link, _| link.set_rates(rates));
     let mut asked = Vec::new();
     for index in 0..3000_u32 {
         let cycle = if index % 10 < 5 { laser(1, &[]) } else { LaserCycle::OFF };
@@ -250,21 +106,19 @@ fn a_bad_line_costs_no_order_and_lights_nothing_that_was_not_asked() {
 
 #[test]
 fn a_bridge_that_dies_leaves_the_line_dark() {
-    let mut bench = Bench::new("position", Rates::default());
-    bench.enable();
+    let mut bench = enabled(0);
     for _ in 0..20 {
         bench.cycle(&bench.driven(0.0, 0.0, laser(1, &[])));
     }
     let died = bench.deadline.0;
-    bench.cable.until(Nanoseconds(died + 100 * PERIOD));
+    bench.cable.go_to(Nanoseconds(died + 100 * PERIOD));
     let last = bench.cable.lit().last().map_or(0, |span| span[1]);
     assert!(last <= died + LATENCY + PERIOD, "{last} {died}");
 }
 
 #[test]
 fn a_clock_that_has_drifted_away_is_a_fault_and_dark() {
-    let mut bench = Bench::on("position", Rates::default(), 1);
-    bench.enable();
+    let mut bench = enabled(1);
     let mut faulted = None;
     for cycle in 0..60_000_u32 {
         bench.cycle(&bench.driven(0.0, 0.0, laser(1, &[])));

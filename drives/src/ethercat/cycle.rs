@@ -1,17 +1,19 @@
 //! A cycle of a bus that is set up: what is sent, what comes back, and what that means.
 
 use ethercrab::{Command, SubDeviceState};
+use machine::Machine;
 use machine::drives::Ethercat;
-use machine::{Actuator, ActuatorMode, Machine};
 use messages::{CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, Nanoseconds};
 
-use super::cia402::{self, State, Wanted};
+use super::cia402::Wanted;
+use super::drive::Drive;
 use super::gate;
-use super::image::{Said, Told};
-use super::network::{DriveFacts, Network};
+use super::image::Said;
+use super::network::Network;
 use super::wire::Wire;
 use crate::fired::Fired;
 use crate::port::{Actuation, Freshness, Measurement, Power};
+use crate::watchdog::impossible_light;
 
 /// What of a period an answer may take.
 const BUDGET: f64 = 0.6;
@@ -19,10 +21,13 @@ const BUDGET: f64 = 0.6;
 const SETTLING: u32 = 20;
 /// How long they may take to do so [cycles].
 const MOST_STARTING: u32 = 5000;
-/// A word of the port's own: see `machine::drives::fault_text`.
+/// Words of the port's own: see `machine::drives::fault_text`.
 const NO_ANSWER: f64 = 1.0;
 const NOT_OPERATIONAL: f64 = 2.0;
 const NOT_SYNCHRONOUS: f64 = 3.0;
+const NOT_ALL: f64 = 4.0;
+/// For how many cycles in a row without a whole answer the gate may open: drives go on at their speed for as long.
+const BORNE: u64 = 3;
 /// What of a period the clocks may be apart: farther, a frame comes to the sync signal of another cycle, and
 /// the gate's samples belong to another place.
 const APART: f64 = 0.2;
@@ -31,6 +36,11 @@ const OPERATIONAL: u16 = 0x08;
 const ACKNOWLEDGE: u16 = 0x14;
 const INITIAL: u16 = 0x01;
 const AL_CONTROL: u16 = 0x0120;
+/// AL status: all of them at once are those of each, joined bit by bit.
+const AL_STATUS: u16 = 0x0130;
+/// How often the slaves are sent to INIT until all are there, and how long each time [ns].
+const CLOSING: u32 = 50;
+const CLOSING_TIME: Nanoseconds = Nanoseconds(5_000_000);
 
 /// How far the slaves have come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,25 +51,6 @@ enum Stage {
     Operational,
     /// One has left; they are started again when the axes are disabled.
     Fallen,
-}
-
-/// One drive in motion.
-#[derive(Debug, Clone)]
-struct Drive {
-    facts: DriveFacts,
-    mode: ActuatorMode,
-    code: i8,
-    /// Angle of a count [rad].
-    resolution: f64,
-    torque_constant: f64,
-    /// Angle at which the machine stood when the port was opened [rad].
-    home: f64,
-    /// Position there [counts], from the first measurement on.
-    zero: Option<i64>,
-    /// Position without the wrap of its 32 bits [counts].
-    counts: i64,
-    said: Said,
-    told: Told,
 }
 
 /// The cycle of a bus.
@@ -73,9 +64,11 @@ pub struct BusCycle {
     power: Option<usize>,
     period: Nanoseconds,
     stage: Stage,
-    /// Cycles in a row without an answer, and how many are a fault.
+    /// Cycles in a row without an answer of all slaves, and how many are a fault.
     silent: u64,
     tolerated: u64,
+    /// What that is as a fault: nobody answers, or some slaves do not take part.
+    lack: f64,
     fired: Fired,
     /// What the laser was told in the newest cycle.
     laser: LaserCycle,
@@ -115,6 +108,7 @@ impl BusCycle {
             stage: Stage::Starting(0),
             silent: 0,
             tolerated,
+            lack: NO_ANSWER,
             fired,
             laser: LaserCycle::OFF,
             before: LaserCycle::OFF,
@@ -149,14 +143,10 @@ impl BusCycle {
                 self.stage = Stage::Starting(0);
             }
         }
-        let fresh = actuation.freshness == Freshness::Fresh && !self.fault.is_some();
-        self.before = self.laser;
-        self.laser =
-            if fresh && self.stage == Stage::Operational && actuation.laser.is_valid(self.period) {
-                actuation.laser
-            } else {
-                LaserCycle::OFF
-            };
+        let is_driven = actuation.mode == CommandMode::Driven;
+        if is_driven && !actuation.laser.is_valid(self.period) && !self.fault.is_some() {
+            self.fault = impossible_light(&actuation.laser);
+        }
         let wanted = match actuation.mode {
             _ if self.stage != Stage::Operational => Wanted::Disabled,
             CommandMode::Disabled => Wanted::Disabled,
@@ -168,7 +158,20 @@ impl BusCycle {
                 self.fault = Fault::new(FaultCode::NotFinite).on_actuator(index);
             }
         }
+        let may_shine = actuation.freshness == Freshness::Fresh
+            && is_driven
+            && self.stage == Stage::Operational
+            && !self.fault.is_some()
+            && self.silent <= BORNE;
+        self.begin_light(if may_shine { actuation.laser } else { LaserCycle::OFF });
         self.put();
+    }
+
+    /// The light of the cycle that ends here is told with the next measurement: what was not acknowledged may have
+    /// been fired all the same, since outputs come before inputs.
+    fn begin_light(&mut self, laser: LaserCycle) {
+        self.fired.pass(&self.laser);
+        self.before = core::mem::replace(&mut self.laser, laser);
     }
 
     /// Writes what is told into the outputs of the slaves.
@@ -176,7 +179,7 @@ impl BusCycle {
         let Network { main, group, .. } = &self.network;
         for drive in &self.drives {
             if let Ok(slave) = group.subdevice(main, drive.facts.slave) {
-                drive.told.write(slave.io_raw_mut().outputs());
+                drive.put(slave.io_raw_mut().outputs());
             }
         }
         if let Some((slave, channel, samples)) = self.gate
@@ -214,10 +217,16 @@ impl BusCycle {
         let end = self.wire.now();
         let mut is_measured = false;
         match answer {
-            None => self.wire.lost(),
+            None => {
+                self.wire.lost();
+                self.lack = NO_ANSWER;
+            }
             Some(Err(_)) => self.wire.corrupted(),
             // Outputs that a slave has not taken, or inputs that one has not given.
-            Some(Ok(response)) if response.working_counter != *whole => self.wire.corrupted(),
+            Some(Ok(response)) if response.working_counter != *whole => {
+                self.wire.corrupted();
+                self.lack = NOT_ALL;
+            }
             Some(Ok(response)) => {
                 is_measured = true;
                 if let Some(time) = response.extra {
@@ -225,14 +234,16 @@ impl BusCycle {
                     self.clock_offset =
                         Nanoseconds((time as i64).wrapping_sub(ours).wrapping_sub(self.offset));
                 }
-                let apart = self.clock_offset.0.unsigned_abs() as f64 / self.period.0 as f64;
+                // When it was read, nobody knows closer than to half of its way there and back.
+                let doubt = (end.0 - start.0).unsigned_abs() / 2;
+                let apart = self.clock_offset.0.unsigned_abs().saturating_sub(doubt);
+                let apart = apart as f64 / self.period.0 as f64;
                 if apart > APART && self.mode != CommandMode::Disabled {
                     self.fail(Fault::new(FaultCode::DriveFault), NOT_SYNCHRONOUS);
                 }
-                let all = response.subdevice_states.iter();
-                let is_operational =
-                    all.clone().all(|state| *state == SubDeviceState::Op) && all.len() > 0;
-                self.advance_stage(is_operational);
+                let mut states = response.subdevice_states.iter();
+                let fallen = states.position(|state| *state != SubDeviceState::Op);
+                self.advance_stage(fallen);
             }
         }
         if is_measured {
@@ -242,16 +253,16 @@ impl BusCycle {
             self.wire.bridged();
             self.silent += 1;
             if self.silent > self.tolerated && self.mode != CommandMode::Disabled {
-                self.fail(Fault::new(FaultCode::DriveFault), NO_ANSWER);
+                self.fail(Fault::new(FaultCode::DriveFault), self.lack);
             }
         }
-        // What was not acknowledged may have been fired all the same: outputs come before inputs.
-        self.fired.pass(&self.laser);
         self.describe(measurement);
     }
 
-    /// Goes on towards the operational state, by one question a cycle.
-    fn advance_stage(&mut self, is_operational: bool) {
+    /// Goes on towards the operational state, by one question a cycle; `fallen` is the first slave that is in
+    /// another.
+    fn advance_stage(&mut self, fallen: Option<usize>) {
+        let is_operational = fallen.is_none();
         match self.stage {
             Stage::Starting(_) if is_operational => self.stage = Stage::Operational,
             Stage::Starting(cycles) => {
@@ -262,17 +273,25 @@ impl BusCycle {
                     _ => {}
                 }
                 if cycles > MOST_STARTING && self.mode != CommandMode::Disabled {
-                    self.fail(Fault::new(FaultCode::DriveFault), NOT_OPERATIONAL);
+                    self.fail(self.of_slave(fallen), NOT_OPERATIONAL);
                 }
             }
             Stage::Operational if !is_operational => {
                 self.stage = Stage::Fallen;
                 if self.mode != CommandMode::Disabled {
-                    self.fail(Fault::new(FaultCode::DriveFault), NOT_OPERATIONAL);
+                    self.fail(self.of_slave(fallen), NOT_OPERATIONAL);
                 }
             }
             Stage::Operational | Stage::Fallen => {}
         }
+    }
+
+    /// A fault of the drive that is at `slave` on the bus, or of the port where none is.
+    fn of_slave(&self, slave: Option<usize>) -> Fault {
+        let fault = Fault::new(FaultCode::DriveFault);
+        let mut drives = self.drives.iter();
+        let index = drives.position(|drive| Some(drive.facts.slave) == slave);
+        index.map_or(fault, |index| fault.on_actuator(index))
     }
 
     /// Asks all slaves for a state at once.
@@ -297,8 +316,8 @@ impl BusCycle {
             let Ok(slave) = group.subdevice(main, drive.facts.slave) else { continue };
             let Some(said) = Said::read(slave.io_raw().inputs()) else { continue };
             drive.hear(said);
-            if State::of(said.status).is_fault() {
-                faulty.get_or_insert((index, said.error));
+            if let Some(error) = drive.error() {
+                faulty.get_or_insert((index, error));
             }
         }
         if let Some((index, error)) = faulty
@@ -311,23 +330,16 @@ impl BusCycle {
 
     fn describe(&mut self, measurement: &mut Measurement) {
         let is_ready = self.stage == Stage::Operational;
-        let powered = |drive: &Drive| {
-            State::of(drive.said.status).is_powered() && drive.said.mode == drive.code
-        };
-        let is_powered = is_ready && !self.drives.is_empty() && self.drives.iter().all(powered);
+        let is_powered =
+            is_ready && !self.drives.is_empty() && self.drives.iter().all(Drive::is_powered);
         measurement.power = if is_powered { Power::On } else { Power::Off };
         for (index, drive) in self.drives.iter().enumerate() {
-            let moved = drive.counts - drive.zero.unwrap_or(drive.counts);
             if let (Some(counts), Some(position), Some(current)) = (
                 measurement.counts.get_mut(index),
                 measurement.position.get_mut(index),
                 measurement.current.get_mut(index),
             ) {
-                let zero = (drive.home / drive.resolution).round();
-                *counts = zero as i64 + moved;
-                *position = drive.home + moved as f64 * drive.resolution;
-                let torque = f64::from(drive.said.torque) * 1e-3 * drive.facts.rated;
-                *current = torque / drive.torque_constant;
+                (*counts, *position, *current) = (drive.moved(), drive.position(), drive.current());
             }
         }
         measurement.tool = None;
@@ -338,17 +350,24 @@ impl BusCycle {
 
     /// A deadline passed in which nothing was sent: the gate's samples were those of no cycle, dark.
     pub fn pass(&mut self) {
-        self.fired.pass(&LaserCycle::OFF);
+        self.begin_light(LaserCycle::OFF);
     }
 
-    /// Leaves the slaves dark and unpowered, in their initial state.
-    pub fn close(&mut self) {
+    /// Leaves the slaves dark and unpowered, in their initial state; whether all are there.
+    pub fn close(&mut self) -> bool {
         let mut measurement = Measurement::default();
         for _ in 0..3 {
             self.send(&Actuation::DISABLED);
             self.receive(&mut measurement);
         }
-        self.request(INITIAL);
+        let slaves = self.network.group.len() as u16;
+        (0..CLOSING).any(|_| {
+            self.request(INITIAL);
+            let main = self.network.main;
+            let question = Command::brd(AL_STATUS).with_wkc(slaves).receive::<u16>(main);
+            let until = self.wire.now() + CLOSING_TIME;
+            self.wire.ask(question, until, CLOSING_TIME) == Some(Ok(INITIAL))
+        })
     }
 }
 
@@ -360,78 +379,5 @@ impl core::fmt::Debug for BusCycle {
             .field("drives", &self.drives)
             .field("fault", &self.fault)
             .finish_non_exhaustive()
-    }
-}
-
-impl Drive {
-    fn new(facts: DriveFacts, actuator: &Actuator, home: f64) -> Self {
-        Self {
-            facts,
-            mode: actuator.mode,
-            code: cia402::mode(actuator.mode).map_or(0, |(code, _)| code),
-            resolution: actuator.encoder.resolution(),
-            torque_constant: actuator.motor.dc().map_or(1.0, |motor| motor.torque_constant),
-            home,
-            zero: None,
-            counts: 0,
-            said: Said::default(),
-            told: Told::default(),
-        }
-    }
-
-    /// What it is told: `false` where a target is no number, which is not told.
-    fn tell(&mut self, wanted: Wanted, actuation: &Actuation, index: usize) -> bool {
-        let state = State::of(self.said.status);
-        self.told = Told {
-            control: state.control(wanted, self.told.control),
-            mode: self.code,
-            position: self.counts as i32,
-            ..Told::default()
-        };
-        if wanted != Wanted::Enabled || state != State::Enabled {
-            return true;
-        }
-        let of =
-            |targets: &messages::ActuatorArray| targets.get(index).copied().unwrap_or(f64::NAN);
-        let [position, velocity, effort] =
-            [of(&actuation.position), of(&actuation.velocity), of(&actuation.effort)];
-        let needed = match self.mode {
-            ActuatorMode::Position => [position, effort],
-            ActuatorMode::Velocity => [velocity, effort],
-            ActuatorMode::Torque | ActuatorMode::Voltage => [effort, effort],
-        };
-        if needed.iter().any(|number| !number.is_finite()) {
-            self.told.control = state.control(Wanted::QuickStop, self.told.control);
-            return false;
-        }
-        let torque = (effort / self.facts.rated * 1000.0).round() as i16;
-        match self.mode {
-            ActuatorMode::Position => {
-                let moved = ((position - self.home) / self.resolution).round() as i64;
-                // The position of a drive goes round in its 32 bits.
-                self.told.position = (self.zero.unwrap_or(self.counts) + moved) as i32;
-                self.told.torque_offset = torque;
-            }
-            ActuatorMode::Velocity => {
-                self.told.velocity = (velocity / self.resolution).round() as i32;
-                self.told.torque_offset = torque;
-            }
-            ActuatorMode::Torque | ActuatorMode::Voltage => self.told.torque = torque,
-        }
-        true
-    }
-
-    fn hear(&mut self, said: Said) {
-        match self.zero {
-            None => {
-                self.counts = i64::from(said.position);
-                self.zero = Some(self.counts);
-            }
-            Some(_) => {
-                let moved = said.position.wrapping_sub(self.counts as i32);
-                self.counts += i64::from(moved);
-            }
-        }
-        self.said = said;
     }
 }

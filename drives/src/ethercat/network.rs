@@ -46,7 +46,8 @@ mod register {
 const TENTHS: u16 = 2498;
 /// The bit of a sync manager's control byte that lets the watchdog watch it.
 const WATCHED: u8 = 0x40;
-/// How long after they are set up the sync signals begin.
+/// How long after they are set up the sync signals of a slave begin: signals that would have begun in the past never
+/// come.
 const AHEAD: i64 = 100_000_000;
 /// How often the clock of the bus is read for the quickest answer.
 const READINGS: u32 = 16;
@@ -385,14 +386,11 @@ async fn start_sync(
         .into());
     };
     let clock_of = group.subdevice(main, reference).asked(WHAT)?;
-    let time = clock_of.register_read::<u64>(register::SYSTEM_TIME).await.asked(WHAT)?;
-    // The time of a bus is 64 bits that go round: it is reckoned as the number that the slaves compare.
-    let ahead = (time as i64).wrapping_add(AHEAD);
-    let deadline = ahead.wrapping_add(period as i64).wrapping_sub(ahead.rem_euclid(period as i64));
-    let start = deadline.wrapping_add(wanted.shift.0) as u64;
     for (index, samples) in synced.chain(gate) {
         let slave = group.subdevice(main, index).asked(WHAT)?;
         let sync0 = (period / u64::from(samples)) as u32;
+        let time = clock_of.register_read::<u64>(register::SYSTEM_TIME).await.asked(WHAT)?;
+        let start = first_signal(time, wanted.period, wanted.shift);
         write(&slave, register::ACTIVATION, 0_u8, WHAT).await?;
         write(&slave, register::CYCLIC_UNIT, 0_u8, WHAT).await?;
         write(&slave, register::START, start, WHAT).await?;
@@ -406,9 +404,29 @@ async fn start_sync(
     Ok(reference)
 }
 
+/// When the signals of a slave begin that is set up at `time` of the bus: `shift` after a multiple of the period, so
+/// that those of all slaves come together.
+fn first_signal(time: u64, period: Nanoseconds, shift: Nanoseconds) -> u64 {
+    // The time of a bus is 64 bits that go round: it is reckoned as the number that the slaves compare.
+    let ahead = (time as i64).wrapping_add(AHEAD);
+    let deadline = ahead.wrapping_add(period.0).wrapping_sub(ahead.rem_euclid(period.0.max(1)));
+    deadline.wrapping_add(shift.0) as u64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn signals_begin_in_the_same_phase_whenever_they_are_set_up() {
+        let [period, shift] = [1_000_000, 300_000].map(Nanoseconds);
+        for time in [0, 1, 123_456_789, 5_000_000_000_u64, (-200_000_001_i64) as u64] {
+            let start = first_signal(time, period, shift) as i64;
+            assert_eq!((start - shift.0).rem_euclid(period.0), 0, "{time}");
+            let ahead = start.wrapping_sub(time as i64);
+            assert!((AHEAD..=AHEAD + 2 * period.0).contains(&ahead), "{time}: {ahead}");
+        }
+    }
 
     #[test]
     fn a_period_is_told_exactly() {

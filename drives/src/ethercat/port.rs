@@ -184,10 +184,15 @@ impl Port for EthercatPort {
     }
 
     fn close(&mut self) -> Result<(), PortError> {
-        if let Some(mut cycle) = self.cycle.take() {
-            cycle.close();
+        match self.cycle.take().map(|mut cycle| cycle.close()) {
+            None | Some(true) => Ok(()),
+            Some(false) => Err(PortError::State {
+                what: format!("the bus at {}", self.place()),
+                act: "come to its initial state".to_owned(),
+                check: "its watchdogs have stopped it; look at the cables, and at the power of the slaves"
+                    .to_owned(),
+            }),
         }
-        Ok(())
     }
 
     fn first_deadline(&self, from: Nanoseconds) -> Nanoseconds {

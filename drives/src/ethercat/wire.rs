@@ -22,6 +22,43 @@ const LONGEST: usize = 1518;
 /// Where a frame has the index of its first datagram.
 const INDEX: usize = HEADER + 3;
 
+/// Bytes of a datagram's header, and of the counter behind its data.
+const DATAGRAM: usize = 10;
+const COUNTER: usize = 2;
+
+/// The length of a datagram's data in its header, the bit that slaves change left out, and that another follows.
+const LENGTH: u16 = 0x07ff;
+const UNCHANGED: u16 = 0xbfff;
+const MORE: u16 = 0x8000;
+
+/// Whether `answer` can be what came of `question`: slaves change addresses, data and counters of a frame, and nothing
+/// else of it.
+fn answers(question: &[u8], answer: &[u8]) -> bool {
+    let header = HEADER..HEADER + 2;
+    if question.get(header.clone()) != answer.get(header.clone()) {
+        return false;
+    }
+    let mut at = header.end;
+    loop {
+        let heads = [question, answer].map(|frame| frame.get(at..at + DATAGRAM));
+        let [Some(asked), Some(told)] = heads else { return false };
+        let lengths = [asked, told].map(|head| match *head {
+            [command, index, _, _, _, _, low, high, ..] => {
+                (command, index, u16::from_le_bytes([low, high]) & UNCHANGED)
+            }
+            _ => (0, 0, 0),
+        });
+        let [(_, _, length), _] = lengths;
+        if lengths.first() != lengths.last() {
+            return false;
+        }
+        if length & MORE == 0 {
+            return true;
+        }
+        at += DATAGRAM + usize::from(length & LENGTH) + COUNTER;
+    }
+}
+
 /// Both ends of the crate's frames, and the link.
 pub struct Wire {
     sender: PduTx<'static>,
@@ -33,6 +70,11 @@ pub struct Wire {
     /// The link's time at the newest look at it [ns].
     time: Arc<AtomicI64>,
     buffer: [u8; LONGEST],
+    /// The newest frame, and its length.
+    newest: [u8; LONGEST],
+    length: usize,
+    /// Whether what came back of it was damaged.
+    is_damaged: bool,
 }
 
 impl Wire {
@@ -40,7 +82,19 @@ impl Wire {
     pub fn new(sender: PduTx<'static>, receiver: PduRx<'static>, link: Box<dyn Link>) -> Self {
         let (counters, answered) = (LinkCounters::default(), None);
         let time = Arc::new(AtomicI64::new(link.now().0));
-        Self { sender, receiver, link, counters, answered, time, buffer: [0; LONGEST] }
+        let (buffer, newest) = ([0; LONGEST], [0; LONGEST]);
+        Self {
+            sender,
+            receiver,
+            link,
+            counters,
+            answered,
+            time,
+            buffer,
+            newest,
+            length: 0,
+            is_damaged: false,
+        }
     }
 
     /// What was counted.
@@ -87,9 +141,9 @@ impl Wire {
         while self.listen(self.link.now()) {}
     }
 
-    /// A cycle passed without an answer.
+    /// A cycle passed without an answer; one that came back damaged is counted as that.
     pub fn lost(&mut self) {
-        self.counters.lost += 1;
+        self.counters.lost += u64::from(!self.is_damaged);
     }
 
     /// A cycle passed without a measurement of its own.
@@ -104,11 +158,14 @@ impl Wire {
 
     fn transmit(&mut self) {
         while let Some(frame) = self.sender.next_sendable_frame() {
-            let link = &mut self.link;
+            let Self { link, newest, length, .. } = self;
             let sent = frame.send_blocking(|bytes| {
                 link.send(bytes);
+                *length = bytes.len().min(newest.len());
+                newest.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
                 Ok(bytes.len())
             });
+            self.is_damaged = false;
             self.counters.sent += u64::from(sent.is_ok());
         }
     }
@@ -118,6 +175,12 @@ impl Wire {
         let Some(length) = self.link.receive(&mut self.buffer, until) else { return false };
         let frame = self.buffer.get(..length).unwrap_or_default();
         let index = frame.get(INDEX).copied();
+        let question = self.newest.get(..self.length).unwrap_or_default();
+        if index == question.get(INDEX).copied() && !answers(question, frame) {
+            self.is_damaged = true;
+            self.counters.corrupted += 1;
+            return true;
+        }
         match self.receiver.receive_frame(frame) {
             Ok(ReceiveAction::Processed) => self.answered = index,
             Ok(ReceiveAction::Ignored) => {}
@@ -131,5 +194,33 @@ impl Wire {
 impl core::fmt::Debug for Wire {
     fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         formatter.debug_struct("Wire").field("counters", &self.counters).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame of two datagrams, of three bytes and of one.
+    fn frame() -> Vec<u8> {
+        let mut frame = vec![0xff; HEADER];
+        frame.extend([28, 0x10]);
+        frame.extend([14, 7, 1, 0, 0x10, 9, 3, 0x80, 0, 0, 1, 2, 3, 0, 0]);
+        frame.extend([12, 7, 0, 0, 0, 1, 1, 0, 0, 0, 9, 0, 0]);
+        frame
+    }
+
+    #[test]
+    fn slaves_change_addresses_data_and_counters_and_nothing_else() {
+        let sent = frame();
+        let second = HEADER + 2 + DATAGRAM + 3 + COUNTER;
+        let kept = [HEADER + 2, second].map(|head| [head, head + 1, head + 6, head + 7]);
+        for at in 0..sent.len() {
+            let mut came = sent.clone();
+            came[at] ^= 0x5a;
+            let is_kept = [HEADER, HEADER + 1].contains(&at) || kept.as_flattened().contains(&at);
+            assert_eq!(answers(&sent, &came), !is_kept, "byte {at}");
+        }
+        assert!(!answers(&sent, &sent[..sent.len() - 13]));
     }
 }

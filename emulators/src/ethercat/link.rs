@@ -7,6 +7,7 @@ use messages::Nanoseconds;
 use super::Segment;
 use super::faults::{Counts, Fate, Line, Rates};
 use super::frame::ETHERNET_HEADER;
+use crate::cable::Hardware;
 
 /// A segment behind a line that may be bad. Frames are Ethernet frames, or the payloads of datagrams.
 #[derive(Debug)]
@@ -88,5 +89,40 @@ impl Link {
     /// When the next frame comes back.
     pub fn next(&self) -> Option<Nanoseconds> {
         self.coming.front().map(|(at, _)| *at)
+    }
+}
+
+impl Hardware for Link {
+    fn send(&mut self, now: Nanoseconds, frame: &[u8]) {
+        Self::send(self, frame, Framing::Ethernet, now);
+    }
+
+    fn receive(&mut self, now: Nanoseconds) -> Option<Vec<u8>> {
+        Self::receive(self, now)
+    }
+
+    fn next(&self) -> Option<Nanoseconds> {
+        Self::next(self)
+    }
+
+    fn advance(&mut self, now: Nanoseconds) {
+        self.segment.advance(now);
+    }
+
+    fn lit(&self, now: Nanoseconds) -> Vec<[Nanoseconds; 2]> {
+        let (mut spans, mut since) = (Vec::new(), None);
+        for edge in self.segment.light() {
+            if edge.power > 0.0 {
+                since.get_or_insert(edge.at);
+            } else if let Some(from) = since.take() {
+                spans.push([from, edge.at]);
+            }
+        }
+        spans.extend(since.map(|from| [from, now]));
+        spans
+    }
+
+    fn tool(&self) -> Option<[f64; 3]> {
+        self.segment.plant().tool()
     }
 }

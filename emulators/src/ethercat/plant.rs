@@ -1,7 +1,8 @@
 //! The simulated plant behind the drives: the one place that knows how the plant is moved.
 
 use drives::{Actuation, Freshness, Measurement, PlantOptions, Port, SimulatedPlant};
-use machine::{ActuatorMode, Machine, Motor};
+use machine::{ActuatorMode, Machine, Motor, Timing};
+use messages::time::Period;
 use messages::{CommandMode, MAX_ACTUATORS, Nanoseconds};
 
 use super::wires::{Bundle, Phases};
@@ -16,6 +17,9 @@ pub enum PlantError {
     #[error("the emulated drives are for servo motors, and this machine has steppers")]
     Steppers,
 }
+
+/// How often the drives' loops run: as in drives that are bought, several times in a cycle of the bus.
+const LOOPS: Period = Period::SHORTEST;
 
 /// The machine that the drives move.
 pub struct Plant {
@@ -47,12 +51,13 @@ impl Plant {
             return Err(PlantError::Steppers);
         }
         // The machine file says what the drives follow, and how late. The motors behind them follow voltages at once.
-        let mut motors = machine.clone();
+        let realtime = Timing { period: LOOPS, ..machine.realtime };
+        let mut motors = Machine { realtime, ..machine.clone() };
         for actuator in &mut motors.actuators {
             (actuator.mode, actuator.latency) = (ActuatorMode::Voltage, Nanoseconds(0));
         }
         let port = SimulatedPlant::new(&motors, options).map_err(PlantError::Plant)?;
-        let period = machine.realtime.period.time();
+        let period = LOOPS.time();
         let back_emf = machine.actuators.iter().map(|actuator| {
             let constant = actuator.motor.dc().map_or(0.0, |motor| motor.torque_constant);
             constant * actuator.encoder.resolution() / period.seconds()

@@ -183,6 +183,14 @@ impl Segment {
         self.link();
     }
 
+    /// Lets the slave at `position` fall out of its operational state at `now`.
+    pub fn leave(&mut self, position: usize, now: Nanoseconds) {
+        self.advance(now);
+        if let Some(slave) = self.slaves.get_mut(position) {
+            slave.leave(now);
+        }
+    }
+
     fn link(&mut self) {
         let reached = self.reached;
         for (position, slave) in self.slaves.iter_mut().enumerate() {

@@ -101,6 +101,13 @@ impl Slave {
         self.reset();
     }
 
+    /// Falls back from OP to SAFE-OP at `now`, as by a fault of its own that it takes for a lack of sync signals.
+    pub fn leave(&mut self, now: Nanoseconds) {
+        if self.state == State::Op {
+            self.fall(now, Loss::Synchronization, Code::Synchronization);
+        }
+    }
+
     /// What stands behind it.
     pub fn device(&self) -> &dyn Device {
         &*self.device

@@ -4,6 +4,8 @@ use messages::Nanoseconds;
 
 use super::board::Board;
 use super::faults::{Account, Direction, Faults, Line};
+use super::rig::Rig;
+use crate::cable::Hardware;
 
 /// A board and both directions of its cable.
 #[derive(Debug)]
@@ -74,5 +76,31 @@ impl Emulator {
     /// What happened to the frames to the board, and to those back.
     pub fn accounts(&self) -> [Account; 2] {
         [self.inward.account(), self.outward.account()]
+    }
+}
+
+impl Hardware for Emulator {
+    fn send(&mut self, now: Nanoseconds, frame: &[u8]) {
+        Self::send(self, now, frame);
+    }
+
+    fn receive(&mut self, now: Nanoseconds) -> Option<Vec<u8>> {
+        Self::receive(self, now)
+    }
+
+    fn next(&self) -> Option<Nanoseconds> {
+        Self::next(self)
+    }
+
+    fn advance(&mut self, now: Nanoseconds) {
+        Self::advance(self, now);
+    }
+
+    fn lit(&self, now: Nanoseconds) -> Vec<[Nanoseconds; 2]> {
+        self.board.record().lit(now)
+    }
+
+    fn tool(&self) -> Option<[f64; 3]> {
+        self.board.rig().and_then(Rig::tool)
     }
 }

@@ -25,11 +25,12 @@ fn hostmot2(word: u32) -> Option<&'static str> {
 /// Error codes of drives by IEC 61800-7-201 (CiA 402), object 603Fh, and of the port itself below 100h.
 fn cia402(word: u32) -> Option<&'static str> {
     Some(match word {
-        1 => "the drive does not answer",
-        2 => "the drive has left the operational state",
-        3 => "the drive has lost its synchronisation with the bus clock",
-        4 => "the drive does not come to its enabled state",
-        5 => "the drive follows another mode than it was told",
+        1 => "the bus does not answer",
+        2 => "a slave has left the operational state",
+        3 => "our clock and that of the bus are too far apart",
+        4 => {
+            "some slaves do not take part: they were cut off, without power, or plugged in anew; start again"
+        }
         0x2110..=0x213F => "short circuit or earth fault at the input",
         0x2200..=0x22FF => "overcurrent in the drive",
         0x2310 => "continuous overcurrent of the motor",

@@ -116,7 +116,7 @@ impl Drive {
         self.ticked = at;
         let wires = self.wires.motor(self.motor);
         let angle = wires.counts as f64 * self.servo.resolution();
-        self.servo.observe(angle);
+        self.servo.observe(angle, wires.current);
         let target = match self.machine.state() {
             State::OperationEnabled => self.followed(at, angle),
             State::QuickStopActive => self.brake(0x605A, angle),

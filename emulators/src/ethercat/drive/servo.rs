@@ -37,6 +37,8 @@ pub struct Servo {
     step: f64,
     angle: f64,
     speed: f64,
+    /// What speeds the motor up beside its own torque [rad/s²].
+    disturbance: f64,
     integral: f64,
     limited: bool,
 }
@@ -57,6 +59,7 @@ impl Servo {
             step,
             angle: 0.0,
             speed: 0.0,
+            disturbance: 0.0,
             integral: 0.0,
             limited: false,
         })
@@ -87,20 +90,26 @@ impl Servo {
         self.limited
     }
 
-    /// Takes the measured `angle` [rad], `step` after the one before.
-    pub fn observe(&mut self, angle: f64) {
-        // A second-order tracking loop: without a lag at an even acceleration.
+    /// Takes the measured `angle` [rad] and `current` [A], `step` after those before.
+    pub fn observe(&mut self, angle: f64, current: f64) {
+        // The speed follows the torque and what stands against it, weight and friction; both are corrected by the
+        // encoder, with a memory that fades (Zarchan, Musoff: Fundamentals of Kalman filtering, ch. 3). Filtering the
+        // encoder alone would tell the speed late by many steps while the motor speeds up.
         let [_, velocity, _] = self.bandwidths;
-        let gain = (ESTIMATE_RATIO * velocity * self.step).min(0.5);
-        let predicted = self.angle + self.speed * self.step;
+        let fresh = (ESTIMATE_RATIO * velocity * self.step).min(0.5);
+        let kept = 1.0 - fresh;
+        let torque = self.torque(current) - self.viscous * self.speed;
+        let change = (torque / self.inertia + self.disturbance) * self.step;
+        let predicted = self.angle + (self.speed + 0.5 * change) * self.step;
         let error = angle - predicted;
-        self.angle = predicted + (1.0 - (1.0 - gain) * (1.0 - gain)) * error;
-        self.speed += gain * gain * error / self.step;
+        self.angle = predicted + (1.0 - kept * kept * kept) * error;
+        self.speed += change + 1.5 * fresh * fresh * (1.0 + kept) * error / self.step;
+        self.disturbance += fresh * fresh * fresh * error / (self.step * self.step);
     }
 
     /// Forgets what the loops have summed up, the motor standing at `angle` [rad].
     pub fn reset(&mut self, angle: f64) {
-        (self.angle, self.speed) = (angle, 0.0);
+        (self.angle, self.speed, self.disturbance) = (angle, 0.0, 0.0);
         self.release();
     }
 

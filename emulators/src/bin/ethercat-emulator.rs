@@ -1,18 +1,17 @@
 //! An emulated EtherCAT segment in real time: on a network interface, or behind a UDP port.
 
-mod bus;
-
 use std::io::Write as _;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use bus::Bus;
 use clap::Parser;
 use drives::PlantOptions;
+use emulators::ethercat::bus::Bus;
 use emulators::ethercat::faults::Rates;
-use emulators::ethercat::{Framing, Layout, Link, Segment};
+use emulators::ethercat::service::serve;
+use emulators::ethercat::{Layout, Link, Segment};
 use machine::Machine;
 use messages::Nanoseconds;
 
@@ -85,40 +84,17 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         duplicated: arguments.duplicate,
         corrupted: arguments.corrupt,
     };
-    let link = Link::new(segment, rates, arguments.seed);
-    let (bus, framing) = match (&arguments.interface, arguments.udp) {
-        (Some(name), _) => (Bus::interface(name)?, Framing::Ethernet),
-        (None, Some(address)) => (Bus::udp(address)?, Framing::Payload),
+    let mut link = Link::new(segment, rates, arguments.seed);
+    let mut bus = match (&arguments.interface, arguments.udp) {
+        (Some(name), _) => Bus::interface(name)?,
+        (None, Some(address)) => Bus::udp(address)?,
         (None, None) => return Err("neither an interface nor an address".into()),
     };
     say(&format!("{} slaves on {bus}", link.segment.slaves().len()));
-    serve(link, bus, framing, arguments.seconds.map(Duration::from_secs_f64))
-}
-
-/// Answers frames until the time is up.
-fn serve(
-    mut link: Link,
-    mut bus: Bus,
-    framing: Framing,
-    time: Option<Duration>,
-) -> Result<(), Box<dyn std::error::Error>> {
     let start = Instant::now();
-    let now = || Nanoseconds(i64::try_from(start.elapsed().as_nanos()).unwrap_or(i64::MAX));
-    let mut frame = [0; 1600];
-    while time.is_none_or(|time| start.elapsed() < time) {
-        // Awake often enough for the plant and the watchdogs, and for what comes back late.
-        let wait = link.next().map_or(1_000_000, |at| (at - now()).0.clamp(0, 1_000_000));
-        if let Some(length) = bus.receive(&mut frame, Duration::from_nanos(wait as u64))? {
-            link.send(frame.get(..length).unwrap_or_default(), framing, now());
-        } else {
-            link.segment.advance(now());
-        }
-        while let Some(back) = link.receive(now()) {
-            bus.send(&back)?;
-        }
-    }
-    let counts = link.counts();
-    say(&format!("{counts:?}"));
+    let time = arguments.seconds.map(Duration::from_secs_f64);
+    serve(&mut link, &mut bus, || time.is_some_and(|time| start.elapsed() >= time))?;
+    say(&format!("{:?}", link.counts()));
     for (position, slave) in link.segment.slaves().iter().enumerate() {
         let (state, code, bites) = (slave.state(), slave.code(), slave.watchdog_count());
         say(&format!(

@@ -6,7 +6,6 @@ use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::{AsFd as _, AsRawFd as _, OwnedFd};
 use std::time::Duration;
 
-use emulators::ethercat::frame::ETHERTYPE;
 use nix::errno::Errno;
 use nix::ifaddrs::getifaddrs;
 use nix::poll::{PollFd, PollFlags, ppoll};
@@ -16,12 +15,15 @@ use nix::sys::socket::{
 };
 use nix::sys::time::TimeSpec;
 
+use super::frame::ETHERTYPE;
+use super::link::Framing;
+
 /// Frames that this side has sent itself are shown to a raw socket as well.
 const OUTGOING: u8 = 4;
 
 /// Where frames come from and go to.
 #[derive(Debug)]
-pub(crate) enum Bus {
+pub enum Bus {
     /// A network interface.
     Interface(String, OwnedFd),
     /// A UDP port, with who sent last.
@@ -45,7 +47,7 @@ impl Bus {
     ///
     /// # Errors
     /// If there is none, or raw sockets are not allowed.
-    pub(crate) fn interface(name: &str) -> io::Result<Self> {
+    pub fn interface(name: &str) -> io::Result<Self> {
         let address = getifaddrs()?
             .filter(|interface| interface.interface_name == name)
             .find_map(|interface| interface.address?.as_link_addr().copied());
@@ -62,21 +64,25 @@ impl Bus {
     ///
     /// # Errors
     /// If it cannot be opened.
-    pub(crate) fn udp(address: SocketAddr) -> io::Result<Self> {
+    pub fn udp(address: SocketAddr) -> io::Result<Self> {
         let socket = UdpSocket::bind(address)?;
         socket.set_nonblocking(true)?;
         Ok(Self::Udp(socket, None))
+    }
+
+    /// What the frames that come here begin with.
+    pub fn framing(&self) -> Framing {
+        match self {
+            Self::Interface(..) => Framing::Ethernet,
+            Self::Udp(..) => Framing::Payload,
+        }
     }
 
     /// Waits for a frame for `time` at most; its length, `None` if none has come.
     ///
     /// # Errors
     /// If the socket fails.
-    pub(crate) fn receive(
-        &mut self,
-        frame: &mut [u8],
-        time: Duration,
-    ) -> io::Result<Option<usize>> {
+    pub fn receive(&mut self, frame: &mut [u8], time: Duration) -> io::Result<Option<usize>> {
         if let Some(length) = self.take(frame)? {
             return Ok(Some(length));
         }
@@ -118,7 +124,7 @@ impl Bus {
     ///
     /// # Errors
     /// If the socket fails.
-    pub(crate) fn send(&mut self, frame: &[u8]) -> io::Result<()> {
+    pub fn send(&mut self, frame: &[u8]) -> io::Result<()> {
         let sent = match self {
             Self::Interface(_, socket) => {
                 send(socket.as_raw_fd(), frame, MsgFlags::empty()).map_err(io::Error::from)

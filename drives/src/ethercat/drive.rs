@@ -1,0 +1,134 @@
+//! One drive in motion: from the targets of an actuator to what the drive is told, and from what it says to what was
+//! measured.
+
+use machine::{Actuator, ActuatorMode};
+
+use super::cia402::{self, State, Wanted};
+use super::image::{Said, Told};
+use super::network::DriveFacts;
+use crate::port::Actuation;
+
+/// The drive of an actuator.
+#[derive(Debug, Clone)]
+pub(super) struct Drive {
+    /// What it told of itself.
+    pub(super) facts: DriveFacts,
+    mode: ActuatorMode,
+    code: i8,
+    /// Angle of a count [rad].
+    resolution: f64,
+    torque_constant: f64,
+    /// Angle at which the machine stood when the port was opened [rad].
+    home: f64,
+    /// Position there [counts], from the first measurement on.
+    zero: Option<i64>,
+    /// Position without the wrap of its 32 bits [counts].
+    counts: i64,
+    said: Said,
+    told: Told,
+}
+
+impl Drive {
+    /// The drive that told `facts`, of an actuator that stands at `home` [rad].
+    pub(super) fn new(facts: DriveFacts, actuator: &Actuator, home: f64) -> Self {
+        Self {
+            facts,
+            mode: actuator.mode,
+            code: cia402::mode(actuator.mode).map_or(0, |(code, _)| code),
+            resolution: actuator.encoder.resolution(),
+            torque_constant: actuator.motor.dc().map_or(1.0, |motor| motor.torque_constant),
+            home,
+            zero: None,
+            counts: 0,
+            said: Said::default(),
+            told: Told::default(),
+        }
+    }
+
+    /// Takes what it shall be told: `false` where a target is no number, which is not told.
+    pub(super) fn tell(&mut self, wanted: Wanted, actuation: &Actuation, index: usize) -> bool {
+        let state = State::of(self.said.status);
+        self.told = Told {
+            control: state.control(wanted, self.told.control),
+            mode: self.code,
+            position: self.counts as i32,
+            ..Told::default()
+        };
+        if wanted != Wanted::Enabled || state != State::Enabled {
+            return true;
+        }
+        let of =
+            |targets: &messages::ActuatorArray| targets.get(index).copied().unwrap_or(f64::NAN);
+        let [position, velocity, effort] =
+            [of(&actuation.position), of(&actuation.velocity), of(&actuation.effort)];
+        let needed = match self.mode {
+            ActuatorMode::Position => [position, effort],
+            ActuatorMode::Velocity => [velocity, effort],
+            ActuatorMode::Torque | ActuatorMode::Voltage => [effort, effort],
+        };
+        if needed.iter().any(|number| !number.is_finite()) {
+            self.told.control = state.control(Wanted::QuickStop, self.told.control);
+            return false;
+        }
+        let torque = (effort / self.facts.rated * 1000.0).round() as i16;
+        match self.mode {
+            ActuatorMode::Position => {
+                let moved = ((position - self.home) / self.resolution).round() as i64;
+                // The position of a drive goes round in its 32 bits.
+                self.told.position = (self.zero.unwrap_or(self.counts) + moved) as i32;
+                self.told.torque_offset = torque;
+            }
+            ActuatorMode::Velocity => {
+                self.told.velocity = (velocity / self.resolution).round() as i32;
+                self.told.torque_offset = torque;
+            }
+            ActuatorMode::Torque | ActuatorMode::Voltage => self.told.torque = torque,
+        }
+        true
+    }
+
+    /// Puts what it is told into its outputs.
+    pub(super) fn put(&self, outputs: &mut [u8]) {
+        self.told.write(outputs);
+    }
+
+    /// Whether it drives its motor in the mode of its actuator.
+    pub(super) fn is_powered(&self) -> bool {
+        State::of(self.said.status).is_powered() && self.said.mode == self.code
+    }
+
+    /// Its error code, if it has a fault.
+    pub(super) fn error(&self) -> Option<u16> {
+        State::of(self.said.status).is_fault().then_some(self.said.error)
+    }
+
+    /// Counts since the first measurement.
+    pub(super) fn moved(&self) -> i64 {
+        self.counts - self.zero.unwrap_or(self.counts)
+    }
+
+    /// The motor's angle [rad].
+    pub(super) fn position(&self) -> f64 {
+        self.home + self.moved() as f64 * self.resolution
+    }
+
+    /// What flows in the motor [A].
+    pub(super) fn current(&self) -> f64 {
+        f64::from(self.said.torque) * 1e-3 * self.facts.rated / self.torque_constant
+    }
+
+    /// Takes in what it says.
+    pub(super) fn hear(&mut self, said: Said) {
+        match self.zero {
+            None => {
+                self.counts = i64::from(said.position);
+                self.zero = Some(self.counts);
+            }
+            Some(_) => {
+                let moved = said.position.wrapping_sub(self.counts as i32);
+                self.counts += i64::from(moved);
+            }
+        }
+        self.said = said;
+    }
+}

@@ -1,0 +1,47 @@
+//! The letters on the emulated bus, whole and in virtual time: where the true tool was under the light, and when the
+//! true light was on.
+
+mod job;
+mod line;
+
+use emulators::ethercat::faults::Rates;
+
+/// How far a mark may lie from its line, and its end from that of the stroke [m].
+const ERROR: f64 = 20e-6;
+
+/// How long a frame is on its way along the slaves at most [ns].
+const FLIGHT: i64 = 10_000;
+
+/// Asserts that the gantry's letters, by drives that follow targets of `mode`, are where they are drawn, and that the
+/// light was on when it was asked for, to half a step of what the port declares.
+fn check(mode: &str) {
+    let machine = line::gantry(mode);
+    assert_eq!(machine.actuators.len(), 4);
+    let plan = job::letters(&machine);
+    let played = job::play(line::open(machine.clone(), Rates::default(), 0), &plan, None);
+    assert_eq!(played.report.completed, 1, "{:?}", played.report.fault);
+    let link = played.drives.link;
+    assert_eq!((link.lost, link.late, link.corrupted, link.bridged), (0, 0, 0, 0), "{link:?}");
+
+    // The last sample of a cycle is always dark.
+    let mut lit: Vec<[i64; 2]> = Vec::new();
+    for span in played.cable.lit() {
+        match lit.last_mut() {
+            Some(last) if span[0] - last[1] <= played.resolution + FLIGHT => last[1] = span[1],
+            _ => lit.push(span),
+        }
+    }
+    let asked = job::asked(&played.records, &machine, machine.drives.gate_latency.0);
+    assert_eq!(lit.len(), asked.len());
+    for (lit, asked) in lit.iter().flatten().zip(asked.iter().flatten()) {
+        let most = played.resolution / 2 + FLIGHT;
+        assert!((lit - asked).abs() <= most, "an edge at {lit} ns instead of {asked}");
+    }
+    let error = played.error(&lit, &plan.artwork);
+    assert!(error <= ERROR, "{error} m");
+}
+
+#[test]
+fn four_drives_that_follow_positions_mark_the_letters() {
+    check("position");
+}
