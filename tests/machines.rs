@@ -65,6 +65,8 @@ fn every_machine_marks_its_sample_job() {
         "cartesian_steppers",
         "corexy",
         "five_bar",
+        "hostmot2_galvo",
+        "hostmot2_steppers",
         "mcm",
         "polar",
         "polar_beam",

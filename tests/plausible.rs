@@ -53,7 +53,7 @@ fn files() -> Vec<File> {
         .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
         .collect();
     paths.sort();
-    assert_eq!(paths.len(), 16);
+    assert_eq!(paths.len(), 18);
     paths
         .into_iter()
         .map(|path| {

@@ -6,6 +6,7 @@
 //!   them; [`path`]: what it is told through a cycle.
 //! - [`grid`]: when requests reach the board; [`gate`]: the laser's edges by the board's clock; [`crate::fired`]: the
 //!   light that the board has shown to have given.
+//! - [`digital`]: inputs and outputs of the machine file on pins.
 //! - [`config`]: what is connected; [`session`]: a cycle; [`port`]: the port.
 //!
 //! A request is built in a fixed buffer, in each cycle the same but for the numbers in it, and its reply is
@@ -16,6 +17,7 @@ pub mod arming;
 pub mod asking;
 pub mod axes;
 pub mod config;
+pub mod digital;
 pub mod encoder;
 pub mod galvo;
 pub mod gate;

@@ -1,17 +1,20 @@
 #!/bin/bash
 # What a cycle costs on the emulated HostMot2 board: LinuxCNC's hm2_eth, and our bridge beside it.
 #
-#   sudo emulators/scripts/cycle_time.sh [SECONDS [PERIOD_NS [JOB_MACHINE]]]
+#   sudo emulators/scripts/cycle_time.sh [SECONDS [PERIOD_NS [MACHINE]]]
 #
 # hm2_eth: the time of its read (request and reply) and of its write, sampled in every cycle by LinuxCNC's own
-# sampler. Our bridge: the round trip of its datagram, from `graver run` of JOB_MACHINE, a machine file with
-# [drives.hostmot2] at this board; without one only hm2_eth is measured. Needs what hostmot2.sh needs.
+# sampler. Our bridge: the exchange of a cycle, one request with its reply, from `graver run` of the sample job of
+# MACHINE (machines/hostmot2_steppers.toml) on this board. Needs what hostmot2.sh needs, and target/release/graver or
+# GRAVER=...
 set -u
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 PATIENT=1
 . "$here/hostmot2_bench.sh"
 
-seconds=${1:-20} period=${2:-1000000} own=${3:-}
+seconds=${1:-20} period=${2:-1000000}
+own=${3:-$here/../../machines/hostmot2_steppers.toml}
+graver=${GRAVER:-$here/../../target/release/graver}
 bench_need linuxcnc-uspace iproute2 iptables gcc
 bench_open
 bench_emulator "$scratch/report.json" --machine "$here/../../machines/cartesian_steppers.toml"
@@ -40,11 +43,9 @@ echo "  read   $(percentiles 1)"
 echo "  write  $(percentiles 2)"
 [ -s "$scratch/samples" ] || grep -v "IO Pin\|fallback_uid" "$scratch/hal.err" | tail -20
 
-if [ -n "$own" ]; then
-    bench_open
-    bench_emulator "$scratch/report.json" --machine "$own"
-    graver=${GRAVER:-$here/../../target/release/graver}
-    echo "graver run on the same board:"
-    "$graver" run --machine "$own" --output "$scratch/run" >"$scratch/run.out" 2>&1
-    grep -iE "round trip|bridge|frames" "$scratch/run.out" || tail -20 "$scratch/run.out"
-fi
+bench_open
+bench_emulator "$scratch/own.json" --machine "$own"
+echo "graver run on the same board:"
+"$graver" run --machine "$own" --set "machine.drives.hostmot2.address=\"$board\"" --out "$scratch/run" \
+    >"$scratch/run.out" 2>&1
+grep -E "^(outcome|drives|link|latency exchange|cycles) " "$scratch/run.out" || tail -20 "$scratch/run.out"

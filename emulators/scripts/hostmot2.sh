@@ -5,7 +5,8 @@
 #   sudo emulators/scripts/hostmot2.sh [SECONDS [PERIOD_NS]]
 #
 # On a computer that stands still for more than 5 ms now and then, as a busy virtual machine does, the watchdog bites
-# and the driver gives up, whatever is on the other end. PATIENT=1 gives it a watchdog of 50 ms and 100 packet errors.
+# and the driver gives up, whatever is on the other end. PATIENT=1 gives it a watchdog of 50 ms and a packet-error-limit
+# of 200 in place of 10.
 #
 # Needs root for a veth pair, a network namespace and real-time priorities, and Debian's packages mesaflash,
 # linuxcnc-uspace, iproute2, iptables and gcc. Takes back all that it changes.

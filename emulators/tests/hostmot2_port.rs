@@ -1,85 +1,19 @@
 //! The HostMot2 port against the emulated board, in virtual time: motion, the gate's edges, and what happens
 //! when frames are lost, late, doubled or damaged, when the cable is cut and when a side dies.
 
-use std::sync::{Arc, Mutex, PoisonError};
+mod board;
 
+use board::Cable;
 use drives::hostmot2::session::{Counters, Trouble};
 use drives::hostmot2::{Config, Connection, Hostmot2Port};
-use drives::link::Link;
 use drives::{Actuation, Freshness, Measurement, Port};
-use emulators::hostmot2::record::Record;
-use emulators::hostmot2::rig::Rig;
-use emulators::hostmot2::spaces::Identity;
-use emulators::hostmot2::wiring::Wiring;
-use emulators::hostmot2::{Board, Emulator, Faults};
+use emulators::hostmot2::Faults;
 use machine::Machine;
 use messages::{CommandMode, GateEdge, LaserCycle, Nanoseconds};
 
 const PERIOD: i64 = 1_000_000;
 const LATENCY: i64 = 400_000;
-const FLIGHT: i64 = 30_000;
-
-struct World {
-    emulator: Emulator,
-    now: Nanoseconds,
-}
-
-/// The cable between port and board, whose time is that of the test.
-#[derive(Clone)]
-struct Cable(Arc<Mutex<World>>);
-
-impl Cable {
-    fn with<T>(&self, look: impl FnOnce(&mut World) -> T) -> T {
-        look(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    fn until(&self, at: Nanoseconds) {
-        self.with(|world| {
-            world.now = world.now.max(at);
-            world.emulator.advance(world.now);
-        });
-    }
-
-    fn lit(&self) -> Vec<[i64; 2]> {
-        self.with(|world| {
-            let record = world.emulator.board().record();
-            record.lit(world.now).into_iter().map(|span| span.map(|at| at.0)).collect()
-        })
-    }
-
-    fn delivered(&self) -> f64 {
-        self.with(|world| world.emulator.board().modules().stepgens.delivered(0))
-    }
-
-    fn bites(&self) -> Vec<Nanoseconds> {
-        self.with(|world| world.emulator.board().record().bites.clone())
-    }
-}
-
-impl Link for Cable {
-    fn send(&mut self, datagram: &[u8]) {
-        self.with(|world| world.emulator.send(world.now, datagram));
-    }
-
-    fn receive(&mut self, buffer: &mut [u8], until: Nanoseconds) -> Option<usize> {
-        self.with(|world| {
-            loop {
-                if let Some(frame) = world.emulator.receive(world.now) {
-                    let length = frame.len().min(buffer.len());
-                    buffer[..length].copy_from_slice(&frame[..length]);
-                    return Some(length);
-                }
-                let next = world.emulator.next().filter(|next| *next <= until);
-                world.now = world.now.max(next.unwrap_or(until));
-                next?;
-            }
-        })
-    }
-
-    fn now(&self) -> Nanoseconds {
-        self.with(|world| world.now)
-    }
-}
+const FLIGHT: i64 = board::FLIGHT.0;
 
 fn machine() -> Machine {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../machines/cartesian_steppers.toml");
@@ -97,6 +31,7 @@ fn config(machine: &Machine) -> Config {
         power: Some(0),
         actuators: (0..machine.actuators.len() as u32).map(stepgen).collect(),
         inputs: Vec::new(),
+        outputs: Vec::new(),
     }
 }
 
@@ -113,11 +48,7 @@ struct Bench {
 impl Bench {
     fn new(faults: &Faults) -> Self {
         let machine = machine();
-        let wiring = Wiring::usual(&machine);
-        let rig = Rig::new(&machine, &wiring).expect("a rig");
-        let board = Board::new(Identity::default()).with_machine(rig, &wiring, Record::with_way());
-        let emulator = Emulator::new(board, faults, Nanoseconds(FLIGHT));
-        let cable = Cable(Arc::new(Mutex::new(World { emulator, now: Nanoseconds(0) })));
+        let cable = Cable::new(&machine, faults);
         let port = Hostmot2Port::new(&machine, config(&machine)).expect("a port");
         let mut port = port.with_link(Box::new(cable.clone()));
         port.open().expect("an open port");
@@ -230,14 +161,40 @@ fn the_steps_are_where_they_are_asked_to_be() {
         // The request arrived a flight after the deadline, where the path was.
         let position = bench.measurement.position[0] - bench.home;
         measured = measured.max((position - before).abs());
-        bench.cable.until(Nanoseconds(bench.deadline.0 + FLIGHT - 1));
-        worst = worst.max((bench.cable.delivered() / per_radian - angle).abs());
+        // The next one leaves at its deadline. Until it arrives the rate stays.
+        bench.cable.until(bench.deadline);
+        let arrived = bench.cable.delivered() + bench.cable.speed() * 1e-9 * FLIGHT as f64;
+        worst = worst.max((arrived - angle * per_radian).abs());
     }
-    let step = 1.0 / per_radian;
-    assert!(worst < 0.5 * step, "{} steps off at an arrival", worst / step);
+    assert!(worst < 0.005, "{worst} steps off at an arrival");
     // By encoder: the rotor is on its spring behind the steps.
     assert!(measured < 0.05, "{measured} rad measured");
     assert_eq!(bench.port.counters(), Counters { sent: 600, ..Counters::default() });
+}
+
+#[test]
+fn missed_deadlines_are_gone_through_at_the_speed_before() {
+    let mut bench = Bench::new(&Faults::default());
+    let per_radian = bench.machine.actuators[0].encoder.counts / core::f64::consts::TAU;
+    let (mut off, mut fastest) = (0.0, 0.0_f64);
+    for index in 0..600 {
+        // Three are missed every now and then, the last of them two cycles before the end.
+        if index % 50 > 46 {
+            bench.port.pass(&bench.driven(0.0, 0.0, LaserCycle::OFF));
+            bench.deadline = Nanoseconds(bench.deadline.0 + PERIOD);
+            continue;
+        }
+        let [angle, speed] = bench.swing(index);
+        bench.cycle(&bench.driven(angle, speed, LaserCycle::OFF));
+        bench.cable.until(bench.deadline);
+        fastest = fastest.max(bench.cable.speed().abs());
+        let arrived = bench.cable.delivered() + bench.cable.speed() * 1e-9 * FLIGHT as f64;
+        if index % 50 > 0 {
+            off = f64::max(off, (arrived - angle * per_radian).abs());
+        }
+    }
+    // ±2 rad at 2 Hz are 12,800 steps a second; what is made up for is the turn of the path within 3 ms.
+    assert!(off < 0.005 && fastest < 14_000.0, "{off} steps off, {fastest} steps/s");
 }
 
 #[test]

@@ -88,10 +88,14 @@ pub struct Hostmot2 {
     pub power: Option<u32>,
     /// What drives each actuator, in the order of the machine's.
     pub actuators: Vec<Hostmot2Actuator>,
+    /// The pin of each of the machine's inputs, in their order.
+    pub inputs: Vec<u32>,
+    /// The pin of each of its outputs.
+    pub outputs: Vec<u32>,
 }
 
 /// What drives an actuator on a HostMot2 card: numbers of the card's modules, from 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Hostmot2Actuator {
     /// A step generator.
     Stepgen {
@@ -113,7 +117,20 @@ pub enum Hostmot2Actuator {
         xy2mod: u32,
         /// 0 for its x, 1 for its y.
         axis: u32,
+        /// The motor's angle at full scale, either way from the middle [rad].
+        full_scale: f64,
+        /// How a position travels.
+        frame: Xy2Frame,
     },
+}
+
+/// Bits of a position in a frame of XY2-100.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Xy2Frame {
+    /// 16.
+    Short,
+    /// 18.
+    Long,
 }
 
 /// Drives on an EtherCAT bus.

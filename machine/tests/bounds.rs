@@ -197,5 +197,5 @@ fn the_shipped_files_are_usual() {
             .collect();
         assert!(warnings.is_empty(), "{}: {warnings:#?}", path.display());
     }
-    assert_eq!(files, 16);
+    assert_eq!(files, 18);
 }

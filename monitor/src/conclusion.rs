@@ -245,7 +245,7 @@ pub fn conclude(
                 None if silenced && info.progress == Progress::Complete => StreamEnd::Silenced,
                 None => StreamEnd::Unknown,
             };
-            results = examine(folder, &drawn, plan.speed, end)
+            results = examine(folder, machine, (&drawn, plan.speed), end)
                 .map_err(|reason| warnings.push(format!("there is no recording: {reason}")))
                 .ok();
         }
@@ -292,19 +292,20 @@ pub fn write(
     }
 }
 
-/// Examines the recording in a folder, against marks that the plan makes at most with `speed`
+/// Examines the recording of `machine` in a folder, against marks that the plan makes at most with `speed`
 /// [m/s].
 fn examine(
     folder: &RunFolder,
-    artwork: &Artwork,
-    speed: f64,
+    machine: &Machine,
+    (artwork, speed): (&Artwork, f64),
     end: StreamEnd<'_>,
 ) -> Result<RunResults, String> {
     let path = folder.file(run_folder::SAMPLES);
     let at = |error: RecordingError| format!("{}: {error}", path.display());
     let file = File::open(&path).map_err(|error| at(error.into()))?;
     let reader = RecordingReader::new(BufReader::new(file)).map_err(at)?;
-    let mut analysis = RunAnalysis::new(artwork, Clock::Real, reader.period()).with_fastest(speed);
+    let analysis = RunAnalysis::new(artwork, Clock::Real, reader.period());
+    let mut analysis = analysis.with_fastest(speed).with_machine(machine);
     for record in reader {
         match record {
             Ok(record) => analysis.push(&record),

@@ -14,4 +14,5 @@ pub mod run_folder;
 pub mod service;
 pub mod stage;
 pub mod summary;
+pub mod tool;
 pub mod trace;

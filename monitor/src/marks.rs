@@ -36,6 +36,8 @@ use tool_path::{Interval, LitSpan, Moment, ToolPath};
 pub enum Source {
     /// The simulated plant's own tool position, or a sensor at the tool.
     Plant,
+    /// The motors' encoders or counted pulses, by way of the mechanism.
+    Encoders,
 }
 
 /// What was marked, compared with the job's geometry. Lengths in m, speeds in m/s.

@@ -3,10 +3,12 @@
 
 use crate::conclusion::LIGHT_LAG;
 use crate::latency::HopHistograms;
-use crate::marks::{MarkEvaluation, MarkEvaluator, StreamEnd, Unevaluated};
+use crate::marks::{MarkEvaluation, MarkEvaluator, Source, StreamEnd, Unevaluated};
 use crate::recording::CycleRecord;
 use crate::recording::continuity::{Continuity, Gap, Stamp, Succession};
+use crate::tool::ToolFinder;
 use crate::trace::Trace;
+use machine::Machine;
 use messages::ControllerReport;
 use messages::artwork::Artwork;
 use messages::time::Period;
@@ -24,6 +26,9 @@ pub enum Clock {
 #[derive(Debug)]
 pub struct RunAnalysis<'a> {
     clock: Clock,
+    finder: Option<ToolFinder>,
+    /// How the tool was known that the marks are judged by.
+    source: Source,
     evaluator: MarkEvaluator<'a>,
     histograms: HopHistograms,
     trace: Trace,
@@ -51,6 +56,8 @@ impl<'a> RunAnalysis<'a> {
     pub fn new(artwork: &'a Artwork, clock: Clock, period: Period) -> Self {
         Self {
             clock,
+            finder: None,
+            source: Source::Plant,
             evaluator: MarkEvaluator::new(artwork, period),
             histograms: HopHistograms::new(),
             trace: Trace::new(clock == Clock::Real, period),
@@ -66,8 +73,19 @@ impl<'a> RunAnalysis<'a> {
         Self { evaluator: self.evaluator.with_fastest(speed), ..self }
     }
 
+    /// The same, of `machine`: where drives does not see the tool, it is found by the motors.
+    #[must_use]
+    pub fn with_machine(self, machine: &Machine) -> Self {
+        Self { finder: Some(ToolFinder::new(machine)), ..self }
+    }
+
     /// Takes the next record.
     pub fn push(&mut self, record: &CycleRecord) {
+        let found = self.finder.as_mut().and_then(|finder| finder.find(record));
+        if found.is_some() {
+            self.source = Source::Encoders;
+        }
+        let record = found.as_ref().unwrap_or(record);
         let stamp = Stamp::of(&record.feedback);
         let succession = |newest| Succession::between(newest, stamp);
         self.continuity.push(self.newest.map_or(Succession::Next, succession));
@@ -86,8 +104,12 @@ impl<'a> RunAnalysis<'a> {
         if let StreamEnd::Reported(report) = end {
             self.count_ends(report);
         }
+        let mut marks = self.evaluator.finish(end);
+        if let Ok(evaluation) = &mut marks {
+            evaluation.marks.source = self.source;
+        }
         RunResults {
-            marks: self.evaluator.finish(end),
+            marks,
             histograms: self.histograms,
             trace: self.trace,
             continuity: self.continuity,

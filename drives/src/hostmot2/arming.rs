@@ -48,6 +48,9 @@ pub struct Pins {
     outputs: Vec<u32>,
     /// Those of them that are low for light.
     gate: Vec<u32>,
+    /// Outputs of the port itself, and their levels.
+    own: Vec<u32>,
+    levels: Vec<u32>,
 }
 
 impl Pins {
@@ -63,31 +66,76 @@ impl Pins {
             return Err(BoardError::Inconsistent { board: board.name.clone(), what });
         }
         let none = vec![0; ports as usize];
-        Ok(Self { module, width: board.port_width, ports, outputs: none.clone(), gate: none })
+        let (outputs, gate, own) = (none.clone(), none.clone(), none.clone());
+        Ok(Self { module, width: board.port_width, ports, outputs, gate, own, levels: none })
     }
 
     /// Makes `pin` an output of its module.
     pub fn output(&mut self, pin: u32) {
-        if let Some(word) = self.outputs.get_mut((pin / self.width) as usize) {
-            *word |= 1 << (pin % self.width);
+        let (port, bit) = self.place(pin);
+        if let Some(word) = self.outputs.get_mut(port) {
+            *word |= bit;
         }
     }
 
     /// Makes `pin` an output of its module that pulls its line low for light, and lets it go for darkness.
     pub fn gate(&mut self, pin: u32) {
         self.output(pin);
-        if let Some(word) = self.gate.get_mut((pin / self.width) as usize) {
-            *word |= 1 << (pin % self.width);
+        let (port, bit) = self.place(pin);
+        if let Some(word) = self.gate.get_mut(port) {
+            *word |= bit;
         }
+    }
+
+    /// Makes `pin` an output of the port, which starts at this level; whether it is there, and nobody's output.
+    pub fn own(&mut self, pin: u32, high: bool) -> bool {
+        let is_free = self.is_input(pin);
+        let (port, bit) = self.place(pin);
+        if is_free && let Some(word) = self.own.get_mut(port) {
+            *word |= bit;
+        }
+        self.set(pin, high);
+        is_free
+    }
+
+    /// Whether `pin` is there, and nobody's output.
+    pub fn is_input(&self, pin: u32) -> bool {
+        let (port, bit) = self.place(pin);
+        let free = |words: &[u32]| words.get(port).is_some_and(|word| word & bit == 0);
+        free(&self.outputs) && free(&self.own)
+    }
+
+    /// The level of an output of the port.
+    pub fn set(&mut self, pin: u32, high: bool) {
+        let (port, bit) = self.place(pin);
+        if let Some(word) = self.levels.get_mut(port) {
+            *word = if high { *word | bit } else { *word & !bit };
+        }
+    }
+
+    /// The connector of `pin`, and its bit there.
+    fn place(&self, pin: u32) -> (usize, u32) {
+        ((pin / self.width()) as usize, 1 << (pin % self.width()))
     }
 
     /// Sets all pins up; the direction comes last, so that none is driven by what it is not meant for.
     pub fn arm(&self, request: &mut Request) {
+        self.write(request);
         for (port, (outputs, gate)) in (0..).zip(self.outputs.iter().zip(&self.gate)) {
+            let own = self.own.get(port as usize).copied().unwrap_or(0);
             request.write(self.module.address(pins::INVERT, port), *gate);
             request.write(self.module.address(pins::OPEN_DRAIN, port), *gate);
             request.write(self.module.address(pins::SOURCE, port), *outputs);
-            request.write(self.module.address(pins::DIRECTION, port), *outputs);
+            request.write(self.module.address(pins::DIRECTION, port), outputs | own);
+        }
+    }
+
+    /// Writes the levels of the port's own outputs.
+    pub fn write(&self, request: &mut Request) {
+        for (port, (own, levels)) in (0..).zip(self.own.iter().zip(&self.levels)) {
+            if *own != 0 {
+                request.write(self.module.address(pins::DATA, port), *levels);
+            }
         }
     }
 

@@ -23,6 +23,11 @@ impl<'a> Asking<'a> {
         Self { link, number: 0 }
     }
 
+    /// The time by the clock of the link.
+    pub fn now(&self) -> Nanoseconds {
+        self.link.now()
+    }
+
     /// Its name.
     ///
     /// # Errors

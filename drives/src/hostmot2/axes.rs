@@ -39,7 +39,7 @@ pub struct Drive {
     position: f64,
     /// The speed between the newest two replies [rad/s].
     speed: f64,
-    /// What the newest reply says and nothing has checked: the place and the encoder.
+    /// What the newest reply says and nothing has checked: the place, and the encoder or a mirror's mode.
     words: [u32; 2],
 }
 
@@ -183,6 +183,14 @@ impl Drive {
         }
     }
 
+    /// A cycle goes by in which it is told nothing: it goes on as it did.
+    pub fn pass(&mut self) {
+        self.path.coast();
+        if let DriveKind::Steps { steps, .. } = &mut self.kind {
+            steps.pass();
+        }
+    }
+
     /// Asks where it is.
     pub fn ask(&self, request: &mut Request) {
         match &self.kind {
@@ -197,7 +205,8 @@ impl Drive {
     pub fn read(&mut self, reply: &mut Reply<'_>, elapsed: f64) -> bool {
         let asked = !matches!(self.kind, DriveKind::Bridge { .. });
         let place = if asked { reply.word() } else { 0 };
-        let count = if self.counter.is_some() { reply.word() } else { 0 };
+        let mirror = matches!(self.kind, DriveKind::Mirror(_));
+        let count = if self.counter.is_some() || mirror { reply.word() } else { 0 };
         self.words = [place, count];
         let steps = match &self.kind {
             DriveKind::Steps { steps, .. } => steps.moved(place, elapsed).is_some(),
@@ -221,7 +230,7 @@ impl Drive {
                     (steps.count(), self.origin + self.resolution * steps.steps());
             }
             DriveKind::Mirror(mirror) => {
-                mirror.take(place);
+                mirror.take([place, count]);
                 self.position = mirror.angle();
                 self.counts = ((self.position - self.origin) / self.resolution).round() as i64;
             }
@@ -237,6 +246,18 @@ impl Drive {
         self.speed = (self.position - before) / elapsed;
         if let DriveKind::Bridge { winding, voltage, .. } = &mut self.kind {
             winding.pass(*voltage, self.speed);
+        }
+    }
+
+    /// Whether its module has said that it cannot follow.
+    pub fn is_overflown(&self) -> bool {
+        matches!(&self.kind, DriveKind::Mirror(mirror) if mirror.is_overflown())
+    }
+
+    /// Forgets what its module has said.
+    pub fn reset(&self, request: &mut Request) {
+        if let DriveKind::Mirror(mirror) = &self.kind {
+            mirror.reset(request);
         }
     }
 

@@ -18,7 +18,9 @@ pub struct Config {
     /// What each actuator of the machine is on, in their order, and how it is later than a deadline [ns].
     pub actuators: Vec<(Connection, Nanoseconds)>,
     /// The pin of each input of the machine, in their order.
-    pub inputs: Vec<Option<u32>>,
+    pub inputs: Vec<u32>,
+    /// The pin of each output.
+    pub outputs: Vec<u32>,
 }
 
 /// What an actuator is on.

@@ -19,6 +19,8 @@ const CONTROL: u32 = 1 | 1 << 3;
 const LONG: u32 = 3 << 10;
 /// The overflows of both mirrors, cleared by a write.
 const OVERFLOWS: u32 = 0xf << 6;
+/// Those of X; Y's stand a bit higher.
+const OWN_OVERFLOWS: u32 = 0b0101 << 6;
 /// What is written waits for this timer of the board's clock.
 const TIMER: u32 = 3;
 
@@ -36,13 +38,15 @@ pub struct Mirror {
     scale: f64,
     long: bool,
     angle: f64,
+    /// Whether a place or a speed was beyond the scale.
+    overflown: bool,
 }
 
 impl Mirror {
     /// The mirror `axis` of the interface `unit` of `module`, whose full scale is `scale` [rad], with frames of
     /// 18 bits where they are `long`.
     pub fn new(module: Module, unit: u32, axis: u32, scale: f64, long: bool) -> Self {
-        Self { module, unit, axis: u16::from(axis == 1), scale, long, angle: 0.0 }
+        Self { module, unit, axis: u16::from(axis == 1), scale, long, angle: 0.0, overflown: false }
     }
 
     /// Sets the interface up, at the middle of its scale; where it `waits`, what is written acts at a timer of
@@ -77,14 +81,27 @@ impl Mirror {
         angle.abs() < self.scale
     }
 
-    /// Reads the position.
+    /// Reads the position, and the mode with its overflows.
     pub fn ask(&self, request: &mut Request) {
         request.read(self.address(register::POSITION), 1);
+        request.read(self.module.address(register::MODE, self.unit), 1);
     }
 
-    /// Its position reads `word`.
-    pub fn take(&mut self, word: u32) {
-        self.angle = f64::from(word as i32) / FULL * self.scale;
+    /// Its position and its mode read these words.
+    pub fn take(&mut self, [position, mode]: [u32; 2]) {
+        self.angle = f64::from(position as i32) / FULL * self.scale;
+        self.overflown = mode & OWN_OVERFLOWS << self.axis != 0;
+    }
+
+    /// Whether the interface says that it was told a place beyond its scale.
+    pub fn is_overflown(&self) -> bool {
+        self.overflown
+    }
+
+    /// Forgets the overflows.
+    pub fn reset(&self, request: &mut Request) {
+        let mode = if self.long { CONTROL | LONG } else { CONTROL };
+        request.write(self.module.address(register::MODE, self.unit), mode | OVERFLOWS);
     }
 
     /// The angle that the head was told when the newest request arrived [rad].

@@ -30,6 +30,9 @@ pub enum Space {
 /// Where the number of a request is written and read, in [`Space::Timer`]: 32 bits.
 pub const NUMBER: u16 = 0x10;
 
+/// Where what a session is known by stands in the same space: 32 bits, 0 after power-on.
+pub const SESSION: u16 = 0x14;
+
 const WRITE: u16 = 1 << 15;
 const ADDRESS: u16 = 1 << 14;
 const WORDS: u16 = 1 << 8;
@@ -90,14 +93,28 @@ impl Request {
 
     /// Writes the number by which the reply is known, which is read back by [`Self::read_number`].
     pub fn write_number(&mut self, number: u32) {
-        let space = (Space::Timer as u16) << 10;
-        self.command(WRITE | ADDRESS | space | WORDS | INCREMENT | 2, NUMBER);
-        self.put(&number.to_le_bytes());
+        self.scratch(NUMBER, number);
     }
 
     /// Reads the number back.
     pub fn read_number(&mut self) {
         self.read_words(Space::Timer, NUMBER, 2);
+    }
+
+    /// Writes what the session is known by.
+    pub fn write_session(&mut self, session: u32) {
+        self.scratch(SESSION, session);
+    }
+
+    /// Reads it back.
+    pub fn read_session(&mut self) {
+        self.read_words(Space::Timer, SESSION, 2);
+    }
+
+    fn scratch(&mut self, address: u16, value: u32) {
+        let space = (Space::Timer as u16) << 10;
+        self.command(WRITE | ADDRESS | space | WORDS | INCREMENT | 2, address);
+        self.put(&value.to_le_bytes());
     }
 
     fn command(&mut self, word: u16, address: u16) {

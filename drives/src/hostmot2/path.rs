@@ -25,6 +25,12 @@ impl Path {
         (self.from, self.to) = ([angle, 0.0], [angle, 0.0]);
     }
 
+    /// The cycle after this one, at the speed that it ends with.
+    pub fn coast(&mut self) {
+        let [angle, speed] = self.to;
+        (self.from, self.to) = (self.to, [angle + speed * self.period, speed]);
+    }
+
     /// The cycle after this one, under `actuation` with `target` [rad, rad/s] and a braking by `deceleration`
     /// [rad/s²].
     pub fn engage(&mut self, actuation: &Actuation, target: [f64; 2], deceleration: f64) {

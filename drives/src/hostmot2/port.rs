@@ -2,7 +2,7 @@
 
 use std::net::{SocketAddr, ToSocketAddrs};
 
-use machine::drives::{Hostmot2, Hostmot2Actuator};
+use machine::drives::{Hostmot2, Hostmot2Actuator, Xy2Frame};
 use machine::{ActuatorMode, DrivesKind, Machine};
 use messages::{LinkCounters, Nanoseconds};
 
@@ -10,6 +10,7 @@ use super::arming::{BoardClock, Pins, Watchdog};
 use super::asking::Asking;
 use super::axes::Drive;
 use super::config::{Config, Connection};
+use super::digital::Digital;
 use super::gate::Gate;
 use super::idrom::{Board, BoardError, Kind};
 use super::lbp16::{self, Reply, Request};
@@ -104,7 +105,7 @@ impl Hostmot2Port {
     /// The port that the machine file's [drives.hostmot2] asks for, not open yet.
     ///
     /// # Errors
-    /// As [`Self::new`]; a scan head, which the machine file cannot describe yet.
+    /// As [`Self::new`].
     pub fn of(machine: &Machine) -> Result<Self, PortError> {
         let DrivesKind::Hostmot2(table) = &machine.drives.kind else {
             return Err(PortError::Unsupported {
@@ -112,7 +113,7 @@ impl Hostmot2Port {
                 instead: "add it, with the board's address".to_owned(),
             });
         };
-        Self::new(machine, config(machine, table)?).map_err(OpenError::into)
+        Self::new(machine, config(machine, table)).map_err(OpenError::into)
     }
 
     /// Finds the board, holds it to what is connected, and arms its watchdog, before the clock starts.
@@ -232,6 +233,8 @@ impl Hostmot2Port {
             board.module(Kind::Pwm, power)?;
             board.outputs(Kind::Pwm, power).for_each(|pin| pins.output(pin));
         }
+        let wired = [&self.config.inputs, &self.config.outputs].map(Vec::as_slice);
+        let digital = Digital::new(&board, &mut pins, &self.machine.operating, wired)?;
         let units: Vec<u32> = drives.iter().filter_map(Drive::pwm).chain(power).collect();
         let pwms = match units.first() {
             Some(first) => Some(Pwms::new(board.module(Kind::Pwm, *first)?, units)),
@@ -250,7 +253,10 @@ impl Hostmot2Port {
         let mirrors = mirrors.filter(|(on, _)| matches!(on, Connection::Xy2mod { .. }));
         let mirrors: Vec<Nanoseconds> = mirrors.map(|(_, latency)| *latency).collect();
         let waits = !mirrors.is_empty();
+        // Any number but that of another session: 0 is what a board has after power-on.
+        let name = asking.now().0 as u32 | 1;
         asking.ask(|request| {
+            request.write_session(name);
             clock.arm(request);
             gate.iter().for_each(|gate: &Gate| gate.dark(request));
             pwms.iter().for_each(|pwms| pwms.arm(request));
@@ -279,14 +285,11 @@ impl Hostmot2Port {
         }
         asking.ask(|request| watchdog.arm(request))?;
 
-        let inputs = self.machine.operating.inputs.iter().enumerate();
-        let inputs = inputs.map(|(index, input)| {
-            Some((self.config.inputs.get(index).copied().flatten()?, input.is_active_low))
-        });
         let mirror = mirrors.into_iter().max().unwrap_or_default();
         Ok(Session::new(Parts {
             fired: Fired::new(laser, self.config.gate_latency, realtime.period),
-            inputs: inputs.collect(),
+            digital,
+            name,
             gate_latency: self.config.gate_latency.seconds(),
             mirror_latency: mirror.seconds(),
             period: realtime.period.time(),
@@ -391,34 +394,26 @@ fn profile(config: &Config) -> Profile {
 }
 
 /// What `machine` says in its `table`.
-fn config(machine: &Machine, table: &Hostmot2) -> Result<Config, PortError> {
-    let mut actuators = Vec::with_capacity(table.actuators.len());
-    for (on, actuator) in table.actuators.iter().zip(&machine.actuators) {
-        let on = match *on {
-            Hostmot2Actuator::Stepgen { stepgen, encoder } => {
-                Connection::Stepgen { stepgen, encoder }
-            }
-            Hostmot2Actuator::Pwm { pwm, encoder } => Connection::Pwm { pwm, encoder },
-            Hostmot2Actuator::Xy2mod { .. } => {
-                return Err(PortError::Unsupported {
-                    what: format!("`{}` is on a scan head", actuator.name),
-                    instead: "the angle of its full scale cannot be written yet: use a stepgen"
-                        .to_owned(),
-                });
-            }
-        };
-        actuators.push((on, actuator.latency));
-    }
-    Ok(Config {
+fn config(machine: &Machine, table: &Hostmot2) -> Config {
+    let connection = |on: &Hostmot2Actuator| match *on {
+        Hostmot2Actuator::Stepgen { stepgen, encoder } => Connection::Stepgen { stepgen, encoder },
+        Hostmot2Actuator::Pwm { pwm, encoder } => Connection::Pwm { pwm, encoder },
+        Hostmot2Actuator::Xy2mod { xy2mod, axis, full_scale, frame } => {
+            Connection::Xy2mod { xy2mod, channel: axis, full_scale, long: frame == Xy2Frame::Long }
+        }
+    };
+    let actuators = table.actuators.iter().zip(&machine.actuators);
+    Config {
         address: table.address.clone(),
         watchdog: table.watchdog,
         // Four, two for each second cycle, from the one that is named.
         gate: table.gate.iter().flat_map(|first| *first..first + 4).collect(),
         gate_latency: machine.drives.gate_latency,
         power: table.power,
-        actuators,
-        inputs: Vec::new(),
-    })
+        actuators: actuators.map(|(on, it)| (connection(on), it.latency)).collect(),
+        inputs: table.inputs.clone(),
+        outputs: table.outputs.clone(),
+    }
 }
 
 /// The address of the board that `text` names, with the port of LBP16 where it has none.

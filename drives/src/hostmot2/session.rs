@@ -2,8 +2,9 @@
 
 use messages::{CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, Nanoseconds};
 
-use super::arming::{BoardClock, MOST_PORTS, Pins, Watchdog};
+use super::arming::{BoardClock, Pins, Watchdog};
 use super::axes::{Drive, Refusal};
+use super::digital::Digital;
 use super::gate::{Gate, LEAD, Light};
 use super::grid::Grid;
 use super::lbp16::{LONGEST, Reply, Request};
@@ -36,6 +37,22 @@ pub enum Trouble {
     Bitten,
     /// It does not answer.
     Silent,
+    /// It was reset, or is another one than before.
+    Reset,
+    /// A mirror was told a place beyond the full scale.
+    Overflow,
+}
+
+impl Trouble {
+    /// The fault word by which it travels; its text is that of [`machine::drives::fault_text`].
+    pub fn word(self) -> u32 {
+        match self {
+            Self::Bitten => 1,
+            Self::Silent => 2,
+            Self::Reset => 3,
+            Self::Overflow => 4,
+        }
+    }
 }
 
 /// What of the period a reply is waited for: the controller needs the rest.
@@ -71,8 +88,10 @@ pub struct Parts {
     pub mirror_latency: f64,
     /// How long a cycle is.
     pub period: Nanoseconds,
-    /// The pin of each input, in the order of the machine's, with whether it is active low.
-    pub inputs: Vec<Option<(u32, bool)>>,
+    /// The machine's inputs and outputs.
+    pub digital: Digital,
+    /// What the board knows this session by.
+    pub name: u32,
     /// What tells the light.
     pub fired: Fired,
 }
@@ -110,8 +129,10 @@ pub struct Session {
     reset: bool,
     fault: Fault,
     trouble: Option<Trouble>,
-    /// Replies in a row that say that the watchdog has bitten, and those that were not believed.
+    /// Replies in a row that say that the watchdog has bitten, those of a board that does not know the session,
+    /// and those that were not believed.
     bites: u32,
+    strange: u32,
     doubts: u32,
     /// The power of the newest cycle with light.
     power: f64,
@@ -144,6 +165,7 @@ impl Session {
             fault: Fault::default(),
             trouble: None,
             bites: 0,
+            strange: 0,
             doubts: 0,
             power: 0.0,
             measurement,
@@ -164,6 +186,7 @@ impl Session {
     /// A deadline has passed without a request: dark, and the axes go on.
     pub fn pass(&mut self) {
         self.begin();
+        self.parts.drives.iter_mut().for_each(Drive::pass);
         self.laser = LaserCycle::OFF;
         self.proof = Proof::None;
     }
@@ -286,11 +309,17 @@ impl Session {
         request.write_number(self.number);
         // First, since it tells when the request arrived.
         clock.ask(request);
+        request.read_session();
         if self.reset && actuation.mode == CommandMode::Disabled {
             watchdog.arm(request);
             gate.iter().for_each(|gate| gate.dark(request));
             pins.arm(request);
         }
+        if self.trouble == Some(Trouble::Overflow) {
+            drives.iter().for_each(|drive| drive.reset(request));
+        }
+        parts.digital.set(pins, actuation);
+        pins.write(request);
         watchdog.feed(request);
 
         let light = Light::of(&actuation.laser, parts.period.0 as f64);
@@ -386,6 +415,16 @@ impl Session {
     /// The reply to the newest request.
     fn take_new(&mut self, mut reply: Reply<'_>) -> bool {
         let phase = f64::from(reply.word()) / PHASES;
+        // One damaged reply is no other board.
+        self.strange =
+            if reply.word() == self.parts.name { 0 } else { self.strange.saturating_add(1) };
+        if self.strange > 0 {
+            self.counters.corrupted += 1;
+            if self.strange > 1 {
+                self.stop(Trouble::Reset);
+            }
+            return false;
+        }
         let status = reply.word();
         let elapsed = f64::from(self.elapsed.max(1)) * self.parts.period.seconds();
         let mut readable = true;
@@ -418,25 +457,17 @@ impl Session {
         } else if self.mode == CommandMode::Disabled {
             self.reset = false;
         }
+        if self.parts.drives.iter().any(Drive::is_overflown) {
+            self.stop(Trouble::Overflow);
+        }
         if self.grid.is_settled() && late < self.parts.gate_latency - LEAD * 1e-9 && !bitten {
             self.proof = Proof::InTime;
         }
         let levels = core::array::from_fn(|port| {
             if port < self.parts.pins.ports() as usize { reply.word() } else { 0 }
         });
-        self.measurement.inputs = self.inputs(levels);
+        self.measurement.inputs = self.parts.digital.active(&levels, self.parts.pins.width());
         true
-    }
-
-    /// The machine's inputs by the `levels` of the connectors, 1 where they are active.
-    fn inputs(&self, levels: [u32; MOST_PORTS]) -> u64 {
-        let width = self.parts.pins.width();
-        let active = |(pin, low): (u32, bool)| {
-            let word = levels.get((pin / width) as usize).copied().unwrap_or(0);
-            (word >> (pin % width) & 1 != 0) != low
-        };
-        let inputs = self.parts.inputs.iter().take(64).enumerate();
-        inputs.fold(0, |mask, (bit, pin)| mask | u64::from(pin.is_some_and(active)) << bit)
     }
 
     /// Why the board has stopped the machine, if that was what did first.
@@ -447,7 +478,8 @@ impl Session {
     /// Stops the machine unless it has been stopped before.
     fn stop(&mut self, trouble: Trouble) {
         if !self.fault.is_some() {
-            self.fault = Fault::new(FaultCode::DriveFault);
+            let fault = Fault::new(FaultCode::DriveFault);
+            self.fault = fault.with(FaultQuantity::DriveWord, f64::from(trouble.word()));
             self.trouble = Some(trouble);
         }
     }

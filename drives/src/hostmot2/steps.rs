@@ -104,6 +104,11 @@ impl Steps {
         self.expected += self.rate * self.period;
     }
 
+    /// A cycle goes by without a request: the rate goes on.
+    pub fn pass(&mut self) {
+        self.expected += self.rate * self.period;
+    }
+
     /// Reads the accumulator.
     pub fn ask(&self, request: &mut Request) {
         request.read(self.module.address(register::ACCUMULATOR, self.unit), 1);

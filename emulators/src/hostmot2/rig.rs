@@ -1,10 +1,10 @@
 //! The machine that the board drives: the motors of the simulated plant, by its connections.
 //!
-//! The plant moves in cycles of its own. At the start of each it is told what the board puts out then: where
-//! the steps will be at its end if their rate stays, the angle of the mirrors, the voltage. So it is up to
-//! one cycle late in what changes inside it. Until a motor has power its cycles are put so that each starts
-//! just after a datagram has arrived, which leaves little of such changes. An encoder stands where its motor is, carried on from the start
-//! of the cycle by the speed there.
+//! The plant moves in cycles of its own, of 125 µs. At the start of each it is told what the board puts out then:
+//! where the steps will be at its end if their rate stays, and the mirrors by their velocity and acceleration, the
+//! voltage. So it is up to one cycle late in what changes inside it. Until a motor has power its cycles are put so
+//! that one starts just after a datagram has arrived. An encoder stands where its motor is, carried on from the
+//! start of the cycle by the speed there.
 //!
 //! A stepper driver has power once its steps are connected, and keeps it. An amplifier has it while its
 //! enable is low: without it brakes the motor to rest, and lets it go.
@@ -22,8 +22,11 @@ use messages::time::Period;
 /// Below this a motor counts as standing [rad/s].
 const STANDING: f64 = 0.1;
 
-/// From the arrival of a datagram to the start of a cycle of the plant: more than arrivals vary by.
-const MARGIN: Nanoseconds = Nanoseconds(100_000);
+/// From the arrival of a datagram to the start of a cycle of the plant: more than arrivals usually vary by.
+const MARGIN: Nanoseconds = Nanoseconds(20_000);
+
+/// How long a cycle of the plant is.
+const PERIOD: Period = Period::SHORTEST;
 
 /// The plant, its mechanism forgotten.
 trait Motors: Send {
@@ -50,8 +53,7 @@ impl MechanismVisitor for Build<'_> {
     type Output = Result<Box<dyn Motors>, PlantError>;
 
     fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> Self::Output {
-        let Self(Machine { axes, actuators, laser, home_joints, realtime, .. }, options) = self;
-        let period = realtime.period;
+        let Self(Machine { axes, actuators, laser, home_joints, .. }, options) = self;
         if actuators.len() == axes.len() {
             let plant = Plant::<N, M>::new(
                 mechanism,
@@ -59,7 +61,7 @@ impl MechanismVisitor for Build<'_> {
                 actuators,
                 laser,
                 home_joints,
-                period,
+                PERIOD,
                 options,
             )?;
             return Ok(Box::new(plant));
@@ -70,7 +72,7 @@ impl MechanismVisitor for Build<'_> {
             actuators,
             laser,
             home_joints,
-            period,
+            PERIOD,
             options,
         )?;
         Ok(Box::new(plant))
@@ -115,8 +117,6 @@ struct Axis {
 pub struct Rig {
     motors: Box<dyn Motors>,
     axes: Vec<Axis>,
-    /// How long its cycle is.
-    period: Period,
     /// When its cycle at hand started.
     started: Nanoseconds,
     measurement: Measurement,
@@ -145,7 +145,10 @@ impl Rig {
         if connected != actuators {
             return Err(RigError::Count { connected, actuators });
         }
-        let mut motors = machine.mechanism.visit(Build(machine, PlantOptions::default()))?;
+        // How late the motors are is the board's doing: those behind it follow at once.
+        let mut direct = machine.clone();
+        direct.actuators.iter_mut().for_each(|actuator| actuator.latency = Nanoseconds(0));
+        let mut motors = machine.mechanism.visit(Build(&direct, PlantOptions::default()))?;
         let mut measurement = Measurement::default();
         motors.exchange(&Actuation::DISABLED, &mut measurement);
         let axis = |(row, (connection, actuator)): (usize, (&Connection, &Actuator))| Axis {
@@ -157,19 +160,19 @@ impl Rig {
             powered: false,
         };
         let axes = wiring.actuators.iter().zip(&machine.actuators).enumerate().map(axis).collect();
-        let (period, started) = (machine.realtime.period, Nanoseconds(0));
-        Ok(Self { motors, axes, period, started, measurement, fault: Fault::default() })
+        let started = Nanoseconds(0);
+        Ok(Self { motors, axes, started, measurement, fault: Fault::default() })
     }
 
     /// When its next cycle starts.
     pub fn next(&self) -> Nanoseconds {
-        self.started + self.period.time()
+        self.started + PERIOD.time()
     }
 
     /// A datagram has arrived at `now`. Until a motor has power, the next cycle starts a little after it.
     pub fn align(&mut self, now: Nanoseconds) {
         if !self.axes.iter().any(|axis| axis.powered) {
-            self.started = now + MARGIN - self.period.time();
+            self.started = now + MARGIN - PERIOD.time();
         }
     }
 
@@ -209,7 +212,7 @@ impl Rig {
     /// What the motors shall do in the cycle that starts.
     fn actuation(&mut self, modules: &Modules) -> Actuation {
         let mut actuation = Actuation { freshness: Freshness::Fresh, ..Actuation::DISABLED };
-        let duration = self.period.seconds();
+        let duration = PERIOD.seconds();
         let (mut powered, mut released) = (false, false);
         for (row, axis) in self.axes.iter_mut().enumerate() {
             match axis.connection.drive {
@@ -225,10 +228,9 @@ impl Rig {
                     let connected = lines.iter().all(|line| pin_connected(modules, *line));
                     axis.powered |= connected;
                     if connected {
-                        let speed = modules.mirrors.speed(xy2mod, side) * full_scale;
-                        let angle = modules.mirrors.position(xy2mod, side) * full_scale;
-                        set(&mut actuation.position, row, angle + speed * duration);
-                        set(&mut actuation.velocity, row, speed);
+                        let [position, speed] = modules.mirrors.after(xy2mod, side, duration);
+                        set(&mut actuation.position, row, position * full_scale);
+                        set(&mut actuation.velocity, row, speed * full_scale);
                     } else {
                         set(&mut actuation.position, row, self.motors.rotor(row)[0]);
                     }

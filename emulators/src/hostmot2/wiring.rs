@@ -1,7 +1,7 @@
 //! What of the machine is connected to which module of the board.
 
 use machine::drives::{DrivesKind, Hostmot2Actuator};
-use machine::{Actuator, Axis, Machine};
+use machine::{Actuator, Machine};
 
 use super::layout::{ENCODERS, Function, PWMGENS, STEPGENS, pin_of};
 
@@ -58,7 +58,7 @@ impl Wiring {
         let DrivesKind::Hostmot2(hostmot2) = &machine.drives.kind else {
             return Self::usual(machine);
         };
-        let actuators = hostmot2.actuators.iter().zip(machine.drives());
+        let actuators = hostmot2.actuators.iter().zip(&machine.actuators);
         Self {
             actuators: actuators.map(|(own, driven)| connection(own, driven)).collect(),
             gate: gate_pins(),
@@ -114,19 +114,16 @@ impl Wiring {
     }
 }
 
-/// What `own` says of an actuator and its axis.
-fn connection(own: &Hostmot2Actuator, (actuator, axis): (&Actuator, &Axis)) -> Connection {
+/// What `own` says of an actuator.
+fn connection(own: &Hostmot2Actuator, actuator: &Actuator) -> Connection {
     let index = |number: u32| number as usize;
     let (drive, encoder) = match *own {
         Hostmot2Actuator::Stepgen { stepgen, encoder } => {
             (Drive::Stepgen { stepgen: index(stepgen) }, encoder)
         }
         Hostmot2Actuator::Pwm { pwm, encoder } => (Drive::Pwm { pwm: index(pwm) }, Some(encoder)),
-        Hostmot2Actuator::Xy2mod { xy2mod, axis: side, .. } => {
-            // The whole range of the axis is that of the head.
-            let [lower, upper] = axis.limits.position;
-            let full_scale = lower.abs().max(upper.abs()) / actuator.ratio.abs();
-            (Drive::Mirror { xy2mod: index(xy2mod), axis: index(side), full_scale }, None)
+        Hostmot2Actuator::Xy2mod { xy2mod, axis, full_scale, .. } => {
+            (Drive::Mirror { xy2mod: index(xy2mod), axis: index(axis), full_scale }, None)
         }
     };
     Connection { drive, encoder: encoder.map(index), counts: actuator.encoder.counts }

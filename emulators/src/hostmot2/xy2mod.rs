@@ -177,17 +177,26 @@ impl Xy2mods {
 
     /// What the head is told, −1..1 of its full scale, of an `axis`, 0 or 1.
     pub fn position(&self, instance: usize, axis: usize) -> f64 {
-        let Some(head) = self.heads.get(instance) else { return 0.0 };
-        let Some(mirror) = head.mirrors.get(axis) else { return 0.0 };
+        let [position, _] = self.after(instance, axis, 0.0);
+        position
+    }
+
+    /// What it will be told `time` [s] from now, −1..1 of its full scale, and how fast that goes on then [1/s],
+    /// unless something is written before.
+    pub fn after(&self, instance: usize, axis: usize, time: f64) -> [f64; 2] {
+        let Some(head) = self.heads.get(instance) else { return [0.0; 2] };
+        let Some(mut mirror) = head.mirrors.get(axis).copied() else { return [0.0; 2] };
+        mirror.advance(time);
         let bits = if head.mode & mode::LONG << axis == 0 { 16 } else { 18 };
         let step = f64::from(1_u32 << (32 - bits));
-        (mirror.position / step).floor() * step / FULL
+        let speed = mirror.velocity * f64::from(Clock::Low.hertz()) / 256.0 / FULL;
+        [(mirror.position / step).floor() * step / FULL, speed]
     }
 
     /// How fast it goes on, of its full scale [1/s].
     pub fn speed(&self, instance: usize, axis: usize) -> f64 {
-        let mirror = self.heads.get(instance).and_then(|head| head.mirrors.get(axis));
-        mirror.map_or(0.0, |mirror| mirror.velocity) * f64::from(Clock::Low.hertz()) / 256.0 / FULL
+        let [_, speed] = self.after(instance, axis, 0.0);
+        speed
     }
 }
 

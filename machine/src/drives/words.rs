@@ -17,7 +17,8 @@ fn hostmot2(word: u32) -> Option<&'static str> {
     Some(match word {
         1 => "the card's watchdog has bitten",
         2 => "the card does not answer",
-        3 => "the card was reset, or is another one than before",
+        3 => "the card was reset, or is another one than before: start again, and home",
+        4 => "the scan head was told a place beyond its full scale",
         _ => return None,
     })
 }

@@ -11,6 +11,7 @@ use crate::document::{
     Diagnostics, Named, NonNegative, Number, ProblemKind, Quantity, Span, Spanned, nearest,
 };
 use crate::drives::{Drives, DrivesKind};
+use crate::operating::Operating;
 use crate::quantity::Duration;
 use crate::table;
 
@@ -66,10 +67,12 @@ drives_tables! {
     ethercat: ethercat::EthercatTable, ethercat::build;
 }
 
-/// The drives of `table`; puts the latency of each actuator into `actuators`.
+/// The drives of `table`, with the pins of what `operating` has; puts the latency of each actuator into
+/// `actuators`.
 pub(super) fn build(
     table: &DrivesTable,
     actuators: &mut [Actuator],
+    operating: &Operating,
     diagnostics: &mut Diagnostics,
 ) -> Drives {
     if let [(first, first_place), (second, second_place), ..] = table.declared().as_slice() {
@@ -79,11 +82,15 @@ pub(super) fn build(
             &format!("keep either [drives.{first}] or [drives.{second}]"),
         );
     }
-    let Some(Built { kind, gate_latency, latency }) = table.build(actuators, diagnostics) else {
+    let Some(Built { mut kind, gate_latency, latency }) = table.build(actuators, diagnostics)
+    else {
         return Drives::default();
     };
     for (actuator, latency) in actuators.iter_mut().zip(latency) {
         actuator.latency = latency;
+    }
+    if let (Some(table), DrivesKind::Hostmot2(card)) = (&table.hostmot2, &mut kind) {
+        hostmot2::connect(table, card, operating, diagnostics);
     }
     Drives { kind, gate_latency }
 }
@@ -111,7 +118,18 @@ fn refuse_unknown<T>(
     actuators: &[Actuator],
     diagnostics: &mut Diagnostics,
 ) {
-    let names = || actuators.iter().map(|actuator| actuator.name.as_str());
+    let names: Vec<&str> = actuators.iter().map(|actuator| actuator.name.as_str()).collect();
+    refuse_others(tables, "actuator", &names, diagnostics);
+}
+
+/// Refuses tables whose names are none of these of a `kind` of thing.
+fn refuse_others<T>(
+    tables: Option<&Named<T>>,
+    kind: &str,
+    known: &[&str],
+    diagnostics: &mut Diagnostics,
+) {
+    let names = || known.iter().copied();
     for (Spanned { value: name, span }, _) in tables.into_iter().flat_map(|tables| &tables.entries)
     {
         if names().any(|known| known == name) {
@@ -119,12 +137,13 @@ fn refuse_unknown<T>(
         }
         let help = match nearest(name, names()) {
             Some(near) => format!("did you mean `{near}`?"),
+            None if known.is_empty() => format!("add [{kind}s.{name}]"),
             None => {
                 let list: Vec<String> = names().map(|name| format!("`{name}`")).collect();
-                format!("the machine's actuators are {}", list.join(", "))
+                format!("the machine's {kind}s are {}", list.join(", "))
             }
         };
-        let message = format!("the machine has no actuator `{name}`");
+        let message = format!("the machine has no {kind} `{name}`");
         diagnostics.refuse(ProblemKind::UnknownKey, *span, message, Some(help));
     }
 }

@@ -51,7 +51,6 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     check_z(&table, &mechanism, &mut diagnostics);
     let laser = laser(&table.laser, &mut diagnostics);
     let mut actuators: Vec<Actuator> = driven.into_iter().map(|(_, actuator)| actuator).collect();
-    let drives = drives::build(&table.drives, &mut actuators, &mut diagnostics);
     let operating = if axes.len() == joints.len() {
         let (inputs, outputs) = (table.inputs.as_ref(), table.outputs.as_ref());
         let safety = &table.safety;
@@ -60,6 +59,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     } else {
         Operating::default()
     };
+    let drives = drives::build(&table.drives, &mut actuators, &operating, &mut diagnostics);
     let PathTable { speed, rapid, acceleration, jerk, tolerance, corners, span: _ } = &table.path;
     let gcode = &table.gcode;
     let machine = Machine {

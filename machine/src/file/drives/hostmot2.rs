@@ -1,10 +1,13 @@
 //! An FPGA card with HostMot2 firmware as drives.
 
-use super::{Built, Latency, each, latencies, whole};
+use super::{Built, Latency, each, find, latencies, refuse_others, whole};
 use crate::actuator::Actuator;
-use crate::document::{Diagnostics, Named, NonNegative, Number, Positive, Quantity, Span, Spanned};
-use crate::drives::{DrivesKind, Hostmot2, Hostmot2Actuator};
-use crate::quantity::Duration;
+use crate::document::{
+    Diagnostics, Named, NonNegative, Number, Positive, ProblemKind, Quantity, Span, Spanned,
+};
+use crate::drives::{DrivesKind, Hostmot2, Hostmot2Actuator, Xy2Frame};
+use crate::operating::{InputFunction, Operating};
+use crate::quantity::{Angle, Duration};
 use crate::table;
 use messages::Nanoseconds;
 
@@ -31,6 +34,18 @@ table! {
         pub power: Option<Hostmot2PowerTable>,
         /// What drives each actuator, by the actuators' names.
         pub actuators: Named<Hostmot2ActuatorTable>,
+        /// Where the machine's inputs are, by their names.
+        pub inputs: Option<Named<Hostmot2PinTable>>,
+        /// Where its outputs are.
+        pub outputs: Option<Named<Hostmot2PinTable>>,
+    }
+}
+
+table! {
+    /// Where an input or an output is.
+    pub struct Hostmot2PinTable {
+        /// Number of the pin, from 0: those of the first connector, then those of the next.
+        pub pin: Channel,
     }
 }
 
@@ -51,7 +66,7 @@ table! {
 }
 
 table! {
-    /// What drives an actuator: `stepgen`, `pwm` with `encoder`, or `xy2mod` with `channel`.
+    /// What drives an actuator: `stepgen`, `pwm` with `encoder`, or `xy2mod` with `channel` and `full_scale`.
     pub struct Hostmot2ActuatorTable {
         /// Number of the step generator.
         pub stepgen: Option<Channel>,
@@ -61,6 +76,10 @@ table! {
         pub xy2mod: Option<Channel>,
         /// Its channel: 0 for x, 1 for y.
         pub channel: Option<Channel>,
+        /// The motor's angle at full scale of the interface, either way from the middle.
+        pub full_scale: Option<Quantity<Angle, Positive>>,
+        /// Bits of a position on the way to the scan head, 16 or 18; 16 when left out.
+        pub bits: Option<Channel>,
         /// Number of the encoder.
         pub encoder: Option<Channel>,
         /// From the deadline at which a command is sent until this motor follows it.
@@ -90,6 +109,8 @@ pub(super) fn build(
             gate,
             power,
             actuators: driven.into_iter().collect::<Option<_>>()?,
+            inputs: Vec::new(),
+            outputs: Vec::new(),
         }),
     })
 }
@@ -103,27 +124,79 @@ fn actuator(
         |number: &Option<Channel>| number.as_ref().map(|it| whole(it, LAST_CHANNEL, diagnostics));
     let encoder = channel(&table.encoder);
     let all = [&table.stepgen, &table.pwm, &table.xy2mod, &table.channel].map(&mut channel);
-    match (all, encoder) {
-        ([Some(stepgen), None, None, None], encoder) => {
+    let mirror = (&table.full_scale, channel(&table.bits));
+    let kind = match (all, encoder, mirror) {
+        ([Some(stepgen), None, None, None], encoder, (None, None)) => {
             Some(Hostmot2Actuator::Stepgen { stepgen, encoder })
         }
-        ([None, Some(pwm), None, None], Some(encoder)) => {
+        ([None, Some(pwm), None, None], Some(encoder), (None, None)) => {
             Some(Hostmot2Actuator::Pwm { pwm, encoder })
         }
-        ([None, None, Some(xy2mod), Some(axis @ 0..=1)], None) => {
-            Some(Hostmot2Actuator::Xy2mod { xy2mod, axis })
+        ([None, None, Some(xy2mod), Some(axis @ 0..=1)], None, (Some(full_scale), bits)) => {
+            let frame = match bits {
+                None | Some(16) => Some(Xy2Frame::Short),
+                Some(18) => Some(Xy2Frame::Long),
+                Some(_) => None,
+            };
+            let full_scale = full_scale.value;
+            frame.map(|frame| Hostmot2Actuator::Xy2mod { xy2mod, axis, full_scale, frame })
         }
-        _ => {
-            refuse(table.span, diagnostics);
-            None
-        }
+        _ => None,
+    };
+    if kind.is_none() {
+        diagnostics.contradict(
+            table.span,
+            "what drives the actuator is not clear".to_owned(),
+            "give `stepgen`; or `pwm` and `encoder`; or `xy2mod`, its `channel`, 0 or 1, the `full_scale`, and \
+             18 `bits` where there are",
+        );
     }
+    kind
 }
 
-fn refuse(span: Span, diagnostics: &mut Diagnostics) {
-    diagnostics.contradict(
-        span,
-        "what drives the actuator is not clear".to_owned(),
-        "give `stepgen`, or `pwm` and `encoder`, or `xy2mod` and its `channel`, 0 or 1",
-    );
+/// Puts the pins of what `operating` has into `card`; notes those of nothing, what has none, and an input that no
+/// pin can see.
+pub(super) fn connect(
+    table: &Hostmot2Table,
+    card: &mut Hostmot2,
+    operating: &Operating,
+    diagnostics: &mut Diagnostics,
+) {
+    for input in &operating.inputs {
+        if matches!(input.function, InputFunction::Index { .. }) {
+            let name = &input.name;
+            diagnostics.contradict(
+                table.span,
+                format!(
+                    "the index pulse `{name}` is shorter than a cycle, and no pin of a card sees it"
+                ),
+                "home by a `switch`, and leave the input out",
+            );
+        }
+    }
+    let inputs: Vec<&str> = operating.inputs.iter().map(|input| input.name.as_str()).collect();
+    let outputs: Vec<&str> = operating.outputs.iter().map(|output| output.name.as_str()).collect();
+    let [wired_in, wired_out] = [table.inputs.as_ref(), table.outputs.as_ref()];
+    card.inputs = pins((wired_in, "input", table.span), &inputs, diagnostics);
+    card.outputs = pins((wired_out, "output", table.span), &outputs, diagnostics);
+}
+
+/// The pin of each of `names`, as `tables`, of which there should be some at `span`, have them.
+fn pins(
+    (tables, kind, span): (Option<&Named<Hostmot2PinTable>>, &str, Span),
+    names: &[&str],
+    diagnostics: &mut Diagnostics,
+) -> Vec<u32> {
+    refuse_others(tables, kind, names, diagnostics);
+    let pin = |name: &&str| match find(tables, name) {
+        Some(table) => whole(&table.pin, LAST_CHANNEL, diagnostics),
+        None => {
+            // A switch that nobody reads would never be active.
+            let message = format!("nothing is said of the pin of the {kind} `{name}`");
+            let help = Some(format!("add [drives.hostmot2.{kind}s.{name}] with its `pin`"));
+            diagnostics.refuse(ProblemKind::MissingKey, span, message, help);
+            0
+        }
+    };
+    names.iter().map(pin).collect()
 }
