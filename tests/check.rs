@@ -155,3 +155,33 @@ fn steppers_are_told_by_pulses_and_a_picture_is_drawn() {
     assert_eq!(refused.code, Some(2));
     assert!(refused.error.contains("cannot write"), "{}", refused.error);
 }
+
+#[test]
+fn the_port_is_told_with_modes_and_latencies_and_why_it_would_refuse() {
+    let report = check("hostmot2_steppers", &[]);
+    let drives = json!({
+        "port": "hostmot2",
+        "mode": ["position", "position"],
+        "latency": [4e-4, 4e-4],
+        "gate_latency": 4e-4,
+        "link": null,
+    });
+    assert_eq!((&report["drives"], &report["warnings"]), (&drives, &json!([])));
+    // A request that comes so early is not there when its gate is due.
+    let early = "machine.drives.hostmot2.gate_latency=\"10 us\"";
+    let report = check("hostmot2_steppers", &["--set", early]);
+    let warning = report["warnings"][0]["message"].as_str().unwrap();
+    let parts = ["`graver run` cannot drive it", "gate has a latency of 10 us", "100 us to 900 us"];
+    assert!(parts.iter().all(|part| warning.contains(part)), "{warning}");
+
+    let machine = support::source("machines/hostmot2_steppers.toml");
+    let told = Place::new().graver(&["check", "--machine", machine.to_str().unwrap()]);
+    told.accepted();
+    for line in [
+        "drives    hostmot2\n",
+        "          x follows a position, 400.0 µs after the deadline\n",
+        "          the gate follows 400.0 µs after the deadline\n",
+    ] {
+        assert!(told.error.contains(line), "{line}: {}", told.error);
+    }
+}

@@ -17,8 +17,8 @@ use crate::run_analysis::{Clock, RunAnalysis, RunResults};
 use crate::run_folder::RunFolder;
 use crate::summary::text::length;
 use crate::summary::{
-    ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime, StallSummary,
-    Summary,
+    DrivesSummary, ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime,
+    StallSummary, Summary,
 };
 use machine::{Actuator, Machine};
 use messages::artwork::Artwork;
@@ -85,6 +85,12 @@ pub fn summarise(
         length: plan.length,
     };
     let mut summary = Summary::new(Outcome::Aborted, job, machine_summary(machine));
+    let counters = run_outcome.drives.map(|report| report.link).unwrap_or_default();
+    let drives = match clock {
+        Clock::Virtual => DrivesSummary::simulated(machine),
+        Clock::Real => DrivesSummary::of(machine),
+    };
+    summary.drives = drives.counted(&counters);
     summary.error = run_outcome.error.clone();
     summary.wall = run_outcome.wall;
     summary.plan_time = run_outcome.plan_time;

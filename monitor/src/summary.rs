@@ -3,6 +3,7 @@
 //! The names and their meaning are what users' scripts rely on; further keys may be added.
 //! SI units and radians, latencies in nanoseconds.
 
+pub mod drives;
 pub mod fault;
 pub mod stalls;
 pub mod text;
@@ -16,6 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+pub use drives::{DrivesSummary, LinkSummary};
 pub use fault::FaultSummary;
 pub use stalls::StallSummary;
 
@@ -61,6 +63,9 @@ pub struct Summary {
     pub job: JobSummary,
     /// The machine.
     pub machine: MachineSummary,
+    /// What drove the motors.
+    #[serde(default)]
+    pub drives: DrivesSummary,
     /// Duration of the motion, first to last [s].
     pub time: f64,
     /// Wall time of the whole command [s].
@@ -216,6 +221,7 @@ impl Summary {
             error: None,
             job,
             machine,
+            drives: DrivesSummary::default(),
             time: 0.0,
             wall: 0.0,
             realtime_factor: None,
@@ -294,6 +300,7 @@ mod tests {
             "error",
             "job",
             "machine",
+            "drives",
             "time",
             "wall",
             "realtime_factor",

@@ -11,12 +11,13 @@ use crate::exit::{Exit, Failure};
 use crate::files::Sources;
 use crate::inputs::MachineInput;
 use crate::{inputs, output};
-use drives::{PlantOptions, SimulatedPlant};
-use machine::Machine;
+use drives::port::{self, PortError};
+use drives::{PlantOptions, SimulatedPlant, ports};
+use machine::{DrivesKind, Machine};
 use messages::artwork::Artwork;
 use monitor::conclusion::machine_summary;
 use monitor::report::workspace::Workspace;
-use monitor::summary::MachineSummary;
+use monitor::summary::{DrivesSummary, MachineSummary};
 use planner::Plan;
 use planner::request::JobRequest;
 use serde::Serialize;
@@ -31,6 +32,8 @@ pub struct CheckReport {
     pub machine: MachineSummary,
     /// Its axes, in order.
     pub axes: Vec<AxisReport>,
+    /// What drives its motors.
+    pub drives: DrivesSummary,
     /// Which part of its area it reaches.
     pub reach: ReachReport,
     /// Warnings about the machine file, with the numbers.
@@ -81,6 +84,7 @@ pub fn run(arguments: &CheckArguments) -> Result<Exit, Failure> {
     let report = CheckReport {
         machine: machine_summary(machine),
         axes: axes::axes(machine),
+        drives: DrivesSummary::of(machine),
         reach: surveyed.report,
         warnings: warnings(&input),
         sample_job: sample_job(&input),
@@ -135,7 +139,7 @@ fn tidy(path: &Path) -> PathBuf {
     tidy
 }
 
-/// The warnings about the machine file, and why it cannot be simulated, if it cannot.
+/// The warnings about the machine file, and why it cannot be driven or simulated, if it cannot.
 fn warnings(input: &MachineInput) -> Vec<CheckWarning> {
     let warnings = input.machine.warnings.iter().map(|warning| CheckWarning {
         line: warning.line as u64,
@@ -148,7 +152,22 @@ fn warnings(input: &MachineInput) -> Vec<CheckWarning> {
         column: 0,
         message: format!("`graver simulate` cannot simulate it: {error}"),
     });
-    warnings.chain(refused).collect()
+    let undriven = undriven(input).map(|error| CheckWarning {
+        line: 0,
+        column: 0,
+        message: format!("`graver run` cannot drive it: {error}"),
+    });
+    warnings.chain(undriven).chain(refused).collect()
+}
+
+/// Why its port would refuse the machine, as far as that can be told without the hardware.
+fn undriven(input: &MachineInput) -> Option<PortError> {
+    let MachineInput { machine, plant, .. } = input;
+    if machine.drives.kind == DrivesKind::Simulated {
+        return None;
+    }
+    let port = ports::build(machine, plant);
+    port.and_then(|port| port::check(port.profile(), machine)).err()
 }
 
 /// The picture of the workspace, as SVG.

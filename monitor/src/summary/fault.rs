@@ -1,6 +1,7 @@
 //! A fault in words: what was found, with its quantity and unit, and the limit that it broke.
 
 use super::StallSummary;
+use machine::drives::fault_text;
 use machine::{JointUnit, Machine};
 use messages::fault::FaultUnit;
 use messages::time::Period;
@@ -30,7 +31,12 @@ impl FaultSummary {
         fault.is_some().then(|| Self {
             code: fault.code().name().to_owned(),
             axis: name.cloned(),
-            detail: detail(fault, driven.or(axis).map(|axis| axis.unit), machine.realtime.period),
+            detail: match word(fault, machine) {
+                Some(told) => told,
+                None => {
+                    detail(fault, driven.or(axis).map(|axis| axis.unit), machine.realtime.period)
+                }
+            },
         })
     }
 
@@ -48,6 +54,23 @@ impl std::fmt::Display for FaultSummary {
         let axis = self.axis.as_ref().map(|axis| format!(" of axis {axis}")).unwrap_or_default();
         write!(formatter, "{}{axis}: {}", self.code, self.detail)
     }
+}
+
+/// A fault word of the drives with its text, where the fault is one; words of a drive on a bus in hexadecimal, as
+/// its manual has them.
+fn word(fault: &Fault, machine: &Machine) -> Option<String> {
+    if fault.quantity() != FaultQuantity::DriveWord {
+        return None;
+    }
+    let word = fault.value as u32;
+    let number = if word < 0x100 { format!("{word}") } else { format!("{word:04X}h") };
+    Some(match fault_text(&machine.drives.kind, word) {
+        Some(text) => format!("{text} (fault word {number} of {})", machine.drives.kind.name()),
+        None => format!(
+            "fault word {number} of {}, which its manual explains",
+            machine.drives.kind.name()
+        ),
+    })
 }
 
 fn detail(fault: &Fault, joint: Option<JointUnit>, period: Period) -> String {
@@ -155,6 +178,19 @@ mod tests {
             overrun.beyond(Quantity::Overruns, 4.0, 3.0),
             "late cycles in a row 4 (4 ms), limit 3 (3 ms)",
         );
+    }
+
+    #[test]
+    fn a_fault_word_is_told_by_its_text() {
+        let file = include_str!("../../../machines/hostmot2_steppers.toml");
+        let board = Machine::parse("board.toml", file, &[]).unwrap();
+        let told = |word: f64, machine: &Machine| {
+            let fault = Fault::new(FaultCode::DriveFault).with(Quantity::DriveWord, word);
+            FaultSummary::of(&fault, machine).unwrap().detail
+        };
+        assert_eq!(told(1.0, &board), "the card's watchdog has bitten (fault word 1 of hostmot2)");
+        let unknown = told(f64::from(0x2310), &board);
+        assert_eq!(unknown, "fault word 2310h of hostmot2, which its manual explains");
     }
 
     #[test]

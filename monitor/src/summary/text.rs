@@ -82,6 +82,10 @@ impl Rows {
         };
         let what = format!("{} ({}), axes {axes}{actuators}", machine.name, machine.mechanism);
         self.add("machine", what);
+        self.add("drives", summary.drives.text(&machine.actuators));
+        if let Some(link) = &summary.drives.link {
+            self.add("link", link.to_string());
+        }
     }
 
     fn times(&mut self, summary: &Summary) {

@@ -4,7 +4,7 @@ use super::axes::{AxisReport, Unit};
 use super::job::{JobReport, MotorUse};
 use super::{CheckReport, CheckWarning};
 use crate::output::say;
-use monitor::summary::MachineSummary;
+use monitor::summary::{DrivesSummary, MachineSummary};
 use workbench::reach::{Obstacle, ReachReport};
 
 /// Prints it on standard error.
@@ -15,6 +15,7 @@ pub(super) fn print(report: &CheckReport) {
         say!("{}", axis_line(axis));
         say!("{}", transmission_line(axis));
     }
+    drives(report);
     reach(&report.reach);
     report.warnings.iter().for_each(warning);
     match &report.job {
@@ -79,6 +80,17 @@ fn range(axis: &AxisReport) -> String {
         [None, Some(upper)] => format!("up to {}{unit}", shown(upper)),
         [None, None] => "unlimited".to_owned(),
     }
+}
+
+/// The port, and what is said of each actuator's drive and of the gate.
+fn drives(report: &CheckReport) {
+    let DrivesSummary { port, mode, latency, gate_latency, .. } = &report.drives;
+    say!("drives    {port}");
+    for ((name, mode), latency) in report.machine.actuators.iter().zip(mode).zip(latency) {
+        let latency = latency * 1e6;
+        say!("          {name} follows a {mode}, {latency:.1} µs after the deadline");
+    }
+    say!("          the gate follows {:.1} µs after the deadline", gate_latency * 1e6);
 }
 
 fn reach(reach: &ReachReport) {
