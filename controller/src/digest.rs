@@ -1,6 +1,6 @@
 //! A hash over what commands mean, to tell two runs apart with one number.
 //!
-//! It covers mode, targets, gate, power and outputs of every command given while a stream is
+//! It covers mode, targets, gate, power, frequency and outputs of every command given while a stream is
 //! played. It leaves out stamps, cycle and stream numbers, and idle cycles, which differ between
 //! runs of one job without any difference on the workpiece; and the voltage, which answers what
 //! was measured and not only what was planned. So do the torque and the velocity of a drive that follows them.
@@ -27,6 +27,10 @@ impl Digest {
         self.word(command.outputs);
         self.word(u64::from(laser.gate));
         self.word(laser.power.to_bits());
+        // A source that is left as it is set says nothing of its frequency.
+        if laser.frequency != 0.0 {
+            self.word(laser.frequency.to_bits());
+        }
         for edge in laser.edges() {
             self.word(u64::from(edge.offset) << 32 | u64::from(edge.gate));
             self.word(edge.power.to_bits());
@@ -72,11 +76,12 @@ mod tests {
     #[test]
     fn sees_what_a_command_means_and_nothing_else() {
         let plain = digest(|_| {});
-        let meanings: [fn(&mut Command); 8] = [
+        let meanings: [fn(&mut Command); 9] = [
             |command| command.mode = 4,
             |command| command.outputs = 1,
             |command| command.laser.gate = 1,
             |command| command.laser.power = 0.1,
+            |command| command.laser.frequency = 20e3,
             |command| command.laser.edges[0].offset = 8,
             |command| command.position[1] = 1e-300,
             |command| command.velocity[0] = 1.0,

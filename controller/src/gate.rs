@@ -29,7 +29,7 @@ pub struct TooManyEdges;
 
 /// The laser over `stretch`, dark before `dark_until`. Edges keep their stream time; power follows
 /// the rate, so that each length of line gets the same light, down to `min_power`: below it the source
-/// might not light at all.
+/// might not light at all. The frequency is that of the setpoint in which the light may begin.
 ///
 /// # Errors
 /// More changes than a cycle can hold: none is left out silently.
@@ -41,14 +41,14 @@ pub fn laser(
 ) -> Result<LaserCycle, TooManyEdges> {
     let rate = stretch.rate();
     if stretch.to <= stretch.from || stretch.to <= dark_until {
-        return Ok(LaserCycle::OFF);
+        return Ok(dark(lookahead, stretch.from));
     }
-    let mut cycle = LaserCycle::OFF;
     let start = stretch.from.max(dark_until);
     let first = start.sequence();
     let last = StreamTime(stretch.to.0 - 1).sequence();
     let period = stretch.period.time().0 as f64;
     let planned = &lookahead.setpoint(first).laser;
+    let mut cycle = LaserCycle { frequency: planned.frequency, ..LaserCycle::OFF };
     let whole = StreamTime::of(first + 1);
     if stretch.from == StreamTime::of(first)
         && stretch.from == start
@@ -96,6 +96,12 @@ pub fn laser(
         }
     }
     Ok(cycle)
+}
+
+/// No light at this instant of the stream, its frequency as planned there.
+pub fn dark(lookahead: &Lookahead, at: StreamTime) -> LaserCycle {
+    let frequency = lookahead.setpoint(at.sequence()).laser.frequency;
+    LaserCycle { frequency, ..LaserCycle::OFF }
 }
 
 /// Adds an edge, inside the cycle of this `period` [ns].

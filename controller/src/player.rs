@@ -408,7 +408,7 @@ impl Player {
     /// # Errors
     /// More edges than a cycle can hold.
     pub fn laser(&self, lookahead: &Lookahead) -> Result<LaserCycle, TooManyEdges> {
-        if self.marking { self.light(lookahead) } else { Ok(LaserCycle::OFF) }
+        if self.marking { self.light(lookahead) } else { Ok(gate::dark(lookahead, self.next.time)) }
     }
 
     /// What the stream has of light between `next` and `after` that was not given before.

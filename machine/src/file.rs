@@ -6,6 +6,7 @@ mod axes;
 pub mod bounds;
 pub mod drives;
 pub mod frame;
+mod laser;
 pub mod mechanism;
 pub mod motors;
 pub mod operating;

@@ -1,5 +1,7 @@
 //! The laser source at the tool.
 
+use messages::math;
+
 /// The laser source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaserSource {
@@ -15,14 +17,33 @@ pub struct LaserSource {
     /// The least fraction of the power asked for that power in proportion to the speed goes down to,
     /// 0 to 1.
     pub proportional_floor: f64,
+    /// The lowest and the highest pulse repetition rate that a job may ask for [pulses/s]; `None` where
+    /// the source has none, or keeps its own.
+    pub frequency: Option<[f64; 2]>,
 }
 
 impl LaserSource {
     /// Switches at once, at any power.
-    pub const IDEAL: Self =
-        Self { on_delay: 0.0, off_delay: 0.0, min_power: 0.0, proportional_floor: 0.0 };
+    pub const IDEAL: Self = Self {
+        on_delay: 0.0,
+        off_delay: 0.0,
+        min_power: 0.0,
+        proportional_floor: 0.0,
+        frequency: None,
+    };
 
     /// The longest delay that a machine file may give a source [s]. Real ones switch within
     /// milliseconds; a longer one is a wrong unit.
     pub const LONGEST_DELAY: f64 = 1.0;
+
+    /// The pulses a second of a `rate` that is told in turns [rad/s], to a thousandth of a pulse.
+    pub fn pulses(rate: f64) -> f64 {
+        (rate / math::TURN * 1e3).round() / 1e3
+    }
+
+    /// Whether it can pulse at `frequency` [pulses/s]; 0 leaves it as it is set.
+    pub fn pulses_at(&self, frequency: f64) -> bool {
+        let within = |[least, most]: [f64; 2]| (least..=most).contains(&frequency);
+        frequency == 0.0 || self.frequency.is_some_and(within)
+    }
 }

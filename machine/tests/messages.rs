@@ -132,6 +132,21 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
         "off_delay = \"1001 ms\"",
         &["102:13: an `off_delay` of 1.001 s is too long; a laser source answers within 1 s"],
     );
+    refused(
+        "on_delay = \"0 us\"",
+        "frequency = [\"80 kHz\", \"20 kHz\"]",
+        &["101:14: the lowest frequency is above the highest one; write the lower one first: \
+           frequency = [\"20 kHz\", \"80 kHz\"]"],
+    );
+    refused(
+        "[laser]",
+        "[drives.hostmot2]\naddress = \"10.0.0.1\"\nactuators.a.stepgen = 0\n\
+         actuators.b.stepgen = 1\n[laser]\nfrequency = [\"20 kHz\", \"80 kHz\"]",
+        &[
+            "105:14: [drives.hostmot2] cannot set the frequency of the pulses; leave `frequency` out: \
+           the source keeps the one that it is set to",
+        ],
+    );
     for (stall, found) in [("0.9 ms", "0.0009"), ("51 ms", "0.051"), ("1e15 s", "1000000000000000")]
     {
         refused(

@@ -21,7 +21,7 @@ sample! {
 
 sample! {
     /// What the laser does in one cycle.
-    LaserCycle = "graver.LaserCycle.v1" {
+    LaserCycle = "graver.LaserCycle.v2" {
         /// The gate when the cycle starts: 0 closed, otherwise open and marking the stroke with
         /// this number (from 1, in the order of the artwork). Light always belongs to a stroke.
         gate: u32,
@@ -29,6 +29,9 @@ sample! {
         edge_count: u32,
         /// Power when the cycle starts, as a fraction of full scale, 0..=1.
         power: f64,
+        /// Pulse repetition rate of the source from the start of the cycle on [pulses/s]; 0 leaves it as
+        /// the source is set. It changes in the dark only.
+        frequency: f64,
         /// The changes inside the cycle; unused entries are zero.
         edges: [GateEdge; MAX_EDGES],
     }
@@ -40,6 +43,7 @@ impl LaserCycle {
         gate: 0,
         edge_count: 0,
         power: 0.0,
+        frequency: 0.0,
         edges: [GateEdge { offset: 0, gate: 0, power: 0.0 }; MAX_EDGES],
     };
 
@@ -59,11 +63,12 @@ impl LaserCycle {
     }
 
     /// Whether it makes sense in a cycle of this `period`: edges in order inside it, power a fraction,
-    /// count in range. Drives keeps a cycle dark that does not.
+    /// count in range, a finite frequency of 0 or more. Drives keeps a cycle dark that does not.
     pub fn is_valid(&self, period: Nanoseconds) -> bool {
         let fraction = |power: f64| (0.0..=1.0).contains(&power);
         self.edge_count as usize <= MAX_EDGES
             && fraction(self.power)
+            && (0.0..=f64::MAX).contains(&self.frequency)
             && self
                 .edges()
                 .iter()
@@ -121,6 +126,9 @@ mod tests {
             !cycle(0, 0.0, &[edge(5, 1, 0.5), edge(4, 0, 0.0)]).is_valid(PERIOD),
             "back in time"
         );
+        for frequency in [-1.0, f64::NAN, f64::INFINITY] {
+            assert!(!LaserCycle { frequency, ..LaserCycle::OFF }.is_valid(PERIOD), "{frequency}");
+        }
         let count = MAX_EDGES as u32 + 1;
         for edge_count in [count, u32::MAX] {
             assert!(!LaserCycle { edge_count, ..LaserCycle::OFF }.is_valid(PERIOD), "{edge_count}");

@@ -91,6 +91,11 @@ pub enum Action {
         /// On or off.
         on: bool,
     },
+    /// Set the pulse repetition rate of the laser, at rest and in the dark.
+    Frequency {
+        /// [pulses/s]; 0 leaves it as the source is set.
+        value: f64,
+    },
     /// Wait, at rest and in the dark, for a person to resume.
     Pause,
     /// How corners are passed from here on.

@@ -7,6 +7,7 @@ mod drawing_error;
 pub mod drawing_table;
 mod estimate;
 pub mod file;
+mod frequency;
 pub mod gcode;
 pub mod letters;
 pub mod letters_table;
@@ -96,6 +97,9 @@ pub struct Marking {
     pub policy: Option<Policy>,
     /// How the tool gets from one line to the next.
     pub turns: Turns,
+    /// Pulse repetition rate of the laser where the job sets no other [pulses/s]; `None` leaves it as the
+    /// source is set.
+    pub frequency: Option<f64>,
     /// The stroke to begin with, from 1: what is marked before is left out.
     pub from_stroke: u64,
 }
@@ -108,6 +112,7 @@ impl Default for Marking {
             tolerance: None,
             policy: None,
             turns: Turns::default(),
+            frequency: None,
             from_stroke: 1,
         }
     }

@@ -90,6 +90,8 @@ pub(crate) struct Task<'a> {
     pub(crate) attitude: crate::geometry::attitude::AttitudeLaw,
     /// What is marked on, where not in a plane.
     pub(crate) surface: Option<machine::surface::Surface>,
+    /// Of the laser's pulses where nothing else is asked for [pulses/s], 0 as the source is set.
+    pub(crate) frequency: f64,
     /// How long the job takes at the speeds asked for, if starts and turns took no time [s].
     pub(crate) estimate: f64,
     /// Where the tool is before it [m].
@@ -357,7 +359,12 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         if self.front.sampler.is_complete() {
             return Ok(());
         }
-        draft.trajectory.pieces.extend(self.front.lead_in.take());
+        if let Some(lead_in) = self.front.lead_in.take() {
+            draft.trajectory.pieces.push(lead_in);
+            if self.task.frequency != 0.0 {
+                draft.trajectory.frequencies.push((0.0, self.task.frequency));
+            }
+        }
         self.hold_height();
         let mut is_last = !self.advance(draft)?;
         // What takes no time is no window of its own: planning it again would mend nothing.

@@ -1,5 +1,5 @@
 //! A job as exact functions of time: pieces of motion, the instants at which the laser changes,
-//! and those of outputs and pauses.
+//! and those of outputs, frequencies and pauses.
 //!
 //! Position, velocity and acceleration are continuous over all pieces; the jerk steps. Stream time
 //! starts with [`BEFORE`] of rest.
@@ -94,6 +94,8 @@ pub struct Trajectory {
     pub laser: Vec<LaserChange>,
     /// Stream times [s] from which all outputs are as given.
     pub outputs: Vec<(f64, u64)>,
+    /// Stream times [s] from which the laser has so many pulses a second, 0 as its source is set.
+    pub frequencies: Vec<(f64, f64)>,
     /// Stream times at which to wait for a person [s].
     pub pauses: Vec<f64>,
     /// How the tool is turned where it leads.
@@ -116,6 +118,7 @@ impl Trajectory {
         self.pieces.extend_from_slice(&next.pieces);
         self.laser.extend_from_slice(&next.laser);
         self.outputs.extend_from_slice(&next.outputs);
+        self.frequencies.extend_from_slice(&next.frequencies);
         self.pauses.extend_from_slice(&next.pauses);
     }
 

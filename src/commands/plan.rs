@@ -287,7 +287,7 @@ fn write_samples(
         write!(file, ",{name}_position,{name}_velocity,{name}_acceleration")?;
         actuators.iter().try_for_each(|actuator| write!(file, ",{}_effort", actuator.name))?;
     }
-    writeln!(file, ",laser,power")?;
+    writeln!(file, ",laser,power,frequency")?;
     for setpoint in setpoints {
         write_row(&mut file, machine, &setpoint)?;
     }
@@ -304,5 +304,6 @@ fn write_row(file: &mut impl Write, machine: &Machine, setpoint: &Setpoint) -> i
         efforts.try_for_each(|effort| write!(file, ",{effort}"))?;
     }
     let lit = u32::from(setpoint.laser.gate != 0);
-    writeln!(file, ",{lit},{}", if lit == 1 { setpoint.laser.power } else { 0.0 })
+    let laser = &setpoint.laser;
+    writeln!(file, ",{lit},{},{}", if lit == 1 { laser.power } else { 0.0 }, laser.frequency)
 }

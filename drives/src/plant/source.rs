@@ -26,6 +26,8 @@ pub struct Source {
     off_delay: Nanoseconds,
     asked: (u32, f64),
     light: (u32, f64),
+    /// Of the newest light that was asked for [pulses/s].
+    frequency: f64,
     pending: [Change; 2 * MAX_EDGES],
     count: usize,
 }
@@ -39,6 +41,7 @@ impl Source {
             off_delay: Nanoseconds::from_seconds(laser.off_delay),
             asked: (0, 0.0),
             light: (0, 0.0),
+            frequency: 0.0,
             pending: [Change::default(); 2 * MAX_EDGES],
             count: 0,
         }
@@ -52,9 +55,16 @@ impl Source {
         if self.on_delay == Nanoseconds(0) && self.off_delay == Nanoseconds(0) {
             return Ok(*asked);
         }
-        let light = self.follow(asked);
+        let mut light = self.follow(asked);
         if light.is_err() {
             *self = Self { asked: (0, 0.0), light: (0, 0.0), count: 0, ..*self };
+        }
+        if asked.is_lit() {
+            self.frequency = asked.frequency;
+        }
+        if let Ok(light) = &mut light {
+            // What still shines after the gate has closed was asked for before.
+            light.frequency = if light.is_lit() { self.frequency } else { asked.frequency };
         }
         light
     }
@@ -133,6 +143,22 @@ mod tests {
         assert_eq!((light.gate, light.power), (3, 0.5));
         assert_eq!(light.edges(), &[GateEdge { offset: 30_000, gate: 0, power: 0.0 }]);
         assert_eq!(source.cycle(&LaserCycle::OFF), Ok(LaserCycle::OFF));
+    }
+
+    #[test]
+    fn light_keeps_its_frequency_when_the_gate_has_closed() {
+        let mut source = source(30e-6, 50e-6);
+        let told = |mut cycle: LaserCycle, frequency| {
+            cycle.frequency = frequency;
+            cycle
+        };
+        let mut frequency =
+            |asked: LaserCycle| source.cycle(&asked).map(|light| light.frequency).unwrap_or(-1.0);
+        assert_eq!(frequency(told(pulse(100_000, 980_000), 20e3)), 20e3);
+        assert_eq!(frequency(LaserCycle::OFF), 20e3, "the tail");
+        assert_eq!(frequency(LaserCycle::OFF), 0.0);
+        assert_eq!(frequency(told(LaserCycle::OFF, 50e3)), 50e3);
+        assert_eq!(frequency(told(pulse(0, 500_000), 50e3)), 50e3);
     }
 
     #[test]

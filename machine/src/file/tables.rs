@@ -346,6 +346,9 @@ table! {
         /// The least share of the power asked for that power in proportion to the speed (M4) goes
         /// down to where the tool is slow.
         pub proportional_floor: Fraction = 0.0,
+        /// The lowest and the highest pulse repetition rate that a job may ask for, where drives can set
+        /// it; left out, the source keeps its own.
+        pub frequency: Option<[Above<unit::PulseRate>; 2]>,
     }
 }
 

@@ -5,13 +5,12 @@ use std::path::PathBuf;
 use super::axes::{Drive, Joint, axis};
 use super::bounds::BOUNDS;
 use super::drives;
+use super::laser;
 use super::mechanism::{self, Built};
 use super::motors;
 use super::operating::{self, operating};
 use super::relations;
-use super::tables::{
-    AreaTable, AxisTable, LaserTable, MachineTable, OriginsTable, PathTable, RealtimeTable,
-};
+use super::tables::{AreaTable, AxisTable, MachineTable, OriginsTable, PathTable, RealtimeTable};
 use super::{unused, warnings};
 use crate::actuator::Actuator;
 use crate::axis::Axis;
@@ -19,7 +18,6 @@ use crate::document::{
     Diagnostics, Document, DocumentError, Named, Point, ProblemKind, Span, Spanned, nearest,
 };
 use crate::gcode_settings::{Dialect, GcodeSettings, ZMeaning};
-use crate::laser::LaserSource;
 use crate::limits::{PathLimits, StallTolerance, Timing, WorkArea};
 use crate::machine::Machine;
 use crate::mechanisms::MechanismKind;
@@ -49,7 +47,6 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     refuse_rigid_pairs(&mechanism, &table.axis, &mut diagnostics);
     refuse_many(&table.axis, &driven, &mut diagnostics);
     check_z(&table, &mechanism, &mut diagnostics);
-    let laser = laser(&table.laser, &mut diagnostics);
     let mut actuators: Vec<Actuator> = driven.into_iter().map(|(_, actuator)| actuator).collect();
     let operating = if axes.len() == joints.len() {
         let (inputs, outputs) = (table.inputs.as_ref(), table.outputs.as_ref());
@@ -60,6 +57,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         Operating::default()
     };
     let drives = drives::build(&table.drives, &mut actuators, &operating, &mut diagnostics);
+    let laser = laser::source(&table.laser, &drives.kind, &mut diagnostics);
     let PathTable { speed, rapid, acceleration, jerk, tolerance, corners, span: _ } = &table.path;
     let gcode = &table.gcode;
     let machine = Machine {
@@ -229,26 +227,6 @@ fn refuse_many(
         format!("the machine has {} actuators", driven.len()),
         &format!("a machine can have {MAX_ACTUATORS} of them, on all its axes together"),
     );
-}
-
-/// Refuses delays that no source has: the stream would wait for them.
-fn laser(table: &LaserTable, diagnostics: &mut Diagnostics) -> LaserSource {
-    for (key, delay) in [("on_delay", table.on_delay), ("off_delay", table.off_delay)] {
-        if delay.value > LaserSource::LONGEST_DELAY {
-            diagnostics.refuse(
-                ProblemKind::OutOfRange,
-                delay.span,
-                format!("an `{key}` of {} s is too long", delay.value),
-                Some(format!("a laser source answers within {} s", LaserSource::LONGEST_DELAY)),
-            );
-        }
-    }
-    LaserSource {
-        on_delay: table.on_delay.value,
-        off_delay: table.off_delay.value,
-        min_power: table.min_power.value,
-        proportional_floor: table.proportional_floor.value,
-    }
 }
 
 /// Refuses a period that the cycle cannot have, and a tolerance shorter than it, or longer than any

@@ -11,7 +11,8 @@ use std::io::{self, Write};
 /// Writes one line a record under a line of column names.
 ///
 /// `cycle` counts from the start of drives; `stream_time` [s], `rate` and `stroke` are the
-/// command's. `lit` is the share of the time since the record before in which the laser marked, 0..=1; `tool_x`,
+/// command's. `lit` is the share of the time since the record before in which the laser marked, 0..=1; `frequency` is what its
+/// source was asked for [pulses/s], 0 as it is set; `tool_x`,
 /// `tool_y`, `tool_z` and `planned_…` are places in the machine frame [m]. Then per actuator reference
 /// and position at the motor [rad], current measured [A] and voltage commanded, in volts.
 ///
@@ -31,7 +32,7 @@ impl<W: Write> TableWriter<W> {
     /// # Errors
     /// Whatever the writer reports.
     pub fn new(mut writer: W, actuators: &[String], period: Period) -> io::Result<Self> {
-        write!(writer, "cycle,stream_time,rate,stroke,lit,tool_x,tool_y,tool_z")?;
+        write!(writer, "cycle,stream_time,rate,stroke,lit,frequency,tool_x,tool_y,tool_z")?;
         write!(writer, ",planned_x,planned_y,planned_z")?;
         for name in actuators.iter().take(MAX_ACTUATORS) {
             write!(writer, ",{name}_reference,{name}_position,{name}_current,{name}_voltage")?;
@@ -52,6 +53,7 @@ impl<W: Write> TableWriter<W> {
         self.field(answered, command.rate)?;
         self.field(answered, command.stroke)?;
         self.field(true, lit_share(&feedback.laser, self.period.of(feedback.elapsed())))?;
+        self.field(true, feedback.laser.frequency)?;
         for value in feedback.tool {
             self.field(feedback.has(status::TOOL_KNOWN), value)?;
         }
@@ -113,12 +115,15 @@ mod tests {
         record.feedback.cycle = Cycle(7);
         record.feedback.status = status::TOOL_KNOWN;
         record.feedback.tool = [0.1, 0.2, 0.0];
+        record.feedback.laser.frequency = 20e3;
         record.command = Command { cycle: Cycle(7), rate: 0.5, ..Command::default() };
         record.command.voltage[1] = -3.5;
         let lines = table(&[record, record]);
         assert_eq!(lines.len(), 3);
-        assert!(lines.iter().all(|line| line.len() == 19), "{lines:?}");
-        for (name, value) in [("cycle", "7"), ("rate", "0.5"), ("tool_y", "0.2")] {
+        assert!(lines.iter().all(|line| line.len() == 20), "{lines:?}");
+        for (name, value) in
+            [("cycle", "7"), ("rate", "0.5"), ("frequency", "20000"), ("tool_y", "0.2")]
+        {
             assert_eq!(column(&lines, 1, name), value);
         }
         assert_eq!(column(&lines, 2, "y_voltage"), "-3.5");

@@ -28,6 +28,8 @@ pub(crate) enum OperationKind {
     Dot(Dot),
     /// Switch an output.
     Output { bit: u32, on: bool },
+    /// Set the pulse repetition rate of the laser [pulses/s], 0 as the source is set.
+    Frequency(f64),
     /// Wait for a person.
     Pause,
 }

@@ -160,6 +160,12 @@ impl<'a> Operations<'a> {
                 self.done.push_back(Operation { kind, line });
                 Ok(())
             }
+            Action::Frequency { value } => {
+                self.flush()?;
+                let kind = OperationKind::Frequency(*value);
+                self.done.push_back(Operation { kind, line });
+                Ok(())
+            }
             Action::Pause => {
                 self.flush()?;
                 self.done.push_back(Operation { kind: OperationKind::Pause, line });

@@ -3,15 +3,14 @@
 use std::path::Path;
 
 use machine::document::{Diagnostics, NonNegative, Number, Point, Positive, Quantity, Spanned};
-use machine::quantity::{Angle, AngularSpeed, Duration, Length};
+use machine::quantity::{Angle, Duration, Length, PulseRate};
 use machine::{DocumentError, Machine, table};
-use messages::math;
 use nalgebra::Vector3;
 
 use super::cloud::{self, Cloud, Glass, Height};
 use super::file::Reading;
 use super::whole::whole;
-use super::{Job, JobError};
+use super::{Job, JobError, frequency};
 use crate::drawing::Drawing;
 
 table! {
@@ -50,8 +49,8 @@ table! {
         pub dwell: Option<Quantity<Duration, Positive>>,
         /// How many pulses mark a point, instead of a time.
         pub pulses: Option<Number<Positive>>,
-        /// How often the source pulses.
-        pub pulse_rate: Option<Quantity<AngularSpeed, Positive>>,
+        /// How often the source pulses; it is told so where the machine has a range of `laser.frequency`.
+        pub pulse_rate: Option<Quantity<PulseRate, Positive>>,
         /// The point to go on from, in the order of marking, from 0.
         pub from: Number<NonNegative> = 0.0,
     }
@@ -77,8 +76,24 @@ pub(super) fn read(table: &CloudTable, mut reading: Reading<'_>) -> Result<Job, 
     let (folder, machine) = (reading.folder, reading.machine);
     let drawing = draw(table, folder, power, &mut reading.diagnostics, machine)?;
     let files = table.file.iter().map(|file| folder.join(&file.value)).collect();
-    let job = Job { files, ..reading.job_of(drawing) };
+    let mut job = Job { files, ..reading.job_of(drawing) };
+    if let Some(frequency) = pulse_rate(table, &mut reading) {
+        job.marking.frequency = Some(frequency);
+    }
     reading.finish(job)
+}
+
+/// The pulse repetition rate that the table asks the machine's source for [pulses/s].
+fn pulse_rate(table: &CloudTable, reading: &mut Reading<'_>) -> Option<f64> {
+    let source = &reading.machine.laser;
+    let rate = table.pulse_rate.as_ref().filter(|_| source.frequency.is_some())?;
+    if let Some(other) = &reading.beside.marking.frequency
+        && other.value != rate.value
+    {
+        let text = "`frequency` and the cloud's `pulse_rate` differ".to_owned();
+        reading.diagnostics.contradict(other.span, text, "leave one of them out");
+    }
+    frequency::asked(Some(rate), source, &mut reading.diagnostics)
 }
 
 /// The drawing of a cloud; what is wrong with the table goes to `diagnostics`.
@@ -179,8 +194,7 @@ fn glass(table: &CloudTable, diagnostics: &mut Diagnostics) -> Option<Glass> {
 fn dwell(table: &CloudTable, diagnostics: &mut Diagnostics) -> f64 {
     match (&table.dwell, &table.pulses, &table.pulse_rate) {
         (Some(dwell), None, _) => dwell.value,
-        // A rate is told in turns, which are pulses here.
-        (None, Some(pulses), Some(rate)) => pulses.value * math::TURN / rate.value,
+        (None, Some(pulses), Some(rate)) => pulses.value / frequency::of(rate),
         _ => {
             let help = "write `dwell`, or `pulses` and `pulse_rate`";
             let text = "how long a point is lit is not clear".to_owned();

@@ -31,6 +31,8 @@ const AIR_ASSIST: u32 = 0;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Composition {
     sections: Shared<[Section]>,
+    /// Pulse repetition rate of the laser before the first of them [pulses/s], 0 as its source is set.
+    frequency: f64,
     /// How often all of it is marked, at least 1.
     repeat: u32,
 }
@@ -55,6 +57,8 @@ struct Recipe {
     focus_step: f64,
     /// Whether the air assist is on.
     air: bool,
+    /// Pulse repetition rate of the laser [pulses/s], 0 as its source is set.
+    frequency: f64,
 }
 
 /// One thing to mark.
@@ -80,7 +84,14 @@ enum MarkShape {
 impl Composition {
     /// Its steps from the first on, made as they are asked for.
     pub fn steps(&self) -> impl Iterator<Item = Step> + '_ {
-        (0..self.repeat).flat_map(|_| self.sections.iter().flat_map(Section::steps))
+        (0..self.repeat).flat_map(move |round| {
+            let before = if round == 0 { None } else { self.sections.last() };
+            let befores = core::iter::once(before).chain(self.sections.iter().map(Some));
+            self.sections.iter().zip(befores).flat_map(move |(section, before)| {
+                let before = before.map_or(self.frequency, |before| before.recipe.frequency);
+                section.tuned(before).into_iter().chain(section.steps())
+            })
+        })
     }
 
     /// Whether the speed of some layer is for the planner to choose.
@@ -165,6 +176,12 @@ impl MarkShape {
 }
 
 impl Section {
+    /// The step that sets its frequency, where that is not the one `before` [pulses/s].
+    fn tuned(&self, before: f64) -> Option<Step> {
+        let value = self.recipe.frequency;
+        (value != before).then_some(Step { action: Action::Frequency { value }, line: 0 })
+    }
+
     fn steps(&self) -> impl Iterator<Item = Step> + '_ {
         let switch = |on| {
             let step = Step { action: Action::Output { bit: AIR_ASSIST, on }, line: 0 };

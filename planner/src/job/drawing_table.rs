@@ -11,7 +11,7 @@ use super::composition::{Composed, Defaults, Part, Parts, compose};
 use super::file::Reading;
 use super::marking_table::MarkingTable;
 use super::workpiece_table::{self, AttitudeTable, SurfaceTable};
-use super::{Job, JobError, gcode};
+use super::{Job, JobError, frequency, gcode};
 use crate::drawing::{Drawing, Power};
 use crate::light::Policy;
 
@@ -74,7 +74,7 @@ pub(super) fn drawing(
     let empty = Document::parse(&path.display().to_string(), "")?;
     let (table, mut diagnostics) =
         empty.override_with(overrides, "")?.decode::<DrawingFileTable>()?;
-    table.marking.check(&mut diagnostics);
+    table.marking.check(&machine.laser, &mut diagnostics);
     let home = Vector3::from(machine.home);
     let surface =
         table.surface.and_then(|table| workpiece_table::surface(&table, &mut diagnostics));
@@ -101,7 +101,11 @@ fn defaults(marking: &MarkingTable, machine: &Machine) -> Defaults {
     };
     let follows_speed =
         marking.policy.as_ref().is_some_and(|policy| policy.value == Policy::Proportional);
-    Defaults { speed, power: Power { level: marking.level(), follows_speed } }
+    Defaults {
+        speed,
+        power: Power { level: marking.level(), follows_speed },
+        frequency: marking.frequency.as_ref().map_or(0.0, frequency::of),
+    }
 }
 
 fn of_drawings(

@@ -44,7 +44,10 @@ impl Job {
                     way / limits.rapid
                 }
                 Action::Dwell { time, .. } => *time,
-                Action::Output { .. } | Action::Pause | Action::Corners(_) => 0.0,
+                Action::Output { .. }
+                | Action::Frequency { .. }
+                | Action::Pause
+                | Action::Corners(_) => 0.0,
             };
         }
         time

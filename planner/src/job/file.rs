@@ -134,7 +134,7 @@ pub(super) fn job(
     most: u64,
 ) -> Result<Job, JobError> {
     let (table, mut diagnostics) = document.decode::<JobTable>()?;
-    check(&table, &mut diagnostics);
+    check(&table, machine, &mut diagnostics);
     let home = Vector3::from(machine.home);
     let surface = table.surface.as_ref();
     let surface = surface.and_then(|table| workpiece_table::surface(table, &mut diagnostics));
@@ -152,8 +152,8 @@ pub(super) fn job(
 }
 
 /// What is wrong with the tables beside the kind.
-fn check(table: &JobTable, diagnostics: &mut Diagnostics) {
-    table.marking.check(diagnostics);
+fn check(table: &JobTable, machine: &Machine, diagnostics: &mut Diagnostics) {
+    table.marking.check(&machine.laser, diagnostics);
     if table.drawing.is_some() || table.drawings.is_some() {
         return;
     }

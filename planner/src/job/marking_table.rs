@@ -1,11 +1,11 @@
 //! The job file's table of how to mark, whatever is marked.
 
 use machine::document::{Diagnostics, Either, Fraction, Number, Positive, Quantity, Spanned};
-use machine::quantity::{Length, Speed};
-use machine::table;
+use machine::quantity::{Length, PulseRate, Speed};
+use machine::{LaserSource, table};
 
 use super::whole::whole;
-use super::{Marking, MarkingSpeed};
+use super::{Marking, MarkingSpeed, frequency};
 use crate::drawing::Turns;
 use crate::light::Policy;
 
@@ -21,6 +21,9 @@ table! {
         pub tolerance: Option<Quantity<Length, Positive>>,
         /// Power of the laser, full power when left out.
         pub power: Option<Fraction<Positive>>,
+        /// Pulse repetition rate of the laser, within `laser.frequency` of the machine; as the source is
+        /// set when left out.
+        pub frequency: Option<Quantity<PulseRate, Positive>>,
         /// How the light goes with the speed along lines: `constant` marks at one speed and comes to it
         /// in the dark, `proportional` lights from rest to rest with power in proportion to the speed.
         /// When left out, a G-code program's M3 and M4 say it, and other jobs are `constant`.
@@ -47,8 +50,9 @@ machine::keyword! {
 const MOST_STROKES: u64 = 1 << 53;
 
 impl MarkingTable {
-    /// Notes what is wrong with it.
-    pub(super) fn check(&self, diagnostics: &mut Diagnostics) {
+    /// Notes what is wrong with it on a machine with this laser `source`.
+    pub(super) fn check(&self, source: &LaserSource, diagnostics: &mut Diagnostics) {
+        frequency::asked(self.frequency.as_ref(), source, diagnostics);
         whole(&self.from_stroke, 1..=MOST_STROKES, "from_stroke", diagnostics);
     }
 
@@ -63,6 +67,7 @@ impl MarkingTable {
             tolerance: self.tolerance.as_ref().map(|tolerance| tolerance.value),
             policy: self.policy.as_ref().map(|policy| policy.value),
             turns: Turns::default(),
+            frequency: self.frequency.as_ref().map(frequency::of),
             from_stroke: self.from_stroke.value as u64,
         }
     }

@@ -54,7 +54,7 @@ pub(super) fn program(
 ) -> Result<Job, JobError> {
     let empty = Document::parse(&path.display().to_string(), "")?;
     let (table, mut diagnostics) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
-    table.marking.check(&mut diagnostics);
+    table.marking.check(&machine.laser, &mut diagnostics);
     let words = table.gcode.over(machine.gcode.words);
     of_program(path, words, &table.marking, diagnostics, machine, most)
 }

@@ -116,7 +116,7 @@ pub(super) fn items(job: &Job) -> Result<Vec<Item>, PlanError> {
                 let is_lit = lit.is_some_and(|power| power > 0.0);
                 items.push(Item::Rest { time: *time, is_lit });
             }
-            Action::Output { .. } | Action::Pause => {
+            Action::Output { .. } | Action::Frequency { .. } | Action::Pause => {
                 items.push(Item::Rest { time: 0.0, is_lit: false });
             }
             Action::Corners(_) => {}

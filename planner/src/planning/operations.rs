@@ -103,13 +103,14 @@ impl<'a> OperationQueue<'a> {
 }
 
 impl OperationQueue<'_> {
-    /// Whether an operation comes before the stroke to begin with; outputs are switched all the same.
+    /// Whether an operation comes before the stroke to begin with; outputs and frequencies are set all the
+    /// same.
     fn is_passed_over(&mut self, operation: &Operation) -> bool {
         if self.passed + 1 >= self.begins {
             return false;
         }
         let strokes = match &operation.kind {
-            OperationKind::Output { .. } => return false,
+            OperationKind::Output { .. } | OperationKind::Frequency(_) => return false,
             OperationKind::Path(contour) => contour.strokes(),
             OperationKind::Dot(_) => 1,
             OperationKind::Rapid(_) | OperationKind::Rest(_) | OperationKind::Pause => 0,

@@ -73,6 +73,7 @@ pub(crate) fn plan_windows(
         attitude: job.attitude,
         surface: job.surface,
         standing,
+        frequency: job.marking.frequency.unwrap_or(0.0),
         estimate,
         start: drawing.start,
     };

@@ -75,15 +75,18 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
                 self.front.estimated += time;
                 self.stand(time, draft);
             }
+            OperationKind::Frequency(frequency) => {
+                self.halt(draft)?;
+                let change = self.change(draft);
+                draft.trajectory.frequencies.push((change, *frequency));
+            }
             OperationKind::Output { bit, on } => {
                 self.halt(draft)?;
                 let mask = 1_u64.checked_shl(*bit).unwrap_or(0);
                 let outputs = self.front.outputs;
                 self.front.outputs = if *on { outputs | mask } else { outputs & !mask };
-                // Rest before and after the change: a control cycle each, so that each of several is seen.
-                let rest = self.task.machine.realtime.period.seconds().max(SETPOINT_TIME);
-                draft.trajectory.outputs.push((self.front.time + rest, self.front.outputs));
-                self.stand(2.0 * rest, draft);
+                let change = self.change(draft);
+                draft.trajectory.outputs.push((change, self.front.outputs));
             }
             OperationKind::Pause => {
                 self.halt(draft)?;
@@ -129,6 +132,15 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         let rest = JointMove::standing(&self.front.now.joints, self.front.now.branch);
         let stroke = self.front.light.stroke;
         self.push(now, Motion::Rest(rest), stroke, draft);
+    }
+
+    /// Rests before and after a change, a control cycle each, so that each of several is seen. The stream
+    /// time of the change [s].
+    fn change(&mut self, draft: &mut Draft<'_>) -> f64 {
+        let rest = self.task.machine.realtime.period.seconds().max(SETPOINT_TIME);
+        let change = self.front.time + rest;
+        self.stand(2.0 * rest, draft);
+        change
     }
 
     /// Comes to rest, then goes to `to` in the dark.

@@ -65,6 +65,9 @@ pub(crate) struct Sampler<const N: usize, M: Mechanism<N>> {
     is_crowded: bool,
     next_output: usize,
     outputs: u64,
+    next_frequency: usize,
+    /// [pulses/s].
+    frequency: f64,
     next_pause: usize,
     /// How far ahead of time the source is told [cycles].
     told_ahead: f64,
@@ -185,6 +188,8 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             is_crowded: false,
             next_output: 0,
             outputs: 0,
+            next_frequency: 0,
+            frequency: 0.0,
             next_pause: 0,
             told_ahead: 0.0,
             end: 0,
@@ -220,6 +225,8 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         self.laser.next = 0;
         self.trajectory.outputs.drain(..self.next_output);
         self.next_output = 0;
+        self.trajectory.frequencies.drain(..self.next_frequency);
+        self.next_frequency = 0;
         self.trajectory.pauses.drain(..self.next_pause);
         self.next_pause = 0;
     }
@@ -438,7 +445,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         }
     }
 
-    /// Outputs and flags of the sample at `time`.
+    /// Outputs, frequency and flags of the sample at `time`.
     fn switch(&mut self, setpoint: &mut Setpoint, time: f64) {
         while let Some(&(from, outputs)) = self.trajectory.outputs.get(self.next_output) {
             if from > time {
@@ -448,6 +455,14 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             self.next_output += 1;
         }
         setpoint.outputs = self.outputs;
+        while let Some(&(from, frequency)) = self.trajectory.frequencies.get(self.next_frequency) {
+            if from > time {
+                break;
+            }
+            self.frequency = frequency;
+            self.next_frequency += 1;
+        }
+        setpoint.laser.frequency = self.frequency;
         if self.trajectory.pauses.get(self.next_pause).is_some_and(|&pause| pause <= time) {
             self.next_pause += 1;
             setpoint.flags |= flags::PAUSE;

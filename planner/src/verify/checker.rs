@@ -2,7 +2,9 @@
 
 use machine::trip::Limit;
 use machine::trip::following::DISCONTINUITY;
-use machine::{Actuator, Axis, DcMotor, Friction, Machine, Motor, PathLimits, WorkArea};
+use machine::{
+    Actuator, Axis, DcMotor, Friction, LaserSource, Machine, Motor, PathLimits, WorkArea,
+};
 use messages::time::{Period, SETPOINT_PERIOD, SETPOINT_TIME};
 use messages::{ActuatorArray, AxisArray, MAX_ACTUATORS, MAX_AXES, MAX_EDGES, Setpoint};
 
@@ -56,6 +58,8 @@ pub enum Quantity {
     PulseRate,
     /// Power of the laser [fraction of full scale].
     LaserPower,
+    /// Pulse repetition rate of the laser [pulses/s].
+    LaserFrequency,
     /// Changes of the laser in a cycle.
     LaserChanges,
 }
@@ -82,6 +86,7 @@ impl Quantity {
             Self::MotorTorque => "motor torque",
             Self::PulseRate => "pulse rate",
             Self::LaserPower => "power of the laser",
+            Self::LaserFrequency => "frequency of the laser",
             Self::LaserChanges => "changes of the laser in a control cycle",
         }
     }
@@ -93,7 +98,7 @@ impl Quantity {
 
     /// Whether it is of the light, of which the source is told ahead of the motion that it belongs to.
     pub fn is_light(self) -> bool {
-        matches!(self, Self::LaserPower | Self::LaserChanges)
+        matches!(self, Self::LaserPower | Self::LaserFrequency | Self::LaserChanges)
     }
 }
 
@@ -201,6 +206,7 @@ pub(crate) struct Checker {
     path: PathLimits,
     dark: f64,
     scope: Scope,
+    source: LaserSource,
     /// The motors at the sample before.
     before: Option<[MotorState; MAX_ACTUATORS]>,
     /// The joints at the sample before: position and velocity.
@@ -226,6 +232,7 @@ impl Checker {
             path,
             dark: path.rapid.max(path.speed),
             scope,
+            source: machine.laser,
             before: None,
             joints_before: None,
             heating: [0.0; MAX_ACTUATORS],
@@ -259,7 +266,7 @@ impl Checker {
         area: &WorkArea,
     ) -> Result<(), LimitViolation> {
         let time = setpoint.sequence as f64 * SETPOINT_TIME;
-        light(setpoint, time)?;
+        light(setpoint, &self.source, time)?;
         if self.edges.as_mut().is_some_and(|edges| !edges.take(setpoint)) {
             return Err(LimitViolation::too_many_changes(setpoint));
         }
@@ -460,10 +467,17 @@ impl EdgeTimes {
     }
 }
 
-/// Whether drives can do what is asked of the laser.
+/// Whether drives and the `source` can do what is asked of the laser.
 #[inline]
-fn light(setpoint: &Setpoint, time: f64) -> Result<(), LimitViolation> {
+fn light(setpoint: &Setpoint, source: &LaserSource, time: f64) -> Result<(), LimitViolation> {
     let laser = &setpoint.laser;
+    if !source.pulses_at(laser.frequency) {
+        let [least, most] = source.frequency.unwrap_or_default();
+        let quantity = Quantity::LaserFrequency;
+        let named = Named { time, axis: None, quantity, unit: "pulses/s" };
+        let limit = if laser.frequency < least { least } else { most };
+        return Err(named.broken(laser.frequency, limit));
+    }
     if laser.is_valid(SETPOINT_PERIOD) {
         return Ok(());
     }
@@ -508,10 +522,11 @@ mod tests {
     #[test]
     fn light_that_drives_refuse_is_refused_before() {
         let machine = Machine::builtin();
+        let source = LaserSource { frequency: Some([20e3, 80e3]), ..machine.laser };
         let check = |change: &dyn Fn(&mut Setpoint)| {
             let mut setpoint = Setpoint::default();
             change(&mut setpoint);
-            light(&setpoint, 0.0).map_err(|violation| violation.quantity)
+            light(&setpoint, &source, 0.0).map_err(|violation| violation.quantity)
         };
         assert_eq!(check(&|_| ()), Ok(()));
         assert_eq!(check(&|it| it.laser.power = 1.0), Ok(()));
@@ -520,6 +535,13 @@ mod tests {
             assert_eq!(check(&|it| it.laser.power = power), Err(Quantity::LaserPower));
             let edge = GateEdge { offset: 1, gate: 1, power };
             assert_eq!(check(&|it| assert!(it.laser.push(edge))), Err(Quantity::LaserPower));
+        }
+        for frequency in [0.0, 20e3, 80e3] {
+            assert_eq!(check(&|it| it.laser.frequency = frequency), Ok(()));
+        }
+        for frequency in [19e3, 81e3, -20e3, f64::NAN] {
+            let found = check(&|it| it.laser.frequency = frequency);
+            assert_eq!(found, Err(Quantity::LaserFrequency), "{frequency}");
         }
         let mut setpoint = Setpoint { tool: machine.home, ..Setpoint::default() };
         setpoint.laser.power = beyond;

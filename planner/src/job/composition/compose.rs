@@ -130,7 +130,8 @@ pub(in crate::job) fn compose(
                     continue;
                 }
                 Layer::OfFile(drawing, index) => {
-                    recipes.get(drawing).and_then(|all| all.get(index))
+                    let recipe = recipes.get(drawing).and_then(|all| all.get(index));
+                    recipe.zip(parts.drawings.get(drawing).map(|part| part.table.span))
                 }
                 Layer::Rest => None,
             };
@@ -140,7 +141,11 @@ pub(in crate::job) fn compose(
         }
     }
     maker.note_saved();
-    let composition = Composition { sections: sections.into(), repeat: repeat as u32 };
+    let composition = Composition {
+        sections: sections.into(),
+        frequency: parts.defaults.frequency,
+        repeat: repeat as u32,
+    };
     Ok(Composed { composition, notes: maker.notes, files })
 }
 
@@ -266,6 +271,7 @@ impl Maker {
             focus: 0.0,
             focus_step: 0.0,
             air: false,
+            frequency: defaults.frequency,
         };
         let shape = match &table.power {
             None => MarkShape::Frame(corners),

@@ -8,6 +8,7 @@ use machine::document::{Diagnostics, Span};
 use super::Recipe;
 use super::tables::{HatchStyle, ImageMode, LayerTable};
 use crate::drawing::{Note, Power};
+use crate::job::frequency;
 use crate::job::whole::whole;
 use crate::light::Policy;
 
@@ -20,6 +21,8 @@ pub(in crate::job) struct Defaults {
     /// [m/s]; `None` leaves it to the planner.
     pub(in crate::job) speed: Option<f64>,
     pub(in crate::job) power: Power,
+    /// Of the laser's pulses [pulses/s], 0 as its source is set.
+    pub(in crate::job) frequency: f64,
 }
 
 /// How a layer is marked.
@@ -59,16 +62,18 @@ const GREYS: u16 = 256;
 /// Distance of hatch lines and rows where nothing says it [m].
 const INTERVAL: f64 = 1e-4;
 
-/// How what is on a layer is marked: its `table` before what `of_file` says, and that before the
-/// `defaults`. What is wrong goes to `diagnostics`, what the machine does not have to `notes`.
+/// How what is on a layer is marked: its `table` before what `of_file` says, whose drawing stands at the
+/// place beside it, and that before the `defaults`. What is wrong goes to `diagnostics`, what the machine does not have to `notes`.
 pub(super) fn recipe(
     table: Option<&LayerTable>,
-    of_file: Option<&FileRecipe>,
+    of_file: Option<(&FileRecipe, Span)>,
     defaults: &Defaults,
     machine: &Machine,
     diagnostics: &mut Diagnostics,
     notes: &mut Vec<Note>,
 ) -> Way {
+    let frequency = frequency_of(table, of_file, machine, diagnostics, notes);
+    let of_file = of_file.map(|(file, _)| file);
     let own = |value: Option<f64>, file: fn(&FileRecipe) -> Option<f64>| {
         value.or_else(|| of_file.and_then(file))
     };
@@ -112,6 +117,7 @@ pub(super) fn recipe(
             focus,
             focus_step,
             air: air && machine.gcode.air_assist,
+            frequency: frequency.unwrap_or(defaults.frequency),
         },
         hatch: hatch(table, of_file),
         image: image(table, of_file),
@@ -120,6 +126,31 @@ pub(super) fn recipe(
         })
         .unwrap_or(0.0),
     }
+}
+
+/// The pulse repetition rate that a layer asks for [pulses/s].
+fn frequency_of(
+    table: Option<&LayerTable>,
+    of_file: Option<(&FileRecipe, Span)>,
+    machine: &Machine,
+    diagnostics: &mut Diagnostics,
+    notes: &mut Vec<Note>,
+) -> Option<f64> {
+    let source = &machine.laser;
+    if let Some(written) = table.and_then(|table| table.frequency.as_ref()) {
+        return frequency::asked(Some(written), source, diagnostics);
+    }
+    let (file, span) = of_file?;
+    let asked = file.frequency?;
+    if source.frequency.is_none() {
+        once(
+            notes,
+            "frequencies in the file have no effect: this machine's cannot be set (laser.frequency)",
+        );
+        return None;
+    }
+    let who = format!("layer `{}` of the drawing", file.name);
+    frequency::held(asked, span, &who, source, diagnostics)
 }
 
 /// How far the tool is above the drawing, and how much lower in each further pass [m].

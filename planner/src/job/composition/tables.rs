@@ -3,7 +3,7 @@
 use machine::document::{
     Either, Fraction, NonNegative, Number, Point, Positive, Quantity, Spanned,
 };
-use machine::quantity::{Angle, Length, Speed};
+use machine::quantity::{Angle, Length, PulseRate, Speed};
 use machine::table;
 
 use crate::light::Policy;
@@ -149,6 +149,8 @@ table! {
         pub speed: Option<Quantity<Speed, Positive>>,
         /// Power of the laser.
         pub power: Option<Fraction<Positive>>,
+        /// Pulse repetition rate of the laser, within `laser.frequency` of the machine.
+        pub frequency: Option<Quantity<PulseRate, Positive>>,
         /// How the light goes with the speed along lines.
         pub policy: Option<Spanned<Policy>>,
         /// How often it is marked.

@@ -62,7 +62,10 @@ fn check_sound(program: &Program, input: &str) {
             Action::Follow { .. } | Action::Trace { .. } => {
                 panic!("no program has poses or curves")
             }
-            Action::Output { .. } | Action::Pause | Action::Corners(_) => continue,
+            Action::Output { .. }
+            | Action::Frequency { .. }
+            | Action::Pause
+            | Action::Corners(_) => continue,
         };
         if let Curve::Arc { centre, major, .. } = curve {
             largest = centre.iter().chain(&major).fold(largest, furthest);
