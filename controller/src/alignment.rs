@@ -3,7 +3,7 @@
 //! Enabling takes the references from an encoder, which rounds to a count; a stream starts at a
 //! planned position. The rest between the two is faded out before the first setpoint is played.
 
-use crate::feedforward::Planned;
+use crate::planned::Planned;
 use machine::Machine;
 use machine::motor::StepperMotor;
 use messages::time::Period;

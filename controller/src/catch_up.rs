@@ -5,7 +5,7 @@
 //! in speed, is faded out of the positions that steppers are told. Where the loops are closed here it
 //! is a following error, and the loops take it back. Either takes time, which light has to wait for.
 
-use crate::feedforward::Planned;
+use crate::planned::Planned;
 use machine::{Machine, Motor};
 use messages::math;
 use messages::time::Period;
@@ -82,8 +82,8 @@ impl CatchUp {
         self.left == 0
     }
 
-    /// Goes on by one cycle, and adds what is left to `planned`.
-    pub fn apply(&mut self, planned: &mut Planned) {
+    /// Goes on by one cycle, and adds what is left to `angle` [rad] and `speed` [rad/s].
+    pub fn apply(&mut self, angle: &mut ActuatorArray, speed: &mut ActuatorArray) {
         if self.is_done() {
             return;
         }
@@ -93,14 +93,14 @@ impl CatchUp {
         let (square, cube) = (at * at, at * at * at);
         // The quintics that begin with a position, and with a speed, without acceleration, and end at
         // rest in 0; and their slopes.
-        let position = 1.0 + cube * (at * (15.0 - 6.0 * at) - 10.0);
-        let position_slope = -30.0 * square * (1.0 - at) * (1.0 - at);
-        let speed = at + cube * (at * (8.0 - 3.0 * at) - 6.0);
+        let by_offset = 1.0 + cube * (at * (15.0 - 6.0 * at) - 10.0);
+        let offset_slope = -30.0 * square * (1.0 - at) * (1.0 - at);
+        let by_speed = at + cube * (at * (8.0 - 3.0 * at) - 6.0);
         let speed_slope = 1.0 + square * (at * (32.0 - 15.0 * at) - 18.0);
-        let planned = planned.angle.iter_mut().zip(&mut planned.speed);
-        for ((angle, rate), (offset, slope)) in planned.zip(self.offset.iter().zip(&self.slope)) {
-            *angle += offset * position + slope * duration * speed;
-            *rate += offset / duration * position_slope + slope * speed_slope;
+        let each = angle.iter_mut().zip(speed);
+        for ((angle, speed), (offset, slope)) in each.zip(self.offset.iter().zip(&self.slope)) {
+            *angle += offset * by_offset + slope * duration * by_speed;
+            *speed += offset / duration * offset_slope + slope * speed_slope;
         }
     }
 }
@@ -120,7 +120,7 @@ mod tests {
         let (mut before, mut speed_before) = (coasted.angle, coasted.speed);
         for _ in 0..48 {
             let mut planned = Planned::default();
-            fading.apply(&mut planned);
+            fading.apply(&mut planned.angle, &mut planned.speed);
             for axis in 0..2 {
                 // The speed is the derivative of the angle: the trapezoid differs by jerk·T³/12.
                 let moved = planned.angle[axis] - before[axis];
@@ -133,7 +133,7 @@ mod tests {
         }
         assert!(before.iter().chain(&speed_before).all(|rest| rest.abs() < 1e-12));
         let mut planned = Planned::default();
-        fading.apply(&mut planned);
+        fading.apply(&mut planned.angle, &mut planned.speed);
         assert_eq!(planned, Planned::default());
     }
 

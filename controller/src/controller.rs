@@ -20,7 +20,8 @@
 //! | `Pulsing` | driven | stand | a test pulse |
 //! | `Halted` | driven | stand | off |
 //! | `Running` | driven | the stream, at a rate | as the stream says |
-//! | `Holding`, `Stopping` | driven | along the stream to rest | off |
+//! | `Holding` | driven | along the stream to rest | off, with what was on its way given |
+//! | `Stopping` | driven | along the stream to rest | off |
 //! | `Stopping` after a fault | driven while the axes follow, else quick stop | the same | off |
 //!
 //! Where the table says driven, each actuator follows the target of its own mode
@@ -51,10 +52,13 @@ use crate::alignment::Alignment;
 use crate::cascade::Cascade;
 use crate::catch_up::CatchUp;
 use crate::exchange::{Inputs, Outputs, Peers, Presence};
-use crate::feedforward::{Feedforward, Planned};
+use crate::feedforward::Feedforward;
 use crate::homing::Homing;
 use crate::intake::Intake;
+use crate::latency::Latencies;
+use crate::light::Light;
 use crate::outputs::Switching;
+use crate::planned::Planned;
 use crate::player::{Event, Player};
 use crate::reference::Reference;
 use crate::safety::Safety;
@@ -97,6 +101,7 @@ pub struct Controller {
     fault: Fault,
     intake: Intake,
     player: Player,
+    light: Light,
     alignment: Alignment,
     catch_up: CatchUp,
     feedforward: Feedforward,
@@ -153,6 +158,7 @@ impl Controller {
             fault: Fault::default(),
             intake: Intake::new(),
             player: Player::new(machine),
+            light: Light::new(&Latencies::of(machine), period),
             alignment: Alignment::default(),
             catch_up: CatchUp::default(),
             feedforward: Feedforward::new(machine),
@@ -221,6 +227,7 @@ impl Controller {
         self.transition(now, feedback);
         self.advance(feedback);
         self.await_settled(settling, now);
+        self.keep_dark();
         if self.state.follows()
             && let Err(finding) =
                 self.supervision.motion(feedback, &self.feedforward.now().angle, self.bounded())
@@ -310,7 +317,7 @@ impl Controller {
             let (value, limit) = (f64::from(self.losses), f64::from(MOST_LOSSES));
             let fault = Fault::new(FaultCode::StaleCommand);
             self.fail(Finding::sound(fault.beyond(FaultQuantity::Losses, value, limit)), now);
-        } else if self.state == State::Running {
+        } else if matches!(self.state, State::Running | State::Holding(AfterRest::Pause)) {
             self.state = State::Holding(AfterRest::Resume);
         }
     }
@@ -322,6 +329,7 @@ impl Controller {
             self.fault = finding.fault.at(now);
         }
         self.player.hold();
+        self.light.put_out();
         self.give_up_travel(MotionEnd::Fault);
         self.state = match self.state {
             State::Disabled | State::Faulted => State::Faulted,
@@ -342,10 +350,11 @@ impl Controller {
         if elapsed.missed == 0 {
             return 0;
         }
+        let is_fading = !self.catch_up.is_done();
         self.catch_up = CatchUp::default();
         // The newest command may have come too late; for the cycles after its own there was none.
         let newest_missed = elapsed.missed >= elapsed.cycles;
-        let last = *if newest_missed { self.feedforward.next() } else { self.feedforward.after() };
+        let last = self.feedforward.told(usize::from(newest_missed));
         if newest_missed {
             self.pass_in_the_dark(now);
         }
@@ -361,7 +370,8 @@ impl Controller {
         }
         let catch_up = self.feedforward.coasted(&last, elapsed.missed);
         // Squaring is so slow that what it goes on by matters nothing.
-        if self.follows_positions && (self.playing != 0 || !self.travel.is_at_rest()) {
+        let moves = self.playing != 0 || is_fading || !self.travel_rests();
+        if self.follows_positions && moves {
             self.feedforward.put_coasted(&last, elapsed.missed);
             self.catch_up = catch_up;
         }
@@ -370,21 +380,36 @@ impl Controller {
 
     /// Drives kept the cycle of the newest command dark: light that was lost in it is gone back for.
     fn pass_in_the_dark(&mut self, now: Nanoseconds) {
-        if self.playing != 0
-            && let Some(from) = self.player.pass_in_the_dark(self.intake.lookahead())
-        {
-            self.go_back_for_light(from, now);
+        if self.playing != 0 && self.light.is_due() {
+            self.lose_light(now);
         }
     }
 
     /// Light waits for axes that need so many cycles to be on the plan again.
     fn await_settled(&mut self, cycles: u64, now: Nanoseconds) {
-        if cycles > 0
-            && self.playing != 0
-            && let Some(from) = self.player.unsettle(cycles, self.intake.lookahead())
-        {
-            self.go_back_for_light(from, now);
+        if cycles == 0 || self.playing == 0 {
+            return;
         }
+        let (from, lookahead) = (self.light.from(), self.intake.lookahead());
+        if self.light.is_coming() || self.player.is_lit_soon(from, cycles, lookahead) {
+            self.lose_light(now);
+        }
+    }
+
+    /// Light that is on its way while there must be none is for after the resume.
+    fn keep_dark(&mut self) {
+        if self.playing != 0 && self.safety.is_dark() && self.light.is_coming() {
+            self.player.lose(self.light.from());
+            self.light.put_out();
+        }
+    }
+
+    /// Light that was to be sent, and what follows it, is not: it is gone back for.
+    fn lose_light(&mut self, now: Nanoseconds) {
+        let from = self.light.from();
+        self.light.put_out();
+        self.player.lose(from);
+        self.go_back_for_light(from, now);
     }
 
     /// Goes on by one cycle along the stream, or stands.
@@ -412,17 +437,17 @@ impl Controller {
             return;
         }
         if self.playing == 0 {
-            let mut next = match self.squaring.advance() {
+            let next = match self.squaring.advance() {
                 Some(next) => next,
                 None => self.travel_on(),
             };
-            self.catch_up.apply(&mut next);
-            self.feedforward.advance(next);
+            self.feedforward.advance(next, &mut self.catch_up);
             return;
         }
         let event = self.player.advance(self.intake.lookahead());
         let lookahead = self.intake.lookahead_mut();
         lookahead.pass(self.player.now().time);
+        self.light.advance(self.player.given(lookahead));
         let mut planned = self.feedforward.plan(lookahead, self.player.after());
         // A cycle may pass several setpoints, or none.
         let [from, to] = [self.player.next(), self.player.after()].map(|it| it.time.sequence());
@@ -430,12 +455,11 @@ impl Controller {
             self.statistics.setpoint(lookahead.setpoint(sequence), self.player.after());
         }
         self.alignment.apply(&mut planned);
-        self.catch_up.apply(&mut planned);
-        self.feedforward.advance(planned);
+        self.feedforward.advance(planned, &mut self.catch_up);
         // Whoever stops for good does not wait.
         if matches!(self.state, State::Running | State::Holding(_)) {
             match event {
-                Event::Paused => self.state = State::Holding(AfterRest::Wait),
+                Event::Paused => self.state = State::Holding(AfterRest::Pause),
                 Event::Starved => self.state = State::Holding(AfterRest::Supply { waited: 0 }),
                 Event::None | Event::Ended => {}
             }

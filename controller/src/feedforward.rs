@@ -4,37 +4,31 @@
 //! of two position references, because the measured velocity is the difference of two encoder
 //! positions: any other pair costs 95–250 µm at the tool (source 003, the pilot).
 //!
-//! The voltage belongs to the cycle in which it acts. The mean of `R·i + L·i′ + k·ω` over that
-//! cycle is `R·ī + L·(i₂ − i₁)/T + k·(θ₂ − θ₁)/T`. One cycle late costs 43 µm, half a cycle 26 µm.
+//! The voltage belongs to the cycle in which it acts, which is the latency of its actuator after the deadline
+//! at which it is sent. The mean of `R·i + L·i′ + k·ω` over that cycle is
+//! `R·ī + L·(i₂ − i₁)/T + k·(θ₂ − θ₁)/T`. One cycle late costs 43 µm, half a cycle 26 µm.
 //!
 //! Coulomb friction has the sign of the planned motion. Where a motor turns round inside a cycle,
 //! its mean over the cycle is weighted by how long either direction lasts.
 
 use crate::cascade::Reference;
 use crate::catch_up::CatchUp;
+use crate::latency::{Latencies, Latency};
 use crate::lookahead::Lookahead;
+use crate::planned::{Planned, Point};
 use crate::player::Instant;
 use crate::winding::Winding;
 use machine::{Actuator, ActuatorMode, Machine};
-use messages::time::{Period, SETPOINT_TIME};
-use messages::{ActuatorArray, MAX_ACTUATORS, Nanoseconds};
+use messages::delay::{Delay, Recent};
+use messages::time::Period;
+use messages::{ActuatorArray, MAX_ACTUATORS};
 
 /// Planned speed below which a motor counts as standing [rad/s]: less than a count of any usual
 /// encoder in a minute. However slowly it creeps above that, friction is against it.
 const STANDING: f64 = machine::Friction::STANDING;
 
-/// What the plan asks of the motors at one instant.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Planned {
-    /// Angle [rad].
-    pub angle: ActuatorArray,
-    /// Speed, the exact derivative [rad/s].
-    pub speed: ActuatorArray,
-    /// Torque without Coulomb friction [N·m].
-    pub torque: ActuatorArray,
-    /// Where the tool shall be, machine frame [m].
-    pub tool: [f64; 3],
-}
+/// Cycles from the start of the newest command's cycle back to the feedback that it answers.
+const ANSWER: usize = 1;
 
 /// Targets for the cycle in which the command acts.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -48,18 +42,32 @@ pub struct Target {
     pub effort: f64,
 }
 
-/// Turns the stream into references and voltages, keeping the last four instants.
+/// Turns the stream into references and voltages.
+///
+/// It keeps what the player has come to in the newest cycles, and for each of them how far the targets were
+/// off it, where axes are brought back to the plan. *Back* counts cycles: in the plan from the player's
+/// newest instant, in targets from the end of the cycle of the newest command.
 #[derive(Debug, Clone)]
 pub struct Feedforward {
     period: Period,
     /// Its time [s].
     cycle_time: f64,
     actuators: Vec<Actuator>,
+    latencies: Latencies,
     windings: Vec<Option<Winding>>,
-    before: Planned,
+    plan: Recent<Planned>,
+    off: Recent<Off>,
+    /// What the motors have been told for the instant of the feedback.
     now: Planned,
-    next: Planned,
-    after: Planned,
+}
+
+/// How far targets are off the plan.
+#[derive(Debug, Clone, Copy, Default)]
+struct Off {
+    /// [rad].
+    angle: ActuatorArray,
+    /// [rad/s].
+    speed: ActuatorArray,
 }
 
 impl Feedforward {
@@ -67,54 +75,90 @@ impl Feedforward {
     pub fn new(machine: &Machine) -> Self {
         let resting = Planned { tool: machine.home, ..Planned::default() };
         let period = machine.realtime.period;
+        let latencies = Latencies::of(machine);
+        // The end and the start of the command's cycle, the instant of the feedback, and the one before that.
+        let kept = 2 + ANSWER + 1;
+        let windings = machine.actuators.iter().zip(&latencies.actuators);
         Self {
             period,
             cycle_time: period.seconds(),
             actuators: machine.actuators.clone(),
-            windings: (machine.actuators.iter())
-                .map(|actuator| actuator.motor.dc().map(|motor| Winding::new(motor, period)))
+            windings: windings
+                .map(|(actuator, latency)| {
+                    let motor = actuator.motor.dc()?;
+                    Some(Winding::new(motor, period, latency.acts))
+                })
                 .collect(),
-            before: resting,
+            plan: Recent::of(resting, latencies.ahead + kept),
+            off: Recent::of(Off::default(), latencies.longest() + kept),
             now: resting,
-            next: resting,
-            after: resting,
+            latencies,
         }
     }
 
-    /// What the plan has for the instant of the feedback.
+    /// What the motors have been told for the instant of the feedback.
     pub fn now(&self) -> &Planned {
         &self.now
     }
 
-    /// What the plan has for the start of the cycle in which the command acts.
-    pub fn next(&self) -> &Planned {
-        &self.next
+    /// What the plan has for the newest instant that the player has come to.
+    pub fn newest(&self) -> &Planned {
+        self.plan.back(0)
     }
 
-    /// What the plan has for the end of the cycle in which the command acts.
-    pub fn after(&self) -> &Planned {
-        &self.after
+    /// Whether the plan stands from the end of the cycle of the newest command, of the actuator with the longest
+    /// latency, to the newest instant.
+    pub fn rests(&self) -> bool {
+        let mut told = (0..=self.latencies.ahead).map(|back| self.plan.back(back));
+        told.all(|planned| planned.speed.iter().all(|speed| *speed == 0.0))
+    }
+
+    /// What the motors have been told for the end of the cycle of the newest command, each by its own latency, or
+    /// `back` cycles before that.
+    pub fn told(&self, back: usize) -> Planned {
+        let (mut told, off) = (self.sent(back), self.off.back(back));
+        for index in 0..self.actuators.len().min(MAX_ACTUATORS) {
+            told.set(index, told.point(index).off(off.angle[index], off.speed[index]));
+        }
+        told
+    }
+
+    /// What the plan has for that.
+    fn sent(&self, back: usize) -> Planned {
+        let mut sent = *self.plan.back(self.latencies.ahead + back);
+        for index in 0..self.actuators.len().min(MAX_ACTUATORS) {
+            sent.set(index, self.planned(index, back));
+        }
+        sent
     }
 
     /// The way back to the plan for axes that went on from `last` by themselves, for `cycles`, to the
     /// end of the newest command.
     pub fn coasted(&self, last: &Planned, cycles: u64) -> CatchUp {
-        CatchUp::new(&last.coasted(self.period.of(cycles)), &self.after, self.period)
+        CatchUp::new(&last.coasted(self.period.of(cycles)), &self.sent(0), self.period)
     }
 
-    /// Has the axes where such a coasting left them, and where they were a cycle before.
+    /// Has the axes where such a coasting left them, and where they were in the cycles before.
     pub fn put_coasted(&mut self, last: &Planned, cycles: u64) {
-        let put = |planned: &mut Planned, coasted: &Planned| {
-            (planned.angle, planned.speed) = (coasted.angle, coasted.speed);
-        };
-        put(&mut self.next, &last.coasted(self.period.of(cycles.saturating_sub(1))));
-        put(&mut self.after, &last.coasted(self.period.of(cycles)));
+        let told = usize::try_from(cycles).unwrap_or(usize::MAX).min(self.off.count() - 1);
+        for back in 0..=told {
+            let coasted = last.coasted(self.period.of(cycles - back as u64));
+            let sent = self.sent(back);
+            let off = self.off.back_mut(back);
+            for index in 0..MAX_ACTUATORS {
+                off.angle[index] = coasted.angle[index] - sent.angle[index];
+                off.speed[index] = coasted.speed[index] - sent.speed[index];
+            }
+        }
+        self.measure();
     }
 
     /// Rests where `resting` is from now on, as if it always had. The voltage that this takes is given
     /// as soon as the motors are powered: `current` is what flows then [A], `None` before.
     pub fn rest_at(&mut self, resting: Planned, current: Option<&ActuatorArray>) {
-        (self.before, self.now, self.next, self.after) = (resting, resting, resting, resting);
+        self.plan.fill(resting);
+        self.off.fill(Off::default());
+        self.now = resting;
         for (index, actuator) in self.actuators.iter().enumerate() {
             let voltage = self.voltage(index, actuator);
             let Some(winding) = &mut self.windings[index] else { continue };
@@ -127,111 +171,38 @@ impl Feedforward {
 
     /// The motors' places are told otherwise by `shift` [rad] from now on: nothing moves.
     pub fn shift(&mut self, shift: &ActuatorArray) {
-        for planned in [&mut self.before, &mut self.now, &mut self.next, &mut self.after] {
+        for planned in self.plan.iter_mut().chain([&mut self.now]) {
             planned.angle.iter_mut().zip(shift).for_each(|(angle, shift)| *angle += shift);
         }
     }
 
-    /// Goes on by one cycle, to `planned` at its end.
-    pub fn advance(&mut self, planned: Planned) {
+    /// Goes on by one cycle, with the player at `planned`. The targets of the command are off it as much as
+    /// `catch_up` says.
+    pub fn advance(&mut self, planned: Planned, catch_up: &mut CatchUp) {
         for (index, actuator) in self.actuators.iter().enumerate() {
             let voltage = self.voltage(index, actuator);
-            let Self { next, after, windings, .. } = self;
-            let Some(winding) = &mut windings[index] else { continue };
-            winding.advance(
-                voltage,
-                (after.angle[index] - next.angle[index]) / self.cycle_time,
-                after.speed[index] - next.speed[index],
-            );
+            let [from, to] = self.ends(index);
+            let Some(winding) = &mut self.windings[index] else { continue };
+            let mean = (to.angle - from.angle) / self.cycle_time;
+            winding.advance(voltage, mean, to.speed - from.speed);
         }
-        (self.before, self.now, self.next, self.after) = (self.now, self.next, self.after, planned);
+        self.plan.push(planned);
+        let mut off = Off::default();
+        catch_up.apply(&mut off.angle, &mut off.speed);
+        self.off.push(off);
+        self.measure();
     }
 
-    /// What the stream asks of the motors at `instant`: the setpoint itself where there is one,
-    /// else between two by cubic Hermite interpolation of position and lead, linear for torques.
+    /// What the stream asks of the motors at `instant`.
     pub fn plan(&self, lookahead: &Lookahead, instant: Instant) -> Planned {
-        let sequence = instant.time.sequence();
-        let fraction = instant.time.fraction();
-        let from = lookahead.setpoint(sequence);
-        let to = lookahead.setpoint(sequence + 1);
-        let earlier = lookahead.setpoint(sequence.saturating_sub(1));
-        let (rate, change) = (instant.rate, instant.rate_change);
-        let mut planned = Planned { tool: from.tool, ..Planned::default() };
-        if fraction == 0.0 {
-            for (index, actuator) in self.actuators.iter().enumerate().take(MAX_ACTUATORS) {
-                let slope = |from: f64, to: f64| (to - from) / (2.0 * SETPOINT_TIME);
-                let lead_speed = slope(earlier.lead[index], to.lead[index]);
-                let static_speed = slope(earlier.static_lead[index], to.static_lead[index]);
-                let demand = Demand {
-                    position: from.position[actuator.axis],
-                    velocity: from.velocity[actuator.axis],
-                    lead: from.lead[index],
-                    lead_speed,
-                    static_lead: from.static_lead[index],
-                    static_speed,
-                    lead_momentum: from.lead_momentum[index],
-                    effort: from.effort[index],
-                    standing: from.static_effort[index],
-                    momentum: from.momentum[index],
-                };
-                planned.put(index, actuator, &demand, rate, change);
-            }
-            return planned;
-        }
-        let later = lookahead.setpoint(sequence + 2);
-        let linear = |from: f64, to: f64| from + (to - from) * fraction;
-        for (index, actuator) in self.actuators.iter().enumerate().take(MAX_ACTUATORS) {
-            let (position, velocity) = hermite(
-                from.position[actuator.axis],
-                from.velocity[actuator.axis] * SETPOINT_TIME,
-                to.position[actuator.axis],
-                to.velocity[actuator.axis] * SETPOINT_TIME,
-                fraction,
-            );
-            let (lead, lead_speed) = hermite(
-                from.lead[index],
-                (to.lead[index] - earlier.lead[index]) / 2.0,
-                to.lead[index],
-                (later.lead[index] - from.lead[index]) / 2.0,
-                fraction,
-            );
-            let (static_lead, static_speed) = hermite(
-                from.static_lead[index],
-                (to.static_lead[index] - earlier.static_lead[index]) / 2.0,
-                to.static_lead[index],
-                (later.static_lead[index] - from.static_lead[index]) / 2.0,
-                fraction,
-            );
-            let demand = Demand {
-                position,
-                velocity: velocity / SETPOINT_TIME,
-                lead,
-                lead_speed: lead_speed / SETPOINT_TIME,
-                static_lead,
-                static_speed: static_speed / SETPOINT_TIME,
-                lead_momentum: linear(from.lead_momentum[index], to.lead_momentum[index]),
-                effort: linear(from.effort[index], to.effort[index]),
-                standing: linear(from.static_effort[index], to.static_effort[index]),
-                momentum: linear(from.momentum[index], to.momentum[index]),
-            };
-            planned.put(index, actuator, &demand, rate, change);
-        }
-        let around: [&[f64; 3]; 8] = core::array::from_fn(|index| {
-            &lookahead.setpoint((sequence + index as u64).saturating_sub(3)).tool
-        });
-        for (index, tool) in planned.tool.iter_mut().enumerate() {
-            let tool_at = around.map(|tool| tool[index]);
-            let [from_slope, to_slope] = [slope(&tool_at[..7]), slope(&tool_at[1..])];
-            (*tool, _) = hermite(tool_at[3], from_slope, tool_at[4], to_slope, fraction);
-        }
-        planned
+        Planned::at(&self.actuators, lookahead, instant)
     }
 
     /// References and voltage for the actuator with this index.
     pub fn reference(&self, index: usize, actuator: &Actuator) -> Reference {
         Reference {
             position: self.now.angle[index],
-            velocity: (self.now.angle[index] - self.before.angle[index]) / self.cycle_time,
+            velocity: (self.now.angle[index] - self.at_feedback(index, 1).angle) / self.cycle_time,
             current: self.windings[index].as_ref().map_or(0.0, Winding::now),
             voltage: self.voltage(index, actuator),
         }
@@ -242,12 +213,12 @@ impl Feedforward {
     fn voltage(&self, index: usize, actuator: &Actuator) -> f64 {
         let Some(motor) = actuator.motor.dc() else { return 0.0 };
         let friction = actuator.friction.coulomb / motor.torque_constant;
-        let current = |planned: &Planned| planned.torque[index] / motor.torque_constant;
-        let (first, last) = (current(&self.next), current(&self.after));
-        let [from, mean, to] = self.directions(index);
+        let ends = self.ends(index);
+        let [first, last] = ends.map(|end| end.torque / motor.torque_constant);
+        let [from, mean, to] = directions(ends);
         let mean_current = (first + last) / 2.0 + friction * mean;
         let current_change = last - first + friction * (to - from);
-        let angle_change = self.after.angle[index] - self.next.angle[index];
+        let angle_change = ends[1].angle - ends[0].angle;
         motor.voltage(
             mean_current,
             current_change / self.cycle_time,
@@ -257,13 +228,14 @@ impl Feedforward {
 
     /// Targets for the actuator with this index.
     pub fn target(&self, index: usize, actuator: &Actuator) -> Target {
-        let [_, mean, _] = self.directions(index);
-        let torque = (self.next.torque[index] + self.after.torque[index]) / 2.0;
+        let ends @ [from, to] = self.ends(index);
+        let [_, mean, _] = directions(ends);
+        let torque = (from.torque + to.torque) / 2.0;
         Target {
-            position: self.after.angle[index],
+            position: to.angle,
             velocity: match actuator.mode {
-                ActuatorMode::Position => self.after.speed[index],
-                _ => (self.after.angle[index] - self.next.angle[index]) / self.cycle_time,
+                ActuatorMode::Position => to.speed,
+                _ => (to.angle - from.angle) / self.cycle_time,
             },
             effort: torque + actuator.friction.coulomb * mean,
         }
@@ -272,82 +244,62 @@ impl Feedforward {
     /// The fastest that the plan has this motor turn between the measurement and the end of the
     /// command [rad/s].
     pub fn fastest(&self, index: usize) -> f64 {
-        let instants = [&self.now, &self.next, &self.after];
-        instants.iter().map(|planned| planned.speed[index].abs()).fold(0.0, f64::max)
+        let [from, to] = self.ends(index);
+        let speeds = [self.now.speed[index], from.speed, to.speed];
+        speeds.into_iter().map(f64::abs).fold(0.0, f64::max)
     }
 
-    /// Direction of the planned motion at the start of the cycle in which the command acts, its
-    /// mean over the cycle, and at the end; −1..=1.
-    fn directions(&self, index: usize) -> [f64; 3] {
-        let moving = |speed: f64| if speed.abs() < STANDING { 0.0 } else { speed };
-        let (from, to) = (moving(self.next.speed[index]), moving(self.after.speed[index]));
-        let size = from.abs() + to.abs();
-        // Speed taken as linear in the cycle: each direction lasts in proportion to its speed.
-        let mean = if size > 0.0 { (from + to) / size } else { 0.0 };
-        [direction(from), mean, direction(to)]
+    /// The motor with this index at the start and at the end of the cycle in which the command acts.
+    fn ends(&self, index: usize) -> [Point; 2] {
+        [1, 0].map(|back| {
+            let off = self.off.back(back);
+            self.planned(index, back).off(off.angle[index], off.speed[index])
+        })
     }
-}
 
-/// The stream's demands on one actuator at one instant, at the planned rate: the motion of its joint, and what is
-/// its own.
-struct Demand {
-    position: f64,
-    velocity: f64,
-    lead: f64,
-    lead_speed: f64,
-    static_lead: f64,
-    static_speed: f64,
-    lead_momentum: f64,
-    effort: f64,
-    standing: f64,
-    momentum: f64,
-}
-
-impl Planned {
-    /// This, `time` later at an even speed.
-    fn coasted(&self, time: Nanoseconds) -> Self {
-        let time = time.seconds();
-        Self {
-            angle: core::array::from_fn(|index| self.angle[index] + self.speed[index] * time),
-            ..*self
+    /// Where the plan has the motor with this index at the end of the cycle of the command, or `back`
+    /// cycles before that.
+    fn planned(&self, index: usize, back: usize) -> Point {
+        let Delay { cycles, part, .. } = self.latencies.actuators[index].behind;
+        let later = self.plan.back(cycles + back);
+        if part == 0.0 {
+            return later.point(index);
         }
+        let earlier = self.plan.back(cycles + back + 1);
+        earlier.between(later, 1.0 - part, self.cycle_time, index)
     }
 
-    /// Joint to motor, at `rate` and its `change`.
-    fn put(&mut self, index: usize, actuator: &Actuator, demand: &Demand, rate: f64, change: f64) {
-        let square = rate * rate;
-        let lead = demand.static_lead
-            + (demand.lead - demand.static_lead) * square
-            + demand.lead_momentum * change;
-        let lead_speed = demand.static_speed + (demand.lead_speed - demand.static_speed) * square;
-        let speed = (demand.velocity + lead_speed) * rate / actuator.ratio;
-        self.angle[index] = (demand.position + lead) / actuator.ratio;
-        self.speed[index] = speed;
-        self.torque[index] = demand.standing
-            + (demand.effort - demand.standing) * square
-            + demand.momentum * change
-            + actuator.friction.viscous * speed;
+    /// What the motor with this index has been told for the instant of the feedback, or `back` cycles before
+    /// that.
+    fn at_feedback(&self, index: usize, back: usize) -> Point {
+        let Latency { acts: Delay { cycles, part, .. }, .. } = self.latencies.actuators[index];
+        let sent = 1 + ANSWER + back;
+        let off = |values: fn(&Off) -> &ActuatorArray| {
+            let value = |back: usize| values(self.off.back(back))[index];
+            let later = value(sent + cycles);
+            if part == 0.0 { later } else { later + (value(sent + cycles + 1) - later) * part }
+        };
+        let planned = self.plan.back(self.latencies.ahead + sent).point(index);
+        planned.off(off(|off| &off.angle), off(|off| &off.speed))
+    }
+
+    /// Looks up what the motors have been told for the instant of the feedback.
+    fn measure(&mut self) {
+        let mut now = *self.plan.back(self.latencies.ahead + 1 + ANSWER);
+        for index in 0..self.actuators.len().min(MAX_ACTUATORS) {
+            now.set(index, self.at_feedback(index, 0));
+        }
+        self.now = now;
     }
 }
 
-fn direction(speed: f64) -> f64 {
-    if speed.abs() < STANDING { 0.0 } else { speed.signum() }
-}
-
-/// Slope at the middle one of seven values: exact to the sixth order, so that the cubics between them are
-/// the motion itself but for the cycles about a jump of its jerk.
-fn slope(values: &[f64]) -> f64 {
-    let rise = |distance: usize| values[3 + distance] - values[3 - distance];
-    (45.0 * rise(1) - 9.0 * rise(2) + rise(3)) / 60.0
-}
-
-/// Value and slope at `at` in 0..1 of the cubic with these values and slopes at 0 and 1.
-fn hermite(from: f64, from_slope: f64, to: f64, to_slope: f64, at: f64) -> (f64, f64) {
-    let rise = to - from;
-    let square = 3.0 * rise - 2.0 * from_slope - to_slope;
-    let cube = from_slope + to_slope - 2.0 * rise;
-    (
-        from + at * (from_slope + at * (square + at * cube)),
-        from_slope + at * (2.0 * square + at * 3.0 * cube),
-    )
+/// Direction of the planned motion at the start of a cycle with these `ends`, its mean over the cycle, and at
+/// the end; −1..=1.
+fn directions(ends: [Point; 2]) -> [f64; 3] {
+    let [from, to] = ends.map(|end| if end.speed.abs() < STANDING { 0.0 } else { end.speed });
+    let size = from.abs() + to.abs();
+    // Speed taken as linear in the cycle: each direction lasts in proportion to its speed.
+    let mean = if size > 0.0 { (from + to) / size } else { 0.0 };
+    let direction = |speed: f64| if speed == 0.0 { 0.0 } else { speed.signum() };
+    [direction(from), mean, direction(to)]
 }

@@ -3,7 +3,7 @@
 use crate::lookahead::Lookahead;
 use crate::stream_time::StreamTime;
 use messages::time::{Period, SETPOINT_PERIOD};
-use messages::{GateEdge, LaserCycle};
+use messages::{GateEdge, LaserCycle, TooManyEdges};
 
 /// A stretch of stream played in one cycle, at the rate it has on average.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,10 +22,6 @@ impl Stretch {
         (self.to - self.from).0 as f64 / StreamTime::in_cycles(1, self.period).0 as f64
     }
 }
-
-/// The edges of more than one setpoint fall into one cycle and do not fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TooManyEdges;
 
 /// The laser over `stretch`, dark before `dark_until`. Edges keep their stream time; power follows
 /// the rate, so that each length of line gets the same light, down to `min_power`: below it the source

@@ -10,7 +10,7 @@
 
 use core::ops::Range;
 
-use crate::feedforward::Planned;
+use crate::planned::Planned;
 use crate::travel::Travel;
 use machine::operating::{Homing as Method, HomingMethod, InputFunction};
 use machine::{JointUnit, Machine};

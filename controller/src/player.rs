@@ -4,21 +4,25 @@
 //! Three instants are in the making. `now` belongs to the feedback that is being answered, `next`
 //! to the deadline at which the answer takes effect, `after` to the one at which it ends. `next`
 //! was promised by the previous command, so a decision taken now acts from `next` on: the gate at
-//! once, the rate up to `after`.
+//! once, the rate up to `after`. Drives with a [latency](crate::latency) have `next` and `after` so many cycles
+//! later, and `now` stays that of the feedback.
 //!
-//! A hold closes the gate at `next` and brakes. The point where it closed stays the boundary of
+//! A hold closes the gate at `next`, with all light before that given, and brakes. The point where it closed stays the boundary of
 //! the dark. A resume goes back the way that it takes to come up to full rate and a little more, and
 //! lights exactly where light was first left out; where limits hinder the rate, below full rate and with
 //! power in proportion. Where no light was left out, nothing is played again.
 
-use crate::gate::{self, Stretch, TooManyEdges};
+use crate::gate::{self, Stretch};
+use crate::latency::Latencies;
+use crate::light::Given;
 use crate::lookahead::Lookahead;
 use crate::motion_limits::{Course, MotionLimits};
 use crate::ramp::{Pace, Ramp, Rate, Slew};
 use crate::stream_time::{ONE, StreamTime};
 use machine::Machine;
+use messages::delay::Recent;
 use messages::setpoint::flags;
-use messages::{LaserCycle, Nanoseconds};
+use messages::{LaserCycle, Nanoseconds, TooManyEdges};
 
 /// The overrides that can be asked for.
 const OVERRIDES: core::ops::RangeInclusive<f64> = 0.1..=2.0;
@@ -85,9 +89,12 @@ pub struct Player {
     pace: Pace,
     /// Cycles after which a stop ignores the limits.
     patience: u64,
-    now: Instant,
     next: Instant,
     after: Instant,
+    /// The instants that `next` has been, from the newest one back to that of the feedback.
+    recent: Recent<Instant>,
+    /// How far commands have come at most.
+    reached: StreamTime,
     ramp: Ramp,
     activity: Activity,
     /// Whether the stretch from `next` to `after` may be lit.
@@ -113,9 +120,10 @@ impl Player {
         Self {
             pace: Pace::new(period),
             patience: period.cycles_for(PATIENCE),
-            now: Instant::default(),
             next: Instant::default(),
             after: Instant::default(),
+            recent: Recent::of(Instant::default(), Latencies::of(machine).ahead + 2),
+            reached: StreamTime::default(),
             ramp: Ramp::new(),
             activity: Activity::Resting,
             marking: false,
@@ -131,7 +139,9 @@ impl Player {
 
     /// Back to before the first setpoint; the override stays.
     pub fn rewind(&mut self) {
-        (self.now, self.next, self.after) = Default::default();
+        (self.next, self.after) = Default::default();
+        self.recent.fill(Instant::default());
+        self.reached = StreamTime::default();
         self.ramp = Ramp::new();
         (self.activity, self.marking) = (Activity::Resting, false);
         (self.dark_until, self.unlit_from) = Default::default();
@@ -161,10 +171,10 @@ impl Player {
 
     /// The instant of the feedback.
     pub fn now(&self) -> Instant {
-        self.now
+        *self.recent.back(self.recent.count() - 1)
     }
 
-    /// The deadline at which the command takes effect.
+    /// The deadline at which the newest decision takes effect.
     pub fn next(&self) -> Instant {
         self.next
     }
@@ -176,7 +186,7 @@ impl Player {
 
     /// Whether nothing moves, as far as commands have gone out.
     pub fn is_at_rest(&self) -> bool {
-        self.is_resting() && self.now.time == self.after.time
+        self.is_resting() && self.now().time == self.after.time
     }
 
     /// Whether it waits for [`Self::resume`].
@@ -199,34 +209,20 @@ impl Player {
         }
     }
 
-    /// Drives had no command for the stretch from `next` to `after`, which was dark: brakes if light was
-    /// to be given in it, and gives the place where it was lost.
-    pub fn pass_in_the_dark(&mut self, lookahead: &Lookahead) -> Option<StreamTime> {
-        let marking = core::mem::take(&mut self.marking);
-        if !marking || !self.is_light_due(lookahead) {
-            return None;
-        }
-        let from = self.next.time.max(self.dark_until);
-        self.brake_in_the_dark(from);
-        self.unlit_from = Some(from);
-        Some(from)
+    /// Light from `from` on is not given, though it was to be: brakes, and goes back for it with a resume.
+    pub fn lose(&mut self, from: StreamTime) {
+        self.marking = false;
+        self.activity = Activity::Braking(0);
+        (self.dark_until, self.unlit_from) = (from, Some(from));
+        // A pause behind it is kept once more, with that light given.
+        self.paused_until = self.paused_until.min(from.sequence() + 1);
     }
 
-    /// The axes are off the plan at `next`, and need so many cycles to come back to it: brakes if light
-    /// is due before that, and gives the place from which it is left out.
-    pub fn unsettle(&mut self, cycles: u64, lookahead: &Lookahead) -> Option<StreamTime> {
-        let from = self.next.time.max(self.dark_until);
-        let playing = matches!(self.activity, Activity::Playing(_));
-        if !playing
-            || !lookahead
-                .is_lit(from, self.after.time + StreamTime::in_cycles(cycles, self.pace.period()))
-        {
-            return None;
-        }
-        self.brake_in_the_dark(from);
-        self.marking = false;
-        self.unlit_from = Some(from);
-        Some(from)
+    /// Whether light is due from `from` on before the stream has been played for `cycles` more.
+    pub fn is_lit_soon(&self, from: StreamTime, cycles: u64, lookahead: &Lookahead) -> bool {
+        let passed = StreamTime::in_cycles(cycles, self.pace.period());
+        matches!(self.activity, Activity::Playing(_))
+            && lookahead.is_lit(from, self.after.time + passed)
     }
 
     /// Brakes; the gate was last open before `from`.
@@ -276,8 +272,9 @@ impl Player {
         if self.marking && self.unlit_from.is_some_and(|from| from < self.after.time) {
             self.unlit_from = None;
         }
-        self.now = self.next;
         self.next = self.after;
+        self.recent.push(self.next);
+        self.reached = self.reached.max(self.recent.back(self.recent.count() - 2).time);
         self.marking = matches!(self.activity, Activity::Playing(_));
         let from = self.next.time;
         if self.activity == Activity::Resting {
@@ -403,12 +400,15 @@ impl Player {
         event
     }
 
-    /// The laser from `next` to `after`.
-    ///
-    /// # Errors
-    /// More edges than a cycle can hold.
-    pub fn laser(&self, lookahead: &Lookahead) -> Result<LaserCycle, TooManyEdges> {
-        if self.marking { self.light(lookahead) } else { Ok(gate::dark(lookahead, self.next.time)) }
+    /// The light from `next` to `after`.
+    pub fn given(&self, lookahead: &Lookahead) -> Given {
+        let dark = || Ok(gate::dark(lookahead, self.next.time));
+        Given {
+            laser: if self.marking { self.light(lookahead) } else { dark() },
+            from: self.next.time,
+            to: self.after.time,
+            dark_until: self.dark_until,
+        }
     }
 
     /// What the stream has of light between `next` and `after` that was not given before.
@@ -420,7 +420,7 @@ impl Player {
 
     /// Where the digital outputs stand: they do not go back with a rewind.
     pub fn outputs_at(&self) -> StreamTime {
-        self.next.time.max(self.dark_until)
+        self.reached
     }
 
     /// The setpoint where the stream itself rests that `after` has come to, and whether the program

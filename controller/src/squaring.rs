@@ -3,7 +3,7 @@
 //! Each comes up at its own home reference, or where it was pushed to while it was unpowered. The joint is in
 //! the mean of their springs, and it stays there: every actuator goes to where the joint is.
 
-use crate::feedforward::Planned;
+use crate::planned::Planned;
 use machine::Machine;
 use messages::{ActuatorArray, MAX_ACTUATORS, Nanoseconds};
 

@@ -3,7 +3,7 @@
 
 use core::fmt;
 
-use crate::feedforward::Planned;
+use crate::planned::Planned;
 use machine::kinematics::{Joints, Mechanism};
 use machine::{Actuator, Machine, MechanismVisitor};
 use messages::time::Period;

@@ -58,6 +58,8 @@ pub(crate) enum HomingStage {
 pub(crate) enum AfterRest {
     /// A person decides.
     Wait,
+    /// The same, once the light before the program's pause has been given.
+    Pause,
     /// The stream goes on.
     Resume,
     /// The stream goes on when enough of it has come in.

@@ -2,7 +2,7 @@
 
 use crate::cascade::Drive;
 use crate::digest::Digest;
-use crate::feedforward::Planned;
+use crate::planned::Planned;
 use crate::player::Instant;
 use machine::{Actuator, Axis, Machine};
 use messages::{

@@ -8,7 +8,7 @@
 
 mod course;
 
-use crate::feedforward::Planned;
+use crate::planned::Planned;
 use machine::{Directions, Machine};
 use messages::{ActuatorArray, MAX_ACTUATORS, MAX_AXES};
 

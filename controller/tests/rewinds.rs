@@ -48,7 +48,10 @@ fn way_back(machine: &Machine, times: f64, moment: u64, stall: u64) -> f64 {
         // A stall, in the middle of which the hold may begin.
         cycle(&mut player, &mut lookahead);
         if at < stall {
-            player.pass_in_the_dark(&lookahead);
+            let given = player.given(&lookahead);
+            if given.laser.unwrap().is_lit() {
+                player.lose(given.from.max(given.dark_until));
+            }
         }
     }
     assert!(player.is_at_rest(), "{:?}", player.now());

@@ -17,7 +17,7 @@
 //! - *Slip*: an overrun that simulated drives waited for; the deadlines that follow moved.
 //! - *Skipped*: a cycle that drives, with strict deadlines, was too late for. Nobody measures in it,
 //!   the gate is closed, the axes go on with what was in force, and the cycle numbers go on with the
-//!   time: the deadline of cycle `n` stays `start + n × period`.
+//!   time: the deadline of cycle `n` stays `start + n × period`, by the clock of the bus where there is one.
 //! - *Stall*: a time in which the cycle stood still; see [`messages::Stalls`].
 
 use machine::{Machine, Timing};
@@ -26,7 +26,8 @@ use messages::{
     MAX_ACTUATORS, Nanoseconds, RealtimeFacts, StallCause, feedback::status,
 };
 
-use crate::port::{self, Actuation, Freshness, Measurement, Port, PortError, Power};
+use crate::discipline::Discipline;
+use crate::port::{self, Actuation, Freshness, Measurement, Port, PortClock, PortError, Power};
 use crate::stalls::{Stall, StallAccount};
 pub use crate::watchdog::GatePermission;
 use crate::watchdog::{Watch, Watchdog};
@@ -99,6 +100,9 @@ pub struct Bridge {
     in_force: Actuation,
     measurement: Measurement,
     feedback: Feedback,
+    discipline: Discipline,
+    /// By how much the deadline to come is moved, beside a period after the one before.
+    moved: Nanoseconds,
     slips: u64,
     /// Cycles without a single encoder count.
     resting: u64,
@@ -132,6 +136,8 @@ impl Bridge {
             in_force: Actuation::DISABLED,
             measurement: Measurement::default(),
             feedback: Feedback { epoch: options.epoch, ..Feedback::default() },
+            discipline: Discipline::new(options.timing.period),
+            moved: Nanoseconds(0),
             slips: 0,
             resting: 0,
             lack: None,
@@ -268,6 +274,18 @@ impl Bridge {
         }
     }
 
+    /// By how much the next deadline is to be moved, beside a period after this one, to follow the clock of
+    /// the port; once in a cycle, after its work.
+    pub fn follow_clock(&mut self) -> Nanoseconds {
+        self.moved = match (self.port.profile().clock, self.measurement.clock_offset) {
+            (PortClock::Bus, Some(ahead)) => self.discipline.follow(ahead),
+            (PortClock::Bus, None) => self.discipline.coast(),
+            (PortClock::Ours, _) => Nanoseconds(0),
+        };
+        self.port.moved(self.moved);
+        self.moved
+    }
+
     /// The newest feedback.
     pub fn feedback(&self) -> &Feedback {
         &self.feedback
@@ -313,7 +331,7 @@ impl Bridge {
     /// deadlines that cycles were skipped. Counts either; returns how many were skipped.
     fn count_late(&mut self, now: Nanoseconds, deadline: Nanoseconds) -> u64 {
         let period = self.options.timing.period;
-        let due = self.feedback.deadline + period.time();
+        let due = self.feedback.deadline + period.time() + self.moved;
         let late = deadline - due;
         if self.phase == Phase::Unstarted || late.0 <= 0 {
             return 0;

@@ -14,6 +14,7 @@
 #![allow(rustdoc::broken_intra_doc_links)]
 
 pub mod bridge;
+pub mod discipline;
 #[cfg(feature = "ethercat")]
 pub mod ethercat;
 pub mod fired;

@@ -14,6 +14,8 @@
 //!   [`PlantOptions::current_resolution`].
 //! - The light follows the gate after the delays of the laser source; gate edges fall where they
 //!   are asked, to the nanosecond.
+//! - Targets and the gate act by the latencies of the machine file after they are sent; a disabling and the dark at
+//!   once, and so does a quick stop of DC motors: steppers brake at the end of what they were told.
 //! - A brake holds the shaft of an unpowered motor as friction does. It closes at once, and holds on for
 //!   its `brake_release` after the power has come.
 //! - Several motors on an axis pull its joint by a spring each, their shares of the transmission's. The
@@ -45,11 +47,12 @@ use machine::transmission::equilibrium;
 use machine::{
     Actuator, ActuatorMode, Axis, LaserSource, Machine, Mechanism, MechanismVisitor, Motor,
 };
+use messages::delay::{Delay, Recent};
 use messages::random::SplitMix64;
 use messages::time::Period;
 use messages::{
     ActuatorArray, CommandMode, Fault, FaultCode, FaultQuantity, GateEdge, LaserCycle,
-    MAX_ACTUATORS, Nanoseconds,
+    MAX_ACTUATORS, Nanoseconds, TooManyEdges,
 };
 use nalgebra::SVector;
 
@@ -173,17 +176,17 @@ impl MechanismVisitor for Build<'_> {
         let Build { machine, options } = self;
         let home = &machine.home_joints;
         let Machine { axes, actuators, laser, realtime, .. } = machine;
-        let period = realtime.period;
+        let (period, gate_latency) = (realtime.period, machine.drives.gate_latency);
         // One size for all machines with several motors on an axis, so that no more has to be compiled.
         if actuators.len() == axes.len() {
             let plant =
                 Plant::<N, M>::new(mechanism, axes, actuators, laser, home, period, options)?;
-            return Ok(Box::new(plant));
+            return Ok(Box::new(plant.with_gate_latency(gate_latency)));
         }
         let plant = Plant::<N, M, MAX_ACTUATORS>::new(
             mechanism, axes, actuators, laser, home, period, options,
         )?;
-        Ok(Box::new(plant))
+        Ok(Box::new(plant.with_gate_latency(gate_latency)))
     }
 }
 
@@ -199,6 +202,9 @@ pub struct Plant<const N: usize, M: Mechanism<N>, const A: usize = N> {
     servos: [Option<Servo>; A],
     /// The drivers of steppers.
     stepping: Option<Stepping<A>>,
+    /// What the gate is asked for in the newest cycles, and by how much later it does it.
+    gate: Recent<LaserCycle>,
+    gate_latency: Delay,
     source: Source,
     weights: Weights<A>,
     substeps: u32,
@@ -270,7 +276,7 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
                 equilibrium::field_ahead(actuator, gravity[axis]).map_err(PlantError::Hold)?;
             origin[row] = angle[row] + field / ratio;
         }
-        let stepping = Stepping::of(axes, actuators, origin, period.seconds());
+        let stepping = Stepping::of(axes, actuators, origin, period);
         let field = stepping.as_ref().map(|stepping| stepping.field(angle));
         let dynamics = Dynamics::new(mechanism, motors, chain)?.with_field(field);
 
@@ -287,9 +293,11 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             brake: Brake::of(axes, actuators),
             servos: core::array::from_fn(|row| {
                 let actuator = actuators.get(row)?;
-                Servo::of(actuator, period.seconds())
+                Servo::of(actuator, period)
             }),
             motors: actuators.len(),
+            gate: Recent::of(LaserCycle::OFF, 2),
+            gate_latency: Delay::default(),
             source: Source::new(laser, period),
             weights: motors.windings.weights(period.seconds() / f64::from(substeps)),
             substeps,
@@ -311,6 +319,14 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             measured: Measurement::default(),
             profile: profile(actuators),
         })
+    }
+
+    /// With a gate that acts by `latency` after the deadline at which it is asked.
+    pub fn with_gate_latency(mut self, latency: Nanoseconds) -> Self {
+        self.gate_latency = Delay::of(latency, self.period);
+        self.gate = Recent::of(LaserCycle::OFF, self.gate_latency.cycles + 2);
+        self.profile.gate_latency = latency;
+        self
     }
 
     /// Where the plant is, in truth.
@@ -357,7 +373,7 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
                     let servos = &mut self.servos;
                     Phases::Driven(SVector::from_fn(|row, _| {
                         let Some(Some(servo)) = servos.get_mut(row) else { return 0.0 };
-                        let voltage = servo.voltage(actuation, row, at, motor_state(state, row));
+                        let voltage = servo.voltage(at, motor_state(state, row));
                         saturate(voltage, motors.voltage[row])
                     }))
                 }
@@ -531,15 +547,18 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
     fn cycle(&mut self) {
         let Some(in_force) = self.in_force else { return };
         self.advance(&in_force);
-        let told = self.source.cycle(&in_force.laser).and_then(|light| self.tell(&light));
-        if told == Err(source::TooManyEdges) {
-            self.fail(impossible_light(&in_force.laser));
+        let Delay { cycles, .. } = self.gate_latency;
+        let [before, after] = [cycles + 1, cycles].map(|back| *self.gate.back(back));
+        let gate = LaserCycle::across(&before, &after, self.gate_latency, self.period);
+        let light = gate.and_then(|gate| self.source.cycle(&gate));
+        if light.and_then(|light| self.tell(&light)) == Err(TooManyEdges) {
+            self.fail(impossible_light(&after));
         }
         self.passed_cycles = self.passed_cycles.saturating_add(1);
     }
 
     /// Adds the light of a cycle to what the laser did since the last exchange.
-    fn tell(&mut self, light: &LaserCycle) -> Result<(), source::TooManyEdges> {
+    fn tell(&mut self, light: &LaserCycle) -> Result<(), TooManyEdges> {
         let start = self
             .passed_cycles
             .saturating_mul(u32::try_from(self.period.time().0).unwrap_or(u32::MAX));
@@ -551,7 +570,7 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
         let changes = (self.light.last() != (light.gate, light.power)).then_some(&first);
         for edge in changes.into_iter().chain(light.edges()) {
             if !self.light.push(GateEdge { offset: edge.offset.saturating_add(start), ..*edge }) {
-                return Err(source::TooManyEdges);
+                return Err(TooManyEdges);
             }
         }
         Ok(())
@@ -577,6 +596,11 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             if let Some(servo) = servo {
                 servo.engage(&accepted, row, motor_state(&self.state, row));
             }
+        }
+        match accepted.mode {
+            CommandMode::Driven => self.gate.push(accepted.laser),
+            // There is nothing on its way.
+            CommandMode::Disabled | CommandMode::QuickStop => self.gate.fill(LaserCycle::OFF),
         }
         self.in_force = Some(accepted);
         accepted.mode

@@ -122,8 +122,8 @@ pub struct Measurement {
     /// What the laser did since the previous measurement; offsets count from there, through the cycles
     /// that passed since.
     pub laser: LaserCycle,
-    /// Where the port has a clock that ours shall follow: its time at the deadline minus the deadline, less
-    /// what it was when the port was opened [ns].
+    /// Where the port has a clock that ours shall follow: how far it is ahead of where it should be at the
+    /// deadline, a whole number of periods after the first one and the [moves](Port::moved) since [ns].
     pub clock_offset: Option<Nanoseconds>,
     /// The port's own fault, latched until the mode is [`CommandMode::Disabled`]; its `at` is set
     /// by the bridge.
@@ -286,6 +286,12 @@ pub trait Port: Send {
     /// touched here. A plant that moves only when it is told moves on.
     fn pass(&mut self, actuation: &Actuation) {
         let _ = actuation;
+    }
+
+    /// Deadlines come later by so much from the next one on, to follow the clock of the port; earlier where it
+    /// is negative.
+    fn moved(&mut self, by: Nanoseconds) {
+        let _ = by;
     }
 
     /// Sets the inputs of a simulated machine that have no place of their own, one bit each; hardware has

@@ -193,6 +193,7 @@ impl ServiceCycle {
                 return self.publish(&report);
             }
             clock.advance();
+            clock.shift(self.bridge.follow_clock());
             if self.deadlines == Deadlines::Slipping {
                 clock.slip();
             }

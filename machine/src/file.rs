@@ -7,6 +7,7 @@ pub mod bounds;
 pub mod drives;
 pub mod frame;
 mod laser;
+mod loops;
 pub mod mechanism;
 pub mod motors;
 pub mod operating;

@@ -205,7 +205,7 @@ fn loops_that_swing_in_a_long_cycle_are_refused_and_defaults_follow_it() {
     let swings = |place: &str| {
         format!(
             "{place}: a current loop of 349 rad/s swings without end in a control cycle of 4 ms; lower \
-             `loops.current`: a third of 1/period is safe; or shorten the period"
+             `loops.current`: 83 rad/s is safe; or shorten the period"
         )
     };
     let long = "[realtime]\nperiod = \"4 ms\"\n[laser]";

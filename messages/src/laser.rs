@@ -1,5 +1,7 @@
 //! The laser's part of a cycle: gate, power, and when inside the cycle they change.
 
+use crate::delay::Delay;
+use crate::time::Period;
 use crate::{Nanoseconds, sample};
 
 /// The most gate edges one cycle can hold, of the setpoints or of control; the planner refuses a job
@@ -36,6 +38,10 @@ sample! {
         edges: [GateEdge; MAX_EDGES],
     }
 }
+
+/// More changes of the laser fall into one cycle than a [`LaserCycle`] can tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TooManyEdges;
 
 impl LaserCycle {
     /// A cycle in the dark.
@@ -87,11 +93,51 @@ impl LaserCycle {
         self.edge_count += 1;
         true
     }
+
+    /// The cycle that is the end of `before`, as much as the part of `delay` says, and then the beginning of
+    /// `after`: what two cycles of this `period` in a row do later by that part.
+    ///
+    /// # Errors
+    /// More changes than a cycle can hold.
+    pub fn across(
+        before: &Self,
+        after: &Self,
+        delay: Delay,
+        period: Period,
+    ) -> Result<Self, TooManyEdges> {
+        if delay.rest == Nanoseconds(0) {
+            return Ok(*after);
+        }
+        let shift = i64::min(delay.rest.0, period.time().0) as u32;
+        let start = period.time().0 as u32 - shift;
+        let passed = before.edges().iter().take_while(|edge| edge.offset <= start).last();
+        let (gate, power) =
+            passed.map_or((before.gate, before.power), |edge| (edge.gate, edge.power));
+        let mut cycle = Self { gate, power, ..Self::OFF };
+        // It changes in the dark only.
+        cycle.frequency = if after.is_lit() { after.frequency } else { before.frequency };
+        let first = GateEdge { offset: 0, gate: after.gate, power: after.power };
+        let late = before.edges().iter().filter(|edge| edge.offset > start);
+        let late = late.map(|edge| GateEdge { offset: edge.offset - start, ..*edge });
+        let changes = (before.last() != (after.gate, after.power)).then_some(first);
+        let early = changes.into_iter().chain(after.edges().iter().copied());
+        let early = early.filter(|edge| edge.offset < start);
+        let early = early.map(|edge| GateEdge { offset: edge.offset + shift, ..edge });
+        for edge in late.chain(early) {
+            if !cycle.push(edge) {
+                return Err(TooManyEdges);
+            }
+        }
+        Ok(cycle)
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{GateEdge, LaserCycle, MAX_EDGES};
+    use super::{GateEdge, LaserCycle, MAX_EDGES, TooManyEdges};
+    use crate::Nanoseconds;
+    use crate::delay::Delay;
+    use crate::time::Period;
     use crate::time::SETPOINT_PERIOD as PERIOD;
 
     fn edge(offset: u32, gate: u32, power: f64) -> GateEdge {
@@ -133,6 +179,33 @@ mod tests {
         for edge_count in [count, u32::MAX] {
             assert!(!LaserCycle { edge_count, ..LaserCycle::OFF }.is_valid(PERIOD), "{edge_count}");
         }
+    }
+
+    #[test]
+    fn a_later_cycle_is_the_end_of_one_and_the_beginning_of_the_next() {
+        let before = cycle(0, 0.0, &[edge(100_000, 3, 0.5), edge(800_000, 0, 0.0)]);
+        let after = cycle(4, 0.25, &[edge(300_000, 0, 0.0), edge(700_000, 5, 1.0)]);
+        let delay = |time: i64| Delay::of(Nanoseconds(time), Period::OF_SETPOINTS);
+        let across =
+            |time: i64| LaserCycle::across(&before, &after, delay(time), Period::OF_SETPOINTS);
+        assert_eq!(across(0), Ok(after));
+        let quarter = [
+            edge(50_000, 0, 0.0),
+            edge(250_000, 4, 0.25),
+            edge(550_000, 0, 0.0),
+            edge(950_000, 5, 1.0),
+        ];
+        assert_eq!(across(250_000), Ok(cycle(3, 0.5, &quarter)));
+        let most = [edge(100_000, 3, 0.5), edge(800_000, 0, 0.0)]
+            .map(|it| edge(it.offset - 1000, it.gate, it.power));
+        let most = [most[0], most[1], edge(999_000, 4, 0.25)];
+        assert_eq!(across(999_000), Ok(cycle(0, 0.0, &most)));
+        // No change where one goes on as the other ended.
+        let lit = cycle(2, 0.5, &[]);
+        assert_eq!(LaserCycle::across(&lit, &lit, delay(500_000), Period::OF_SETPOINTS), Ok(lit));
+        let full = cycle(0, 0.0, &[edge(400_000, 1, 0.5); MAX_EDGES]);
+        let beyond = LaserCycle::across(&full, &full, delay(700_000), Period::OF_SETPOINTS);
+        assert_eq!(beyond, Err(TooManyEdges));
     }
 
     #[test]

@@ -11,6 +11,7 @@
 pub mod artwork;
 pub mod axis;
 pub mod command;
+pub mod delay;
 pub mod fault;
 pub mod feedback;
 pub mod finite;
@@ -37,7 +38,7 @@ pub use command::{Command, CommandMode};
 pub use fault::{Fault, FaultCode, FaultQuantity};
 pub use feedback::Feedback;
 pub use job::{JobOffer, PlannerPhase, PlannerReport};
-pub use laser::{GateEdge, LaserCycle, MAX_EDGES};
+pub use laser::{GateEdge, LaserCycle, MAX_EDGES, TooManyEdges};
 pub use motion::MotionEnd;
 pub use operator::{OperatorReply, OperatorRequest, OperatorVerb, SimulatedInputs};
 pub use progress::Progress;

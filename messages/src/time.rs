@@ -22,7 +22,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 pub struct Nanoseconds(pub i64);
 
 /// The number of a control cycle since drives started; the deadline of cycle `n` is
-/// `start + n × period`, and later where the clock may slip.
+/// `start + n × period`, by the clock of a bus where there is one, and later where the clock may slip.
 #[derive(
     Debug,
     Clone,

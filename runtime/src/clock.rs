@@ -58,7 +58,7 @@ pub fn sleep_then_spin_until(deadline: Nanoseconds, margin: Nanoseconds) {
     }
 }
 
-/// The absolute deadlines of a cycle: `start + n × period`, without drift.
+/// The absolute deadlines of a cycle: `start + n × period`, without drift, unless they are moved.
 #[derive(Debug, Clone)]
 pub struct PeriodicClock {
     period: Nanoseconds,
@@ -107,6 +107,12 @@ impl PeriodicClock {
     pub fn advance(&mut self) -> Nanoseconds {
         self.deadline = self.deadline + self.period;
         self.deadline
+    }
+
+    /// Moves this and all later deadlines by `time`, earlier where it is negative: for drives that follow
+    /// another clock.
+    pub fn shift(&mut self, time: Nanoseconds) {
+        self.deadline = self.deadline + time;
     }
 
     /// Moves this and all later deadlines so that this one is not before now: for drives that can

@@ -73,7 +73,7 @@ impl Controller {
         if self.playing == 0 {
             return LaserCycle::OFF;
         }
-        let Ok(laser) = self.player.laser(self.intake.lookahead()) else {
+        let Ok(laser) = self.light.due() else {
             let limit = MAX_EDGES as f64;
             let fault = Fault::new(FaultCode::SetpointLimit);
             let fault = fault.beyond(FaultQuantity::Edges, limit + 1.0, limit);

@@ -3,7 +3,7 @@
 use super::Controller;
 use super::operating::{Jog, Probing};
 use super::requests::Refused;
-use crate::feedforward::Planned;
+use crate::planned::Planned;
 use crate::state::{HomingStage, State};
 use crate::test_pulse::TestPulse;
 use crate::travel::{Beyond, MOVERS};
@@ -214,7 +214,7 @@ impl Controller {
 
     /// Where the plan has the axes rest or move now, and the tool with them.
     fn stood(&mut self) -> Planned {
-        let mut standing = *self.feedforward.after();
+        let mut standing = *self.feedforward.newest();
         let mut borne = standing;
         if self.standing.bear(&mut borne) {
             standing.tool = borne.tool;

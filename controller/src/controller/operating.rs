@@ -1,8 +1,8 @@
 //! Homing, jogging, probing, and what the inputs do to them.
 
 use super::Controller;
-use crate::feedforward::Planned;
 use crate::homing::{GroupOutcome, Seen};
+use crate::planned::Planned;
 use crate::reference::bit;
 use crate::squaring::Squaring;
 use crate::state::{AfterRest, HomingStage, State};
@@ -78,9 +78,14 @@ impl Controller {
         if matches!(self.state, State::Homing(_)) { 0 } else { self.reference.homed() }
     }
 
+    /// Whether what moves without a stream rests, as far as drives have been told.
+    pub(super) fn travel_rests(&self) -> bool {
+        self.travel.is_at_rest() && (self.playing != 0 || self.feedforward.rests())
+    }
+
     /// Goes on by one cycle where axes are moved without a stream, or stands.
     pub(super) fn travel_on(&mut self) -> Planned {
-        let standing = *self.feedforward.after();
+        let standing = *self.feedforward.newest();
         if self.travel.is_at_rest() {
             return standing;
         }
@@ -241,7 +246,7 @@ impl Controller {
 
     /// How fast the plan has the joint of an axis go on [joint units/s].
     fn joint_speed(&self, axis: usize) -> f64 {
-        let speed = &self.feedforward.after().speed;
+        let speed = &self.feedforward.newest().speed;
         let own = self.machine.actuators.iter().zip(speed).filter(|(it, _)| it.axis == axis);
         own.map(|(it, speed)| it.share * (speed * it.ratio)).sum()
     }
@@ -267,7 +272,7 @@ impl Controller {
                     inputs: feedback.inputs,
                     angle: &feedback.position,
                     current: &feedback.current,
-                    standing: self.feedforward.after(),
+                    standing: self.feedforward.newest(),
                 };
                 match self.homing.step(&seen, &mut self.travel) {
                     GroupOutcome::Searching => {}
@@ -286,7 +291,7 @@ impl Controller {
                 }
             }
             HomingStage::Squaring { begun: false } => {
-                self.squaring = Squaring::new(&self.machine, self.feedforward.after());
+                self.squaring = Squaring::new(&self.machine, self.feedforward.newest());
                 self.state = State::Homing(HomingStage::Squaring { begun: true });
             }
             HomingStage::Squaring { begun: true } if self.squaring.is_done() => {
@@ -297,7 +302,7 @@ impl Controller {
                     self.state = State::Homing(HomingStage::Returning);
                 }
             }
-            HomingStage::Returning if self.travel.is_at_rest() => {
+            HomingStage::Returning if self.travel_rests() => {
                 self.rest_by_hand(MotionEnd::Reached);
             }
             HomingStage::Squaring { .. } | HomingStage::Returning => {}
@@ -306,7 +311,7 @@ impl Controller {
 
     /// Sends the axes that were homed to where they stand at home.
     fn go_home(&mut self) {
-        let standing = *self.feedforward.after();
+        let standing = *self.feedforward.newest();
         for axis in 0..self.machine.axes.len().min(MAX_AXES) {
             if !self.homing.took_part(axis) {
                 continue;
@@ -331,7 +336,7 @@ impl Controller {
             self.travel.stop(mover);
         }
         self.probing.before = place;
-        if self.travel.is_at_rest() {
+        if self.travel_rests() {
             let is_found = self.probing.found.is_some();
             self.rest_by_hand(if is_found { MotionEnd::Reached } else { MotionEnd::NotTouched });
         }

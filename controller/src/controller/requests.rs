@@ -91,6 +91,7 @@ impl Controller {
             }
             (OperatorVerb::Stop, State::Running | State::Holding(_)) => {
                 self.player.hold();
+                self.light.put_out();
                 self.state = State::Stopping;
             }
             (

@@ -55,6 +55,9 @@ impl Controller {
             State::Running if !self.is_over() && self.alignment.is_done() => {
                 self.player.resume(self.intake.lookahead());
             }
+            State::Holding(AfterRest::Pause) if self.player.is_at_rest() => {
+                self.state = State::Holding(AfterRest::Wait);
+            }
             // Whatever it was held for, it needs the way to stop again.
             State::Holding(AfterRest::Resume) if self.player.is_at_rest() => {
                 self.await_supply(now, 0);
@@ -67,7 +70,7 @@ impl Controller {
                 self.state = State::Idle;
             }
             State::Homing(stage) => self.home(now, feedback, stage),
-            State::Jogging if self.travel.is_at_rest() => {
+            State::Jogging if self.travel_rests() => {
                 // Nobody has to speak for an axis that rests.
                 self.jogs = [None; MOVERS];
                 self.rest_by_hand(MotionEnd::Reached);
@@ -114,7 +117,7 @@ impl Controller {
         let rests = held > self.standing.release() && stands && strayed.is_none();
         let settled = if rests { settled + 1 } else { 0 };
         if settled >= self.waits.standing {
-            self.squaring = Squaring::new(&self.machine, self.feedforward.after());
+            self.squaring = Squaring::new(&self.machine, self.feedforward.newest());
             self.state = if self.squaring.is_done() {
                 State::Idle
             } else {
@@ -188,9 +191,10 @@ impl Controller {
     /// Begins the stream in hand, from where the axes stand.
     fn begin(&mut self, now: Nanoseconds, cycle: Cycle) {
         self.player.rewind();
+        self.light.rewind();
         let lookahead = self.intake.lookahead();
         let start = self.feedforward.plan(lookahead, self.player.after());
-        match Alignment::new(&self.machine, self.feedforward.after(), &start) {
+        match Alignment::new(&self.machine, self.feedforward.newest(), &start) {
             Ok(alignment) => {
                 self.alignment = alignment;
                 self.playing = self.intake.started();
@@ -227,12 +231,13 @@ impl Controller {
         self.completed = completed;
         self.intake.finish();
         self.player.rewind();
+        self.light.rewind();
         self.ended = Some(self.statistics.finish(completed, self.fault));
     }
 
     /// Whether the stream rests, and what a stall left behind has been compensated: without that the next motion would jump by it.
     fn stands_on_plan(&self) -> bool {
-        let rests = self.squaring.is_done() && self.travel.is_at_rest();
+        let rests = self.squaring.is_done() && self.travel_rests();
         self.player.is_at_rest() && self.catch_up.is_done() && rests
     }
 

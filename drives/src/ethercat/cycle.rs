@@ -76,7 +76,12 @@ pub struct BusCycle {
     before: LaserCycle,
     mode: CommandMode,
     fault: Fault,
-    clock_offset: Nanoseconds,
+    /// How far the clock of the bus is ahead, where this cycle has told.
+    clock_offset: Option<Nanoseconds>,
+    /// The largest of it so far, whichever way [ns].
+    clock_error_max: u64,
+    /// By how much deadlines have been moved since the port was opened [ns].
+    moved: i64,
 }
 
 impl BusCycle {
@@ -114,7 +119,9 @@ impl BusCycle {
             before: LaserCycle::OFF,
             mode: CommandMode::Disabled,
             fault: Fault::default(),
-            clock_offset: Nanoseconds(0),
+            clock_offset: None,
+            clock_error_max: 0,
+            moved: 0,
         }
     }
 
@@ -123,9 +130,14 @@ impl BusCycle {
         &self.wire
     }
 
-    /// The largest distance of the clock of the bus from ours so far.
-    pub fn clock_offset(&self) -> Nanoseconds {
-        self.clock_offset
+    /// Deadlines come later by so much from the next one on.
+    pub fn moved(&mut self, by: Nanoseconds) {
+        self.moved = self.moved.wrapping_add(by.0);
+    }
+
+    /// How far the clock of the bus was from our deadlines at most [ns].
+    pub fn clock_error_max(&self) -> u64 {
+        self.clock_error_max
     }
 
     /// The first deadline from `from` on at which the latency is that of the machine file.
@@ -208,6 +220,7 @@ impl BusCycle {
 
     /// Exchanges the process data, and says what was measured.
     pub fn receive(&mut self, measurement: &mut Measurement) {
+        self.clock_offset = None;
         self.wire.drain();
         let start = self.wire.now();
         let budget = Nanoseconds((self.period.0 as f64 * BUDGET) as i64);
@@ -231,12 +244,15 @@ impl BusCycle {
                 is_measured = true;
                 if let Some(time) = response.extra {
                     let ours = (start.0 + end.0) / 2;
-                    self.clock_offset =
-                        Nanoseconds((time as i64).wrapping_sub(ours).wrapping_sub(self.offset));
+                    let apart = (time as i64).wrapping_sub(ours).wrapping_sub(self.offset);
+                    let apart = apart.wrapping_add(self.moved);
+                    self.clock_offset = Some(Nanoseconds(apart));
                 }
                 // When it was read, nobody knows closer than to half of its way there and back.
                 let doubt = (end.0 - start.0).unsigned_abs() / 2;
-                let apart = self.clock_offset.0.unsigned_abs().saturating_sub(doubt);
+                let apart = self.clock_offset.map_or(0, |offset| offset.0.unsigned_abs());
+                let apart = apart.saturating_sub(doubt);
+                self.clock_error_max = self.clock_error_max.max(apart);
                 let apart = apart as f64 / self.period.0 as f64;
                 if apart > APART && self.mode != CommandMode::Disabled {
                     self.fail(Fault::new(FaultCode::DriveFault), NOT_SYNCHRONOUS);
@@ -344,7 +360,7 @@ impl BusCycle {
         }
         measurement.tool = None;
         measurement.laser = self.fired.take();
-        measurement.clock_offset = Some(self.clock_offset);
+        measurement.clock_offset = self.clock_offset;
         measurement.fault = self.fault;
     }
 

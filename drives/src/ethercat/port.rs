@@ -217,9 +217,14 @@ impl Port for EthercatPort {
         }
     }
 
+    fn moved(&mut self, by: Nanoseconds) {
+        if let Some(cycle) = &mut self.cycle {
+            cycle.moved(by);
+        }
+    }
+
     fn link(&self) -> LinkCounters {
         let Some(cycle) = &self.cycle else { return LinkCounters::default() };
-        let clock_error_max = cycle.clock_offset().0.unsigned_abs();
-        LinkCounters { clock_error_max, ..*cycle.wire().counters() }
+        LinkCounters { clock_error_max: cycle.clock_error_max(), ..*cycle.wire().counters() }
     }
 }

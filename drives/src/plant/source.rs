@@ -2,7 +2,7 @@
 
 use machine::LaserSource;
 use messages::time::Period;
-use messages::{GateEdge, LaserCycle, MAX_EDGES, Nanoseconds};
+use messages::{GateEdge, LaserCycle, MAX_EDGES, Nanoseconds, TooManyEdges};
 
 /// A change of the light that is still to come.
 #[derive(Debug, Clone, Copy, Default)]
@@ -12,10 +12,6 @@ struct Change {
     gate: u32,
     power: f64,
 }
-
-/// More changes of the light fall into one cycle than a [`LaserCycle`] can tell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TooManyEdges;
 
 /// The source with what it has been told and not yet done.
 #[derive(Debug, Clone, Copy)]

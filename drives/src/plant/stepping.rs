@@ -6,10 +6,14 @@
 //! pulses say: what the rotor does about it, nobody measures. A rotor more than two full steps away
 //! has fallen out of step, which this plant knows, and reports as a fault; a real driver may not.
 //!
+//! Positions act by the latency of their actuator after they are sent.
+//!
 //! Unpowered, only the teeth hold the rotor. The count then follows it, as if it were homed anew
 //! when the power comes back.
 
 use machine::{Actuator, Axis, StepperMotor};
+use messages::delay::{Delay, Recent};
+use messages::time::Period;
 use messages::{CommandMode, Fault, FaultCode, FaultQuantity};
 use nalgebra::SVector;
 
@@ -82,24 +86,27 @@ pub(super) struct Stepping<const N: usize> {
     deceleration: [f64; N],
     /// Commanded angles at home [rad]; pulses count from there.
     origin: SVector<f64, N>,
-    /// Commanded angles from home through the cycle at hand.
-    segments: [Segment; N],
+    latency: [Delay; N],
+    /// Commanded angles from home through the newest cycles.
+    told: Vec<Recent<Segment>>,
 }
 
 impl<const N: usize> Stepping<N> {
     /// The drivers of `actuators`, which drive `axes`, at home with the magnetic axes at `origin` [rad],
-    /// in cycles of `cycle_time` [s]; `None` where they have no steppers.
+    /// in cycles of this `period`; `None` where they have no steppers.
     pub(super) fn of(
         axes: &[Axis],
         actuators: &[Actuator],
         origin: SVector<f64, N>,
-        cycle_time: f64,
+        period: Period,
     ) -> Option<Self> {
         let first = *actuators.first()?.motor.stepper()?;
         let (mut motors, mut deceleration) = ([first; N], [0.0; N]);
+        let mut latency = [Delay::default(); N];
         for (row, actuator) in actuators.iter().enumerate().take(N) {
             motors[row] = *actuator.motor.stepper()?;
             deceleration[row] = brake::deceleration(axes.get(actuator.axis)?, actuator);
+            latency[row] = Delay::of(actuator.latency, period);
         }
         let count = actuators.len().min(N);
         Some(Self {
@@ -107,7 +114,13 @@ impl<const N: usize> Stepping<N> {
             count,
             deceleration,
             origin,
-            segments: [Segment::rest(0.0, cycle_time); N],
+            told: (latency.iter().take(count))
+                .map(|latency| {
+                    let rest = Segment::rest(0.0, period.seconds());
+                    Recent::of(rest, latency.cycles + 2)
+                })
+                .collect(),
+            latency,
         })
     }
 
@@ -133,18 +146,19 @@ impl<const N: usize> Stepping<N> {
         actuation: &Actuation,
         state: &State<J, N>,
     ) -> Result<(), Fault> {
-        let mut segments = self.segments;
-        for (row, segment) in segments.iter_mut().enumerate().take(self.count) {
-            let motor = &self.motors[row];
-            *segment = match (actuation.mode, actuation.freshness) {
+        let mut next: [Option<Segment>; N] = [None; N];
+        for (row, told) in self.told.iter().enumerate() {
+            let (motor, newest) = (&self.motors[row], told.back(0));
+            let segment = match (actuation.mode, actuation.freshness) {
                 (CommandMode::Disabled, _) => {
-                    Segment::rest(state.angle[row] - self.origin[row], segment.time)
+                    Segment::rest(state.angle[row] - self.origin[row], newest.time)
                 }
-                (CommandMode::Driven, Freshness::Fresh) => segment
-                    .then(actuation.position[row] - self.origin[row], actuation.velocity[row]),
+                (CommandMode::Driven, Freshness::Fresh) => {
+                    newest.then(actuation.position[row] - self.origin[row], actuation.velocity[row])
+                }
                 // Nobody said where to: on as before, for the few cycles that the bridge allows.
-                (CommandMode::Driven, Freshness::Stale) => segment.coast(),
-                _ => segment.brake(self.deceleration[row]),
+                (CommandMode::Driven, Freshness::Stale) => newest.coast(),
+                _ => newest.brake(self.deceleration[row]),
             };
             let rate = segment.fastest() * motor.pulses_per_radian();
             let follows = actuation.mode == CommandMode::Driven;
@@ -152,8 +166,15 @@ impl<const N: usize> Stepping<N> {
                 let fault = Fault::new(FaultCode::DriveFault).on_actuator(row);
                 return Err(fault.beyond(FaultQuantity::PulseRate, rate, motor.pulse_rate));
             }
+            next[row] = Some(segment);
         }
-        self.segments = segments;
+        for (told, segment) in self.told.iter_mut().zip(next.into_iter().flatten()) {
+            // Without power there is nothing on its way.
+            match actuation.mode {
+                CommandMode::Disabled => told.fill(segment),
+                _ => told.push(segment),
+            }
+        }
         Ok(())
     }
 
@@ -161,9 +182,10 @@ impl<const N: usize> Stepping<N> {
     /// the mean, so that each pulse counts from its instant on.
     pub(super) fn drive(&self, field: &mut Field<N>, [from, to]: [f64; 2], mode: CommandMode) {
         field.powered = mode != CommandMode::Disabled;
-        for (row, segment) in self.segments.iter().enumerate().take(self.count) {
-            let pulses = segment.mean_count(self.per_radian(row), from, to);
-            let (_, speed) = segment.at(0.5 * (from + to));
+        for row in 0..self.count {
+            let pulses = self.mean_count(row, from, to);
+            let (segment, at) = self.acting(row, 0.5 * (from + to));
+            let (_, speed) = segment.at(at);
             field.angle[row] = self.origin[row] + pulses / self.per_radian(row);
             field.speed[row] = speed;
             field.most[row] = self.motors[row].pull_out_torque(speed);
@@ -192,13 +214,50 @@ impl<const N: usize> Stepping<N> {
 
     /// Pulses sent to the end of the cycle.
     pub(super) fn counts(&self) -> [i64; N] {
-        core::array::from_fn(|row| count(self.per_radian(row), self.segments[row].to))
+        core::array::from_fn(|row| {
+            if row >= self.count {
+                return 0;
+            }
+            let (segment, at) = self.acting(row, 1.0);
+            count(self.per_radian(row), segment.at(at).0)
+        })
     }
 
     /// Slows all axes down in the next cycle.
     pub(super) fn brake(&mut self) {
-        for (segment, deceleration) in self.segments.iter_mut().zip(&self.deceleration) {
-            *segment = segment.brake(*deceleration);
+        for (told, deceleration) in self.told.iter_mut().zip(&self.deceleration) {
+            let segment = told.back(0).brake(*deceleration);
+            told.push(segment);
+        }
+    }
+
+    /// The count of pulses in the mean over the shares `from` to `to` of the cycle.
+    fn mean_count(&self, row: usize, from: f64, to: f64) -> f64 {
+        let per_radian = self.per_radian(row);
+        let Delay { cycles, part: turn, .. } = self.latency[row];
+        if turn == 0.0 {
+            return self.told[row].back(cycles).mean_count(per_radian, from, to);
+        }
+        let mean = |from: f64, to: f64| {
+            // What is asked for lies in one segment, whose end counts as its own.
+            let (segment, middle) = self.acting(row, 0.5 * (from + to));
+            let half = 0.5 * (to - from);
+            segment.mean_count(per_radian, middle - half, middle + half)
+        };
+        if turn <= from || turn >= to {
+            return mean(from, to);
+        }
+        (mean(from, turn) * (turn - from) + mean(turn, to) * (to - turn)) / (to - from)
+    }
+
+    /// The segment that acts at `share` of the cycle, and the share of it there.
+    fn acting(&self, row: usize, share: f64) -> (&Segment, f64) {
+        let Delay { cycles, part, .. } = self.latency[row];
+        let told = &self.told[row];
+        if share >= part {
+            (told.back(cycles), share - part)
+        } else {
+            (told.back(cycles + 1), 1.0 + share - part)
         }
     }
 

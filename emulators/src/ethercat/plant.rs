@@ -56,6 +56,7 @@ impl Plant {
         for actuator in &mut motors.actuators {
             (actuator.mode, actuator.latency) = (ActuatorMode::Voltage, Nanoseconds(0));
         }
+        motors.drives.gate_latency = Nanoseconds(0);
         let port = SimulatedPlant::new(&motors, options).map_err(PlantError::Plant)?;
         let period = LOOPS.time();
         let back_emf = machine.actuators.iter().map(|actuator| {

@@ -1,17 +1,18 @@
 //! From the axes' tables to [`Axis`] and [`Actuator`]: ratios, what the loops move, and the motors' own
 //! limits.
 
+use super::loops::{DeadTimes, gains};
 use super::motors::{counts, mode, motor};
-use super::tables::{AxisActuatorTable, AxisTable, LimitsTable, LoopsTable};
+use super::tables::{AxisActuatorTable, AxisTable, LimitsTable};
 use crate::actuator::{Actuator, Friction, HoldingBrake, LoopGains};
 use crate::axis::Axis;
-use crate::document::{Decode, Diagnostics, Either, ProblemKind, Quantity, Range, Span, Spanned};
+use crate::document::{Diagnostics, Either, ProblemKind, Quantity, Range, Spanned};
 use crate::limits::AxisLimits;
 use crate::motor::Motor;
 use crate::quantity::Kind;
 use crate::transmission::gear::Efficiency;
 use messages::Nanoseconds;
-use messages::time::{Period, SETPOINT_TIME};
+use messages::time::Period;
 
 pub(super) use crate::axis::JointUnit;
 
@@ -207,7 +208,7 @@ pub(super) fn axis(
             },
             encoder: counts(table, &motor, diagnostics)?,
             gains: match motor {
-                Motor::Dc(_) => gains(table, inertia, period, diagnostics)?,
+                Motor::Dc(_) => gains(table, inertia, DeadTimes::at_once(period), diagnostics)?,
                 Motor::Stepper(_) => {
                     LoopGains { position: 0.0, velocity: 0.0, current: 0.0, inertia }
                 }
@@ -265,72 +266,6 @@ fn backlash(
         );
     }
     backlash.value
-}
-
-/// The gains of the loops in cycles of `period`. Defaults suit 1 ms; where it is longer they are slower
-/// by as much, with what is written of them as it is. A command acts a cycle after its measurement, so a
-/// loop with a bandwidth of 1/period swings without end: it is refused.
-fn gains(
-    table: &AxisTable,
-    inertia: f64,
-    period: Period,
-    diagnostics: &mut Diagnostics,
-) -> Option<LoopGains> {
-    let defaults;
-    let loops = match &table.loops {
-        Some(loops) => loops,
-        None => {
-            defaults = LoopsTable::absent(table.span, diagnostics)?;
-            &defaults
-        }
-    };
-    let slower = (SETPOINT_TIME / period.seconds()).min(1.0);
-    // The place of a default is that of its table.
-    let in_period = |value: f64, span: Span| Spanned {
-        value: if span == loops.span { value * slower } else { value },
-        span,
-    };
-    let position = in_period(loops.position.value, loops.position.span);
-    let velocity = in_period(loops.velocity.value, loops.velocity.span);
-    let current = in_period(loops.current.value, loops.current.span);
-    for (bandwidth, word) in [(velocity, "velocity"), (current, "current")] {
-        if bandwidth.value * period.seconds() >= 1.0 {
-            diagnostics.contradict(
-                bandwidth.span,
-                format!(
-                    "a {word} loop of {} rad/s swings without end in a control cycle of {} ms",
-                    bandwidth.value,
-                    period.seconds() * 1e3
-                ),
-                &format!(
-                    "lower `loops.{word}`: a third of 1/period is safe; or shorten the period"
-                ),
-            );
-        }
-    }
-    for (inner, outer, words) in [
-        (velocity, position, ["velocity", "position"]),
-        (current, velocity, ["current", "velocity"]),
-    ] {
-        if outer.value >= inner.value {
-            // The place of a default is that of its table: what was written is what is wrong.
-            let span = if outer.span == loops.span { inner.span } else { outer.span };
-            diagnostics.contradict(
-                span,
-                format!(
-                    "the {} loop ({} rad/s) must be faster than the {} loop around it ({} rad/s)",
-                    words[0], inner.value, words[1], outer.value
-                ),
-                &format!("raise `loops.{}` or lower `loops.{}`", words[0], words[1]),
-            );
-        }
-    }
-    Some(LoopGains {
-        position: position.value,
-        velocity: velocity.value,
-        current: current.value,
-        inertia,
-    })
 }
 
 fn limits(

@@ -6,6 +6,7 @@ use super::axes::{Drive, Joint, axis};
 use super::bounds::BOUNDS;
 use super::drives;
 use super::laser;
+use super::loops;
 use super::mechanism::{self, Built};
 use super::motors;
 use super::operating::{self, operating};
@@ -39,15 +40,9 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         return diagnostics.fail();
     };
     let realtime = realtime(&table.realtime, &mut diagnostics);
-    let (axes, driven) = axes(&table, &tables, &joints, realtime.period, &mut diagnostics);
-    if diagnostics.is_empty() {
-        relations::check(&table, &mechanism, &joints, &axes, &driven, &mut diagnostics);
-    }
-    refuse_rigid_backlash(&mechanism, &table.axis, &mut diagnostics);
-    refuse_rigid_pairs(&mechanism, &table.axis, &mut diagnostics);
-    refuse_many(&table.axis, &driven, &mut diagnostics);
-    check_z(&table, &mechanism, &mut diagnostics);
-    let mut actuators: Vec<Actuator> = driven.into_iter().map(|(_, actuator)| actuator).collect();
+    let (axes, mut driven) = axes(&table, &tables, &joints, realtime.period, &mut diagnostics);
+    let mut actuators: Vec<Actuator> =
+        driven.iter().map(|(_, actuator)| actuator.clone()).collect();
     let operating = if axes.len() == joints.len() {
         let (inputs, outputs) = (table.inputs.as_ref(), table.outputs.as_ref());
         let safety = &table.safety;
@@ -57,6 +52,19 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         Operating::default()
     };
     let drives = drives::build(&table.drives, &mut actuators, &operating, &mut diagnostics);
+    if diagnostics.is_empty() {
+        for ((drive, own), actuator) in driven.iter_mut().zip(&mut actuators) {
+            loops::slow_down(actuator, &drive.table, realtime.period, &mut diagnostics);
+            *own = actuator.clone();
+        }
+    }
+    if diagnostics.is_empty() {
+        relations::check(&table, &mechanism, &joints, &axes, &driven, &mut diagnostics);
+    }
+    refuse_rigid_backlash(&mechanism, &table.axis, &mut diagnostics);
+    refuse_rigid_pairs(&mechanism, &table.axis, &mut diagnostics);
+    refuse_many(&table.axis, &driven, &mut diagnostics);
+    check_z(&table, &mechanism, &mut diagnostics);
     let laser = laser::source(&table.laser, &drives.kind, &mut diagnostics);
     let PathTable { speed, rapid, acceleration, jerk, tolerance, corners, span: _ } = &table.path;
     let gcode = &table.gcode;

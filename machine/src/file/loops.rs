@@ -1,0 +1,148 @@
+//! The control loops of an actuator: how fast they may be.
+
+use super::tables::{AxisTable, LoopsTable};
+use crate::actuator::{Actuator, LoopGains};
+use crate::document::{Decode, Diagnostics, Span, Spanned};
+use crate::drives::ActuatorMode;
+use crate::motor::Motor;
+use messages::Nanoseconds;
+use messages::time::Period;
+
+/// What a loop waits for its own answer.
+#[derive(Debug, Clone, Copy)]
+struct DeadTime {
+    period: Period,
+    latency: Nanoseconds,
+}
+
+impl DeadTime {
+    /// In cycles of `period`, with a drive that acts by `latency` after it is told.
+    fn of(period: Period, latency: Nanoseconds) -> Self {
+        Self { period, latency }
+    }
+
+    /// From a measurement to the start of the cycle in which its answer acts [s].
+    fn seconds(self) -> f64 {
+        self.period.seconds() + self.latency.seconds()
+    }
+
+    /// What makes a loop swing, in words.
+    fn words(self) -> String {
+        let milliseconds = |time: f64| format!("{} ms", time * 1e3);
+        let cycle = milliseconds(self.period.seconds());
+        if self.latency == Nanoseconds(0) {
+            return format!("in a control cycle of {cycle}");
+        }
+        let latency = milliseconds(self.latency.seconds());
+        format!("in a control cycle of {cycle} with a drive that acts {latency} after it is told")
+    }
+}
+
+/// What each loop waits.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DeadTimes {
+    position: DeadTime,
+    velocity: DeadTime,
+    current: DeadTime,
+}
+
+impl DeadTimes {
+    /// In cycles of `period`, with drives that act at once.
+    pub(super) fn at_once(period: Period) -> Self {
+        let dead = DeadTime::of(period, Nanoseconds(0));
+        Self { position: dead, velocity: dead, current: dead }
+    }
+}
+
+/// Slows the loops of `actuator`, whose axis has `table`, down by the latency of its drive: those that the drive
+/// does not close.
+pub(super) fn slow_down(
+    actuator: &mut Actuator,
+    table: &AxisTable,
+    period: Period,
+    diagnostics: &mut Diagnostics,
+) {
+    let is_stepper = matches!(actuator.motor, Motor::Stepper(_));
+    if actuator.latency == Nanoseconds(0) || is_stepper {
+        return;
+    }
+    let by_drive = DeadTime::of(period, Nanoseconds(0));
+    let here = DeadTime::of(period, actuator.latency);
+    let [position, velocity, current] = match actuator.mode {
+        ActuatorMode::Position => [by_drive; 3],
+        ActuatorMode::Velocity => [here, by_drive, by_drive],
+        ActuatorMode::Torque => [here, here, by_drive],
+        ActuatorMode::Voltage => [here; 3],
+    };
+    let dead = DeadTimes { position, velocity, current };
+    if let Some(gains) = gains(table, actuator.gains.inertia, dead, diagnostics) {
+        actuator.gains = gains;
+    }
+}
+
+/// The gains of the loops. Defaults suit 1 ms without latency; with a longer dead time they are slower by as
+/// much, with what is written of them as it is. A loop that answers within its dead time swings without end: it
+/// is refused.
+pub(super) fn gains(
+    table: &AxisTable,
+    inertia: f64,
+    dead: DeadTimes,
+    diagnostics: &mut Diagnostics,
+) -> Option<LoopGains> {
+    let defaults;
+    let loops = match &table.loops {
+        Some(loops) => loops,
+        None => {
+            defaults = LoopsTable::absent(table.span, diagnostics)?;
+            &defaults
+        }
+    };
+    let usual = DeadTime::of(Period::OF_SETPOINTS, Nanoseconds(0)).seconds();
+    // The place of a default is that of its table.
+    let in_time = |value: f64, span: Span, dead: DeadTime| Spanned {
+        value: if span == loops.span { value * (usual / dead.seconds()).min(1.0) } else { value },
+        span,
+    };
+    let position = in_time(loops.position.value, loops.position.span, dead.position);
+    let velocity = in_time(loops.velocity.value, loops.velocity.span, dead.velocity);
+    let current = in_time(loops.current.value, loops.current.span, dead.current);
+    for (bandwidth, word, dead) in
+        [(velocity, "velocity", dead.velocity), (current, "current", dead.current)]
+    {
+        if bandwidth.value * dead.seconds() >= 1.0 {
+            let safe = 1.0 / 3.0 / dead.seconds();
+            diagnostics.contradict(
+                bandwidth.span,
+                format!(
+                    "a {word} loop of {} rad/s swings without end {}",
+                    bandwidth.value,
+                    dead.words()
+                ),
+                &format!("lower `loops.{word}`: {safe:.0} rad/s is safe; or shorten the period"),
+            );
+        }
+    }
+    for (inner, outer, words) in [
+        (velocity, position, ["velocity", "position"]),
+        (current, velocity, ["current", "velocity"]),
+    ] {
+        if outer.value >= inner.value {
+            // The place of a default is that of its table: what was written is what is wrong.
+            let span = if outer.span == loops.span { inner.span } else { outer.span };
+            diagnostics.contradict(
+                span,
+                format!(
+                    "the {} loop ({} rad/s) must be faster than the {} loop around it ({} rad/s)",
+                    words[0], inner.value, words[1], outer.value
+                ),
+                &format!("raise `loops.{}` or lower `loops.{}`", words[0], words[1]),
+            );
+        }
+    }
+    Some(LoopGains {
+        position: position.value,
+        velocity: velocity.value,
+        current: current.value,
+        inertia,
+    })
+}

@@ -1,0 +1,108 @@
+//! Drives that act later than they are told: the declared latency is in the plan of each actuator and of the
+//! gate, so that marks are as accurate as without one.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use drives::PlantOptions;
+use machine::{Machine, Override};
+use monitor::marks::{Marks, StreamEnd};
+use monitor::run_analysis::{Clock, RunAnalysis};
+use planner::Job;
+use workbench::simulation::simulate;
+
+fn overrides(texts: &[&str]) -> Vec<Override> {
+    texts.iter().map(|text| text.parse().unwrap()).collect()
+}
+
+/// The marks of one letter on a machine with these changes.
+fn mark(file: &str, changes: &[&str]) -> Marks {
+    let path = support::source("machines").join(format!("{file}.toml"));
+    let machine = Machine::load(&path, &overrides(changes)).unwrap();
+    let letter = ["letters.text=S", "letters.height=10 mm"];
+    let job =
+        Job::read(&support::source("jobs/letters.toml"), &overrides(&letter), &machine).unwrap();
+    let plan = planner::plan(&machine, &job).unwrap();
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, machine.realtime.period);
+    let options = PlantOptions::default();
+    let simulated = simulate(&machine, &machine, &plan, options, |records| {
+        records.iter().for_each(|record| analysis.push(record));
+    });
+    let report = simulated.unwrap().controller;
+    assert_eq!((report.completed, report.fault.code), (1, 0), "{changes:?}: {report:?}");
+    analysis.finish(StreamEnd::Reported(&report)).marks.unwrap().marks
+}
+
+/// How far the marks of a machine with these changes may be off [m].
+fn assert_accurate(file: &str, changes: &[&str], bound: f64) {
+    let marks = mark(file, changes);
+    let what = format!("{file} {changes:?}: {marks:?}");
+    assert!(marks.error_max <= bound, "{what}");
+    assert!(marks.tracking_max <= bound, "{what}");
+    assert!(marks.missing_end_max <= 20e-6 && marks.double_end_max <= 20e-6, "{what}");
+    assert_eq!((marks.strokes_lost, marks.stray), (0, 0.0), "{what}");
+}
+
+#[test]
+fn a_latency_of_whole_cycles_costs_no_accuracy() {
+    let latency = |time: &str| {
+        ["latency", "gate_latency"].map(|key| format!("drives.simulated.{key}={time}"))
+    };
+    let late = latency("1 ms");
+    let late: Vec<&str> = late.iter().map(String::as_str).collect();
+    assert_accurate("corexy", &late, 15e-6);
+    let very_late = latency("2 ms");
+    let modes = ["axis.a.mode=position", "axis.b.mode=position"];
+    let changes: Vec<&str> = very_late.iter().map(String::as_str).chain(modes).collect();
+    assert_accurate("corexy", &changes, 15e-6);
+}
+
+#[test]
+fn written_loops_that_swing_with_the_latency_are_refused_and_those_of_the_drive_are_not() {
+    let load = |changes: &[&str]| {
+        let path = support::source("machines").join("corexy.toml");
+        Machine::load(&path, &overrides(changes))
+    };
+    let late = "drives.simulated.latency=2 ms";
+    let refused = load(&[late]).unwrap_err().to_string();
+    let words = "a current loop of 349 rad/s swings without end in a control cycle of 1 ms with a drive that acts \
+                 2 ms after it is told";
+    assert!(refused.contains(words), "{refused}");
+    // The drive closes its current loop itself.
+    let torque = ["axis.a.mode=torque", "axis.b.mode=torque"];
+    load(&[&[late][..], &torque].concat()).unwrap();
+}
+
+#[test]
+fn actuators_and_gate_may_be_late_by_different_parts_of_a_cycle() {
+    for (x, y, gate) in
+        [("0 ms", "0 ms", "0.3 ms"), ("0.4 ms", "1.7 ms", "0 ms"), ("1 ms", "0 ms", "2.6 ms")]
+    {
+        let changes = [
+            format!("drives.simulated.actuators.x.latency={x}"),
+            format!("drives.simulated.actuators.y.latency={y}"),
+            format!("drives.simulated.gate_latency={gate}"),
+        ];
+        let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+        assert_accurate("cartesian", &changes, 15e-6);
+        assert_accurate("cartesian_steppers", &changes, 15e-6);
+        // Without a latency: 12.8, 4.6 and 3.8 um.
+        for (mode, bound) in [("torque", 20e-6), ("velocity", 15e-6), ("position", 15e-6)] {
+            let modes = ["x", "y"].map(|axis| format!("axis.{axis}.mode={mode}"));
+            let changes: Vec<&str> =
+                changes.iter().copied().chain(modes.iter().map(String::as_str)).collect();
+            assert_accurate("cartesian", &changes, bound);
+        }
+    }
+}
+
+#[test]
+fn a_shorter_cycle_counts_the_same_latency_in_more_cycles() {
+    let changes = [
+        "realtime.period=250 us",
+        "drives.simulated.latency=0.9 ms",
+        "drives.simulated.gate_latency=0.35 ms",
+    ];
+    assert_accurate("corexy", &changes, 15e-6);
+}
