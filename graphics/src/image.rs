@@ -1,4 +1,4 @@
-//! Images from PNG, JPEG, BMP, GIF (its first picture) and WebP files.
+//! Images from PNG, JPEG, BMP, GIF, WebP and TIFF files, of GIF and TIFF the first picture.
 //!
 //! Grey is the luminance of Rec. 709, summed in linear light and encoded again by the transfer function
 //! of sRGB: a grey pixel keeps its value. Transparency is laid on white in encoded values, as browsers do
@@ -68,7 +68,10 @@ pub fn read(bytes: &[u8]) -> Result<Graphic, ReadError> {
 pub fn decode(bytes: &[u8]) -> Result<Image, ReadError> {
     let mut reader = ImageReader::new(Cursor::new(bytes));
     let format = ::image::guess_format(bytes).map_err(|_| {
-        ReadError::new("the file is not an image of a known kind", "PNG, JPEG, BMP, GIF or WebP")
+        ReadError::new(
+            "the file is not an image of a known kind",
+            "PNG, JPEG, BMP, GIF, WebP or TIFF",
+        )
     })?;
     reader.set_format(format);
     let limits = || {

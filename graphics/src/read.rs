@@ -45,9 +45,9 @@ pub const MOST_ELEMENTS: usize = 300_000;
 pub const MOST_DEPTH: usize = 100;
 
 /// Extensions of files that are read here, without their dots.
-pub const EXTENSIONS: [&str; 15] = [
+pub const EXTENSIONS: [&str; 17] = [
     "svg", "svgz", "dxf", "lbrn2", "lbrn", "plt", "hpgl", "hpg", "hgl", "png", "jpg", "jpeg",
-    "bmp", "gif", "webp",
+    "bmp", "gif", "webp", "tif", "tiff",
 ];
 
 /// Reads a drawing. Its content says what it is; `extension`, of its name and without a dot, counts where the

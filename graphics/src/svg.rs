@@ -12,11 +12,10 @@ mod tests;
 use std::collections::{BTreeSet, HashMap};
 use std::io::Read as _;
 use std::rc::Rc;
-use std::sync::{Arc as Shared, Mutex, OnceLock};
+use std::sync::{Arc as Shared, Mutex};
 
 use kurbo::{Affine, BezPath, Point, Rect};
 use roxmltree::Document;
-use usvg::fontdb::Database;
 use usvg::tiny_skia_path::PathSegment;
 
 use crate::ReadError;
@@ -26,6 +25,7 @@ use crate::read::pen::{Budget, Pen};
 use crate::read::xml::{self, Lines};
 use crate::read::{MOST_BYTES, bounds, is_finite};
 use crate::shape::{Colour, Contour, Fill, FillRule, Graphic, Raster, Segment, Shape};
+use crate::text::Installed;
 use path::Drawn;
 use source::Source;
 
@@ -51,9 +51,9 @@ const STYLE: &str = "*{mask:none!important;filter:none!important;marker-start:no
 /// Where it is no SVG file, or exceeds a bound of [`crate::read`].
 pub fn read(bytes: &[u8]) -> Result<Graphic, ReadError> {
     if bytes.starts_with(&[0x1f, 0x8b]) {
-        return read_text(&crate::read::text(&inflate(bytes)?)?);
+        return read_text(&crate::read::text(&inflate(bytes)?)?, Installed::here);
     }
-    read_text(&crate::read::text(bytes)?)
+    read_text(&crate::read::text(bytes)?, Installed::here)
 }
 
 /// What a compressed file holds, up to [`MOST_BYTES`].
@@ -69,7 +69,8 @@ fn inflate(bytes: &[u8]) -> Result<Vec<u8>, ReadError> {
     Ok(inflated)
 }
 
-fn read_text(text: &str) -> Result<Graphic, ReadError> {
+/// Reads an SVG document, its text in `fonts`.
+fn read_text<'f>(text: &str, fonts: impl FnOnce() -> &'f Installed) -> Result<Graphic, ReadError> {
     let document = xml::parse(text)?;
     let root = document.root_element();
     if root.tag_name().name() != "svg" {
@@ -83,7 +84,8 @@ fn read_text(text: &str) -> Result<Graphic, ReadError> {
     let mut source = Source::new(&document, &lines, &mut notes)?;
     let page = source.page(&mut notes);
     let stand_in = source.stand_in();
-    let tree = resolve(&stand_in, has_element(&document, "text"), &mut notes)?;
+    let fonts = has_element(&document, "text").then(fonts);
+    let tree = resolve(&stand_in, fonts, &mut notes)?;
     let (width, height) = (f64::from(tree.size().width()), f64::from(tree.size().height()));
     let has_clones = has_element(&document, "use");
     let mut walk = Walk {
@@ -124,19 +126,12 @@ fn has_element(document: &Document<'_>, name: &str) -> bool {
     document.descendants().any(|node| node.tag_name().name() == name)
 }
 
-/// The fonts of this computer, looked for once.
-fn fonts() -> Shared<Database> {
-    static FONTS: OnceLock<Shared<Database>> = OnceLock::new();
-    let load = || {
-        let mut fonts = Database::new();
-        fonts.load_system_fonts();
-        Shared::new(fonts)
-    };
-    Shared::clone(FONTS.get_or_init(load))
-}
-
 /// The tree that `usvg` makes: no file is followed, and fonts that are not there are named.
-fn resolve(text: &str, has_text: bool, notes: &mut Notes) -> Result<usvg::Tree, ReadError> {
+fn resolve(
+    text: &str,
+    fonts: Option<&Installed>,
+    notes: &mut Notes,
+) -> Result<usvg::Tree, ReadError> {
     let replaced = Mutex::new(BTreeSet::new());
     let select = usvg::FontResolver::default_font_selector();
     let mut options = usvg::Options {
@@ -153,15 +148,18 @@ fn resolve(text: &str, has_text: bool, notes: &mut Notes) -> Result<usvg::Tree, 
         },
         ..usvg::Options::default()
     };
-    if has_text {
-        options.fontdb = fonts();
+    if let Some(fonts) = fonts {
+        options.fontdb = Shared::clone(&fonts.faces);
+        let built_in = fonts.built_in;
         let replaced = &replaced;
         options.font_resolver.select_font = Box::new(move |font, database| {
-            let found = select(font, database);
+            let found = select(font, database).or(built_in);
             let named = found.and_then(|id| database.face(id)).map(|face| &face.families);
+            let is_left = found.is_some() && found == built_in;
             let wanted = font.families().iter().find_map(|family| match family {
-                usvg::FontFamily::Named(name) => Some(name.as_str()),
-                _ => None,
+                usvg::FontFamily::Named(name) => Some(name.clone()),
+                // A kind of font that is not there either.
+                kind => is_left.then(|| kind.to_string()),
             });
             if let (Some(wanted), Ok(mut replaced)) = (wanted, replaced.lock()) {
                 let found = named.and_then(|names| names.first()).map(|name| name.0.as_str());
@@ -170,7 +168,7 @@ fn resolve(text: &str, has_text: bool, notes: &mut Notes) -> Result<usvg::Tree, 
                         if named.is_some_and(|names| names.iter().any(|known| known.0 == *name)))
                 });
                 if !is_one_of {
-                    replaced.insert((wanted.to_owned(), found.map(str::to_owned)));
+                    replaced.insert((wanted, found.map(str::to_owned)));
                 }
             }
             found

@@ -2,10 +2,14 @@
 
 #[cfg(feature = "text")]
 mod font;
+#[cfg(feature = "text")]
+mod installed;
 pub(crate) mod layout;
 
 #[cfg(feature = "text")]
 pub use font::Font;
+#[cfg(feature = "text")]
+pub use installed::Installed;
 
 /// A text and how it is set.
 ///

@@ -176,7 +176,7 @@ pub enum JobError {
 const GCODE: [&str; 7] = ["ngc", "nc", "gcode", "tap", "gc", "cnc", "g"];
 
 /// Extensions of drawings and images.
-const DRAWINGS: [&str; 15] = graphics::read::EXTENSIONS;
+const DRAWINGS: [&str; 17] = graphics::read::EXTENSIONS;
 
 /// Extension of job files.
 const JOB_FILE: &str = "toml";

@@ -77,15 +77,16 @@ impl<'p, 'a> File<'p, 'a> {
             while let Some(record) = records.next_if(|record| record.kind != "ENDSEC") {
                 own.push(record);
             }
+            // A file that programs joined of several has a section more than once.
             match name {
                 "TABLES" => {
-                    file.layers = layers(&own);
-                    file.fonts = fonts(&own);
+                    file.layers.extend(layers(&own));
+                    file.fonts.extend(fonts(&own));
                 }
-                "BLOCKS" => file.blocks = blocks(own),
+                "BLOCKS" => file.blocks.extend(blocks(own)),
                 "ENTITIES" => {
                     has_entities = true;
-                    file.entities = own;
+                    file.entities.append(&mut own);
                 }
                 _ => {}
             }

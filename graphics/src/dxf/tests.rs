@@ -55,6 +55,14 @@ fn units_are_those_of_the_header() {
 }
 
 #[test]
+fn sections_that_a_file_has_more_than_once_count_together() {
+    let line = |to: u32| format!("0 LINE|10 0|20 0|11 {to}|21 1");
+    let section = |content: &str| format!("0 SECTION|2 ENTITIES|{content}|0 ENDSEC");
+    let before = [MILLIMETRES, &section(&line(30)), &section("")].join("|");
+    assert_eq!(around(&drawing(&before, &line(4))), [0.0, 0.0, 30.0, 1.0]);
+}
+
+#[test]
 fn arcs_circles_and_ellipses_are_true() {
     let graphic = drawing(MILLIMETRES, "0 CIRCLE|8 A|10 50|20 40|40 100");
     assert_eq!(around(&graphic), [-50.0, -60.0, 150.0, 140.0]);

@@ -11,6 +11,7 @@ pub(super) fn pitch(format: ImageFormat, bytes: &[u8]) -> Option<(f64, f64)> {
         ImageFormat::Png => png(bytes),
         ImageFormat::Jpeg => jpeg(bytes),
         ImageFormat::Bmp => bmp(bytes),
+        ImageFormat::Tiff => tiff(bytes),
         _ => None,
     }?;
     // Both are pixels per metre.
@@ -69,4 +70,32 @@ fn bmp(bytes: &[u8]) -> Option<(f64, f64)> {
     let number = |from: usize| Some(i32::from_le_bytes(*bytes.get(from..)?.first_chunk()?));
     let has_them = number(14)? >= 40;
     has_them.then_some((f64::from(number(38)?), f64::from(number(42)?)))
+}
+
+/// The fields XResolution, YResolution and ResolutionUnit of the first picture (TIFF 6.0, section 3).
+fn tiff(bytes: &[u8]) -> Option<(f64, f64)> {
+    let is_little = bytes.starts_with(b"II");
+    let short = |at: usize| {
+        let word = *bytes.get(at..)?.first_chunk()?;
+        Some(if is_little { u16::from_le_bytes(word) } else { u16::from_be_bytes(word) })
+    };
+    let long = |at: usize| {
+        let word = *bytes.get(at..)?.first_chunk()?;
+        Some(if is_little { u32::from_le_bytes(word) } else { u32::from_be_bytes(word) })
+    };
+    let directory = long(4)? as usize;
+    let count = usize::from(short(directory)?);
+    let entries = (0..count).map(|index| directory.saturating_add(2 + 12 * index));
+    let find = |tag: u16| entries.clone().find(|at| short(*at) == Some(tag));
+    let ratio = |tag: u16| {
+        let at = long(find(tag)?.checked_add(8)?)? as usize;
+        Some(f64::from(long(at)?) / f64::from(long(at.checked_add(4)?)?))
+    };
+    let unit = find(296).map_or(Some(2), |at| short(at.checked_add(8)?));
+    let per_metre = match unit? {
+        2 => 1.0 / 0.0254,
+        3 => 100.0,
+        _ => return None,
+    };
+    Some((ratio(282)? * per_metre, ratio(283)? * per_metre))
 }

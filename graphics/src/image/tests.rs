@@ -162,3 +162,62 @@ fn ten_thousand_damaged_files_do_no_harm() {
         }
     }
 }
+
+/// A grey picture as a TIFF file of 100 by 50 pixels to `unit`, the tags in either order of bytes.
+fn tiff(pixels: &[u8], [columns, rows]: [u16; 2], unit: u16, is_little: bool) -> Vec<u8> {
+    let short = |value: u16| if is_little { value.to_le_bytes() } else { value.to_be_bytes() };
+    let long = |value: u32| if is_little { value.to_le_bytes() } else { value.to_be_bytes() };
+    let whole = |tag: u16, value: u16| {
+        [&short(tag)[..], &short(3), &long(1), &short(value), &short(0)].concat()
+    };
+    let far = |tag: u16, kind: u16, value: u32| {
+        [&short(tag)[..], &short(kind), &long(1), &long(value)].concat()
+    };
+    let entries = 11_u16;
+    let behind = 8 + 2 + 12 * u32::from(entries) + 4;
+    [
+        if is_little { b"II" } else { b"MM" }.to_vec(),
+        short(42).to_vec(),
+        long(8).to_vec(),
+        short(entries).to_vec(),
+        whole(256, columns),
+        whole(257, rows),
+        whole(258, 8),
+        whole(259, 1),
+        // 0 is black.
+        whole(262, 1),
+        far(273, 4, behind + 16),
+        whole(277, 1),
+        far(279, 4, pixels.len() as u32),
+        far(282, 5, behind),
+        far(283, 5, behind + 8),
+        whole(296, unit),
+        long(0).to_vec(),
+        [long(200), long(2), long(50), long(1)].concat(),
+        pixels.to_vec(),
+    ]
+    .concat()
+}
+
+#[test]
+fn a_tiff_is_read_with_its_resolution() {
+    let ramp: Vec<u8> = (0..=255).collect();
+    for is_little in [true, false] {
+        for (unit, pitch) in
+            [(1, None), (2, Some((0.0254 / 100.0, 0.0254 / 50.0))), (3, Some((1e-4, 2e-4)))]
+        {
+            let image = decode(&tiff(&ramp, [64, 4], unit, is_little)).expect("an image");
+            assert_eq!((&image.pixels[..], image.columns, image.rows), (&ramp[..], 64, 4));
+            match (image.pitch, pitch) {
+                (Some(found), Some(right)) => {
+                    assert!((found.0 - right.0).abs() < 1e-12 && (found.1 - right.1).abs() < 1e-12);
+                }
+                (found, right) => assert_eq!(found, right),
+            }
+        }
+    }
+    let file = tiff(&ramp, [64, 4], 2, true);
+    for length in 0..file.len() {
+        assert!(decode(&file[..length]).is_err(), "{length} bytes");
+    }
+}

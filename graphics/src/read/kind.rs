@@ -26,7 +26,7 @@ impl Kind {
             "dxf" => Self::Dxf,
             "lbrn" | "lbrn2" => Self::LightBurn,
             "plt" | "hpgl" | "hpg" | "hgl" => Self::Hpgl,
-            "png" | "jpg" | "jpeg" | "bmp" | "gif" | "webp" => Self::Image,
+            "png" | "jpg" | "jpeg" | "bmp" | "gif" | "webp" | "tif" | "tiff" => Self::Image,
             _ => return None,
         })
     }
@@ -46,6 +46,8 @@ impl Kind {
             (b"GIF8", Self::Image),
             (b"BM", Self::Image),
             (b"RIFF", Self::Image),
+            (b"II*\0", Self::Image),
+            (b"MM\0*", Self::Image),
         ] {
             if bytes.starts_with(start) {
                 return Some(kind);

@@ -4,8 +4,10 @@ use kurbo::{Point, Rect};
 use messages::random::SplitMix64;
 
 use super::read;
+use super::read_text;
 use crate::read::bounds;
 use crate::shape::{Colour, FillRule, Graphic, Segment};
+use crate::text::Installed;
 
 const HEAD: &str = "xmlns='http://www.w3.org/2000/svg' \
                     xmlns:xlink='http://www.w3.org/1999/xlink' \
@@ -308,6 +310,23 @@ fn text_becomes_outlines_or_is_named() {
             assert!(all.x0 > 9.0 && all.x1 < 60.0, "{all:?}");
             assert!(all.y0 > 297.0 - 51.0 && all.y1 < 297.0 - 30.0, "{all:?}");
         }
+    }
+}
+
+#[test]
+fn without_fonts_text_is_set_in_the_built_in_one() {
+    let fonts = Installed::of(fontdb::Database::new());
+    for family in ["", "font-family='Arial'", "font-family='serif'"] {
+        let text = format!(
+            "<svg xmlns='http://www.w3.org/2000/svg' width='50mm' height='50mm'>\
+             <text x='10' y='50' font-size='20' {family}>Hi</text></svg>"
+        );
+        let graphic = read_text(&text, || &fonts).expect("a drawing");
+        assert!(!graphic.shapes.is_empty(), "{family}");
+        let told = notes(&graphic);
+        let is_told =
+            told.iter().any(|note| note.ends_with("is not installed: text is set in \"Ubuntu\""));
+        assert!(is_told, "{family}: {told:?}");
     }
 }
 

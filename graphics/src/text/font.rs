@@ -16,6 +16,8 @@ use crate::{Colour, Contour, Fill, FillRule, ReadError, Segment, Shape};
 #[derive(Clone)]
 pub struct Font {
     bytes: Shared<[u8]>,
+    /// Which font of a collection.
+    index: u32,
     shaped: harfrust::Font,
     units: f64,
     /// Height of a capital letter in em, where the font says or shows it.
@@ -33,19 +35,24 @@ impl Font {
     ///
     /// Where the bytes are no such font.
     pub fn new(bytes: &[u8]) -> Result<Self, ReadError> {
+        Self::of_collection(bytes, 0)
+    }
+
+    /// The font with this `index` in the bytes of a file.
+    pub(super) fn of_collection(bytes: &[u8], index: u32) -> Result<Self, ReadError> {
         let refuse = |reason: &str| {
             let message = format!("the font cannot be read: {reason}");
             ReadError::new(message, "a TrueType or OpenType font, .ttf or .otf")
         };
-        let font = FontRef::from_index(bytes, 0).map_err(|error| refuse(&error.to_string()))?;
-        let shaped = harfrust::Font::new(bytes.to_vec(), 0);
+        let font = FontRef::from_index(bytes, index).map_err(|error| refuse(&error.to_string()))?;
+        let shaped = harfrust::Font::new(bytes.to_vec(), index);
         let shaped = shaped.ok_or_else(|| refuse("it has no characters"))?;
         let metrics = font.metrics(Size::unscaled(), LocationRef::default());
         let units = f64::from(metrics.units_per_em);
         if !(16.0..=16_384.0).contains(&units) {
             return Err(refuse(&format!("its em has {units} units, not 16 to 16384")));
         }
-        let mut font = Self { bytes: bytes.into(), shaped, units, cap: None };
+        let mut font = Self { bytes: bytes.into(), index, shaped, units, cap: None };
         let said = metrics.cap_height.map(|cap| f64::from(cap) / units);
         font.cap = said.filter(|cap| *cap > 0.05 && *cap < 10.0).or_else(|| font.shown_cap());
         Ok(font)
@@ -94,7 +101,7 @@ impl Font {
         let options = ShapeOptions::new().features(features);
         harfrust::shape(&ShaperFont::new(&self.shaped), &mut buffer, options)
             .map_err(|error| self.damaged(&error.to_string()))?;
-        let font = FontRef::from_index(&self.bytes, 0)
+        let font = FontRef::from_index(&self.bytes, self.index)
             .map_err(|error| self.damaged(&error.to_string()))?;
         let glyphs = buffer.glyph_infos().iter().zip(buffer.glyph_positions());
         let glyph = |(info, position): (&harfrust::GlyphInfo, &harfrust::GlyphPosition)| {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use graphics::code::{self, Code, Modules, Symbology};
-use graphics::text::{self, Font, Height, Text};
+use graphics::text::{self, Font, Height, Installed, Text};
 use graphics::{Graphic, ReadError, single_line};
 use machine::document::{Diagnostics, Either, Spanned};
 
@@ -94,6 +94,9 @@ impl<'a> Source<'a> {
                 BuiltInFont::SingleLine => return Some(Self::Text { table, font: None }),
                 BuiltInFont::Outline => (None, Font::built_in()),
             },
+            Either::Value(name) if !is_font_file(&name.value) => {
+                (None, Installed::here().font(&name.value))
+            }
             Either::Value(file) => {
                 let path = folder.join(&file.value);
                 let font = std::fs::read(&path).map_err(|error| {
@@ -182,6 +185,14 @@ impl<'a> Source<'a> {
             Graphic::default()
         }))
     }
+}
+
+/// Whether a font is given by its file and not by its name.
+fn is_font_file(written: &str) -> bool {
+    let extension = Path::new(written).extension().and_then(|extension| extension.to_str());
+    let known = ["ttf", "otf", "ttc", "otc"];
+    written.contains('/')
+        || extension.is_some_and(|found| known.iter().any(|one| one.eq_ignore_ascii_case(found)))
 }
 
 /// A text in a font, or in the single-line one.

@@ -12,7 +12,7 @@ table! {
     /// A drawing: exactly one of `file`, `text` and `code`.
     pub struct DrawingTable {
         /// A file of a drawing program or an image, relative to this one: SVG, DXF, LightBurn, HPGL, PNG,
-        /// JPEG, BMP.
+        /// JPEG, BMP, GIF, WebP, TIFF.
         pub file: Option<Spanned<String>>,
         /// Text in a font.
         pub text: Option<TextTable>,
@@ -51,8 +51,9 @@ table! {
     pub struct TextTable {
         /// What to write; \n begins another line.
         pub content: Spanned<String>,
-        /// A font file (TTF, OTF), relative to this file; or one that is built in: `single_line`, whose
-        /// letters are strokes, and `outline`, Ubuntu Light, whose letters are filled.
+        /// A font file (TTF, OTF, TTC), relative to this file; the name of a font of this computer, such as
+        /// "DejaVu Sans"; or one that is built in: `single_line`, whose letters are strokes, and
+        /// `outline`, Ubuntu Light, whose letters are filled.
         pub font: Either<BuiltInFont, Spanned<String>> = "single_line",
         /// Height of a capital letter.
         pub height: Quantity<Length, Positive> = "5 mm",
