@@ -129,9 +129,9 @@ pub enum Command {
     Domain(DomainArguments),
     /// The planner service: reads, plans and checks a job, and streams its setpoints.
     Planner(ServiceArguments),
-    /// The controller service: plays the setpoints and closes the loops, 1 kHz.
+    /// The controller service: plays the setpoints and closes the loops.
     Controller(ServiceArguments),
-    /// The drives service: the clock, the port to the motors, and the watchdog, 1 kHz.
+    /// The drives service: the clock, the port to the motors, and the watchdog.
     Drives(ServiceArguments),
     /// The monitor service: records and measures; nobody waits for it.
     Monitor(ServiceArguments),

@@ -244,6 +244,11 @@ impl<P: Port, H: Hardware> Port for Bench<P, H> {
         self.deadline = self.deadline + self.period;
     }
 
+    fn moved(&mut self, by: Nanoseconds) {
+        self.deadline = self.deadline + by;
+        self.port.moved(by);
+    }
+
     fn link(&self) -> LinkCounters {
         self.port.link()
     }

@@ -12,13 +12,13 @@ const ERROR: f64 = 20e-6;
 /// How long a frame is on its way along the slaves at most [ns].
 const FLIGHT: i64 = 10_000;
 
-/// Asserts that the gantry's letters, by drives that follow targets of `mode`, are where they are drawn, and that the
+/// Asserts that the gantry's letters, by drives that follow targets of `mode` and whose clocks are drawn by `seed`, are where they are drawn, and that the
 /// light was on when it was asked for, to half a step of what the port declares.
-fn check(mode: &str) {
+fn check(mode: &str, seed: u64) {
     let machine = line::gantry(mode);
     assert_eq!(machine.actuators.len(), 4);
     let plan = job::letters(&machine);
-    let played = job::play(line::open(machine.clone(), Rates::default(), 0), &plan, None);
+    let played = job::play(line::open(machine.clone(), Rates::default(), seed), &plan, None);
     assert_eq!(played.report.completed, 1, "{:?}", played.report.fault);
     let link = played.drives.link;
     assert_eq!((link.lost, link.late, link.corrupted, link.bridged), (0, 0, 0, 0), "{link:?}");
@@ -43,5 +43,10 @@ fn check(mode: &str) {
 
 #[test]
 fn four_drives_that_follow_positions_mark_the_letters() {
-    check("position");
+    check("position", 0);
+}
+
+#[test]
+fn clocks_that_drift_are_followed_to_the_end_of_the_job() {
+    check("position", 1);
 }

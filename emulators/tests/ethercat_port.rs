@@ -3,6 +3,7 @@
 
 mod line;
 
+use drives::discipline::Discipline;
 use drives::{Actuation, Port as _, Power};
 use emulators::ethercat::faults::Rates;
 use line::Line;
@@ -114,6 +115,24 @@ fn a_bridge_that_dies_leaves_the_line_dark() {
     bench.cable.go_to(Nanoseconds(died + 100 * PERIOD));
     let last = bench.cable.lit().last().map_or(0, |span| span[1]);
     assert!(last <= died + LATENCY + PERIOD, "{last} {died}");
+}
+
+#[test]
+fn a_clock_that_drifts_is_followed() {
+    let mut bench = enabled(1);
+    let mut discipline = Discipline::new(bench.machine.realtime.period);
+    let mut left = Nanoseconds(0);
+    for cycle in 0..30_000_u32 {
+        bench.cycle(&bench.driven(0.0, 0.0, laser(1, &[])));
+        let fault = bench.measurement.fault;
+        assert!(!fault.is_some(), "{fault:?} in cycle {cycle}");
+        let ahead = bench.measurement.clock_offset.expect("an answer in each cycle");
+        bench.moved(discipline.follow(ahead));
+        left = ahead;
+    }
+    // It drifts by 20 ppm at most, alone for the 400 cycles until the drives follow.
+    let apart = bench.port.link().clock_error_max;
+    assert!(apart < 20_000 && left.0.abs() < 500, "{apart} ns, {left:?} at the end");
 }
 
 #[test]

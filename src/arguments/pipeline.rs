@@ -19,7 +19,7 @@ pub struct DrivesArguments {
     /// What to drive.
     #[arg(long, value_enum, default_value = "machine")]
     pub drives: DrivesKind,
-    /// Let no deadline slip, as on hardware: a command later than 0.3 ms closes the gate for that
+    /// Let no deadline slip, as on hardware: a command later than 0.3 of the period closes the gate for that
     /// cycle. Without it the simulated plant waits for up to 100 ms.
     #[arg(long)]
     pub strict: bool,
@@ -34,7 +34,8 @@ pub struct DrivesArguments {
 /// Arguments of `run`.
 #[derive(Debug, Clone, Args)]
 pub struct RunArguments {
-    /// Job: .ngc .nc .gcode .tap .gc .cnc .g (G-code) or .toml; without it the machine's sample job.
+    /// Job: G-code, a drawing (.svg .dxf .lbrn2 .plt …), an image or a job file (.toml);
+    /// without it the machine's sample job.
     pub job: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -56,7 +57,8 @@ pub struct RunArguments {
 /// Arguments of `simulate`.
 #[derive(Debug, Clone, Args)]
 pub struct SimulateArguments {
-    /// Job: .ngc .nc .gcode .tap .gc .cnc .g (G-code) or .toml; without it the machine's sample job.
+    /// Job: G-code, a drawing (.svg .dxf .lbrn2 .plt …), an image or a job file (.toml);
+    /// without it the machine's sample job.
     pub job: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -75,7 +77,7 @@ pub struct SimulateArguments {
 /// Arguments of `submit`.
 #[derive(Debug, Clone, Args)]
 pub struct SubmitArguments {
-    /// Job: .ngc .nc .gcode .tap .gc .cnc .g (G-code) or .toml.
+    /// Job: G-code, a drawing (.svg .dxf .lbrn2 .plt …), an image or a job file (.toml).
     pub job: PathBuf,
     /// Change a value of the job. Can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]

@@ -7,7 +7,8 @@ use std::path::PathBuf;
 /// Arguments of `plan`.
 #[derive(Debug, Clone, Args)]
 pub struct PlanArguments {
-    /// Job: .ngc .nc .gcode .tap .gc .cnc .g (G-code) or .toml; without it the machine's sample job.
+    /// Job: G-code, a drawing (.svg .dxf .lbrn2 .plt …), an image or a job file (.toml);
+    /// without it the machine's sample job.
     pub job: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]

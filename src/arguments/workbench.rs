@@ -10,7 +10,8 @@ use std::path::PathBuf;
 /// Arguments of `size`.
 #[derive(Debug, Clone, Args)]
 pub struct SizeArguments {
-    /// Job: .ngc .nc .gcode .tap .gc .cnc .g (G-code) or .toml; without it the machine's sample job.
+    /// Job: G-code, a drawing (.svg .dxf .lbrn2 .plt …), an image or a job file (.toml);
+    /// without it the machine's sample job.
     pub job: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -203,7 +204,8 @@ fn kinds() -> impl TypedValueParser<Value = Kind> {
 /// Arguments of `compare`.
 #[derive(Debug, Clone, Args)]
 pub struct CompareArguments {
-    /// Job: .ngc .nc .gcode .tap .gc .cnc .g (G-code) or .toml; without it the first machine's sample job.
+    /// Job: G-code, a drawing (.svg .dxf .lbrn2 .plt …), an image or a job file (.toml);
+    /// without it the first machine's sample job.
     pub job: Option<PathBuf>,
     /// Machine file (.toml). Can be repeated; without any and without a job, the machines of source
     /// 003 are compared on its letters.

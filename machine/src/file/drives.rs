@@ -92,6 +92,9 @@ pub(super) fn build(
     if let (Some(table), DrivesKind::Hostmot2(card)) = (&table.hostmot2, &mut kind) {
         hostmot2::connect(table, card, operating, diagnostics);
     }
+    if let Some(table) = &table.ethercat {
+        ethercat::refuse_wiring(table, operating, diagnostics);
+    }
     Drives { kind, gate_latency }
 }
 

@@ -4,6 +4,7 @@ use super::{Built, Latency, each, latencies, whole};
 use crate::actuator::Actuator;
 use crate::document::{Diagnostics, Named, NonNegative, Number, Positive, Quantity, Spanned};
 use crate::drives::{DrivesKind, Ethercat, EthercatGate, EthercatLink};
+use crate::operating::Operating;
 use crate::quantity::Duration;
 use crate::table;
 use messages::Nanoseconds;
@@ -113,4 +114,22 @@ pub(super) fn build(
             power,
         }),
     })
+}
+
+/// Refuses inputs and outputs, which the port does not exchange with the bus: an emergency stop that is never
+/// seen is worse than none.
+pub(super) fn refuse_wiring(
+    table: &EthercatTable,
+    operating: &Operating,
+    diagnostics: &mut Diagnostics,
+) {
+    let inputs = operating.inputs.iter().map(|input| ("input", "read", &input.name));
+    let outputs = operating.outputs.iter().map(|output| ("output", "switch", &output.name));
+    if let Some((kind, verb, name)) = inputs.chain(outputs).next() {
+        diagnostics.contradict(
+            table.span,
+            format!("the port to an EtherCAT bus does not {verb} the {kind} `{name}` yet"),
+            "leave [inputs] and [outputs] out, and wire what is for safety",
+        );
+    }
 }
