@@ -37,7 +37,7 @@ fn every_cycle_is_a_line_with_the_machines_axes() {
     };
     let summary = place.summary("run");
     let axes = summary["machine"]["axes"].as_array().unwrap();
-    assert_eq!(rows[0].len(), 11 + 4 * axes.len());
+    assert_eq!(rows[0].len(), 12 + 4 * axes.len());
     for (index, axis) in axes.iter().enumerate() {
         let position = column(&format!("{}_position", axis.as_str().unwrap()));
         for (row, record) in rows[1..].iter().zip(&records) {
@@ -70,7 +70,7 @@ fn without_a_summary_the_actuators_are_numbered() {
     let samples = folder.join("samples.bin");
     std::fs::remove_file(folder.join("summary.json")).unwrap();
     let rows = exported(&place, &samples);
-    assert_eq!(rows[0].len(), 11 + 4 * messages::MAX_ACTUATORS);
+    assert_eq!(rows[0].len(), 12 + 4 * messages::MAX_ACTUATORS);
     assert!(rows[0].iter().any(|column| column == "actuator_16_voltage"), "{:?}", rows[0]);
 }
 
