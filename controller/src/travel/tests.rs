@@ -78,7 +78,7 @@ fn the_tool_of_a_corexy_goes_straight_and_no_joint_leads_it_out_of_the_area() {
     // Belt a takes the tool along x and y at once: x ends it.
     let mut bounds = [None; MOVERS];
     bounds[x] = Some([-0.01, 0.03]);
-    let far = travel.beyond(0, 0.1, &bounds, &standing).unwrap();
+    let far = travel.beyond(0, 0.1, &bounds, &standing).expect("a bound");
     assert_eq!((far.mover, far.limit), (x, 0.03));
     assert!((far.end - 0.05).abs() < 1e-12);
     travel.run(0, 0.1, &standing);
