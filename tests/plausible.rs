@@ -8,16 +8,19 @@
 
 mod support;
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 
 use drives::{PlantOptions, SimulatedPlant};
 use machine::Machine;
 use messages::finite::first_not_finite;
 use messages::random::SplitMix64;
+use messages::time::SETPOINT_TIME;
 use monitor::conclusion::{self, RunOutcome};
 use monitor::marks::StreamEnd;
 use monitor::run_analysis::{Clock, RunAnalysis};
 use monitor::summary::Outcome;
+use planner::Job;
 use planner::request::JobRequest;
 use support::Place;
 use workbench::simulation::simulate;
@@ -106,6 +109,26 @@ enum Verdict {
     Wrong(String),
 }
 
+/// Whether `job` takes longer than is worth simulating here: a plan in memory is as long as its job, so it is planned
+/// window by window first, no further than that.
+fn is_long(machine: &Machine, job: &Job) -> bool {
+    struct TooLong;
+    let mut setpoints = 0;
+    let planned = catch_unwind(AssertUnwindSafe(|| {
+        let _ = planner::plan_through(machine, job, |window| {
+            setpoints += window.len();
+            if setpoints as f64 * SETPOINT_TIME > LONGEST {
+                resume_unwind(Box::new(TooLong));
+            }
+        });
+    }));
+    match planned {
+        Ok(()) => false,
+        Err(end) if end.is::<TooLong>() => true,
+        Err(end) => resume_unwind(end),
+    }
+}
+
 /// What `graver check` and `graver simulate` say of a machine file with this text.
 fn judge(file: &File, text: &str, job: &Path, known: usize) -> Verdict {
     let Ok(machine) = Machine::parse("machine.toml", text, &[]) else { return Verdict::Told };
@@ -114,10 +137,12 @@ fn judge(file: &File, text: &str, job: &Path, known: usize) -> Verdict {
         return Verdict::Told;
     }
     let request = JobRequest { job: Some(job.to_owned()), set: Vec::new(), offsets: None };
-    let Ok(plan) = request.plan(&machine) else { return Verdict::NoJob };
-    if plan.facts.duration > LONGEST {
+    let Ok(job) = request.read(&machine) else { return Verdict::NoJob };
+    if is_long(&machine, &job) {
         return Verdict::NoJob;
     }
+    let Ok(plan) = planner::plan(&machine, &job) else { return Verdict::NoJob };
+    assert!(plan.facts.duration <= LONGEST, "{} s", plan.facts.duration);
     let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, machine.realtime.period);
     let simulated = simulate(&machine, &machine, &plan, options, |records| {
         records.iter().for_each(|record| analysis.push(record));
