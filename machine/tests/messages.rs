@@ -152,7 +152,7 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
         "[drives.ethercat]\nudp = \"127.0.0.1:34980\"\nactuators.a.slave = 0\nactuators.b.slave = 1\n\
          [inputs.stop]\nfunction = \"estop\"\n[laser]",
         &[
-            "101:1: the port to an EtherCAT bus does not read the input `stop` yet; leave [inputs] and \
+            "100:9: the port to an EtherCAT bus does not read the input `stop` yet; leave [inputs] and \
            [outputs] out, and wire what is for safety",
         ],
     );
