@@ -12,6 +12,7 @@ pub mod inputs;
 pub mod output;
 pub mod pipeline;
 
+use ::operator::Verb;
 use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
@@ -19,7 +20,6 @@ use commands::{
     operating, operator, plan, run, service, simulate, size, tables, verify,
 };
 use exit::{Exit, Failure};
-use pipeline::operators::Verb;
 use runtime::domain::Role;
 use std::process::ExitCode;
 

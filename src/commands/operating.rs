@@ -8,8 +8,8 @@ use crate::arguments::{
 };
 use crate::exit::{Exit, Failure};
 use crate::output::{self, say};
-use crate::pipeline::operators::{Request, Verb};
 use machine::quantity::{self, Kind, Travel, TravelSpeed};
+use operator::{Request, Verb};
 use runtime::message;
 use runtime::socket::ANSWER_PATIENCE;
 use std::time::Duration;

@@ -4,7 +4,7 @@
 //! `~/.local/state` without it. Where that cannot be written the faults since the start are known, and
 //! whoever starts the pipeline is told.
 
-use super::status::PastFault;
+use operator::PastFault;
 use runtime::message;
 use std::collections::VecDeque;
 use std::fs::{self, File};

@@ -1,8 +1,8 @@
 //! Why a request was refused, in words.
 
-use super::operators::Verb;
 use machine::{JointUnit, Machine};
 use messages::{ControllerState, MAX_AXES, OperatorReply, Refusal};
+use operator::Verb;
 
 /// What `reply` of the controller for `machine` to `verb` says; `None` where it is no refusal.
 pub(super) fn words(reply: &OperatorReply, verb: Verb, machine: &Machine) -> Option<String> {

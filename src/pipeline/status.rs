@@ -6,8 +6,7 @@ use super::refusals::DIRECTIONS;
 use machine::{Directions, Machine};
 use messages::{ControllerState, Fault, MAX_AXES, MotionEnd, Nanoseconds, PlannerPhase, Progress};
 use monitor::summary::FaultSummary;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use operator::{AxisStatus, PastFault, Probed, Status};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -23,100 +22,6 @@ pub struct StatusBoard {
     /// When the newest fault was found.
     newest: Mutex<Nanoseconds>,
     history: Mutex<FaultHistory>,
-}
-
-/// What a pipeline is doing, as `graver status --json` prints it.
-#[derive(Debug, Clone, Default, Serialize, schemars::JsonSchema)]
-pub struct Status {
-    /// The controller's state.
-    pub state: String,
-    /// What the planner is doing.
-    pub planner: String,
-    /// The machine file; null for the built-in machine.
-    pub machine_file: Option<String>,
-    /// The stream being played, 0 for none.
-    pub stream: u64,
-    /// Its job, when it has one.
-    pub job: Option<String>,
-    /// Setpoints played so far.
-    pub played: u64,
-    /// Setpoints of the stream that were planned so far; all of them once the plan is complete.
-    pub samples: u64,
-    /// How long the job still takes at the present rate, an estimate until its plan is complete; null
-    /// without a job under way [s].
-    pub time_left: Option<f64>,
-    /// Stroke being marked, from 1; 0 for none.
-    pub stroke: u64,
-    /// Rate at which the stream is played.
-    pub rate: f64,
-    /// Where the plan has the tool [m].
-    pub tool: [f64; 3],
-    /// Axes that know their place; all of a machine without homing.
-    pub homed: Vec<String>,
-    /// Axes that have to be homed before a job.
-    pub unhomed: Vec<String>,
-    /// The axes by name, and the directions of the tool that can be jogged and are no axis.
-    pub axes: BTreeMap<String, AxisStatus>,
-    /// The inputs of the machine file, and whether each is active.
-    pub inputs: BTreeMap<String, bool>,
-    /// The outputs of the machine file, and whether each is on.
-    pub outputs: BTreeMap<String, bool>,
-    /// Where the probe touched last; null before it has.
-    pub probed: Option<Probed>,
-    /// How the newest motion by hand ended: `reached`, `stopped`, `soft_limit`, `dead_man`, `door_open`, `interlock`,
-    /// `not_touched`, `out_of_reach` or `fault`; `none` while it lasts and before the first.
-    pub motion_end: String,
-    /// How many requests the controller has accepted; a reply with a greater `number` does not show here yet.
-    pub requests: u32,
-    /// The latched fault.
-    pub fault: Option<String>,
-    /// The newest faults, the newest last; also those of before the start where they are kept.
-    pub faults: Vec<PastFault>,
-    /// Where all of them are kept; null where they are not.
-    pub faults_file: Option<String>,
-    /// Cycles since drives started.
-    pub cycles: u64,
-    /// Overruns since drives started.
-    pub overruns: u64,
-    /// Process id of each service; null for one that does not run.
-    pub services: BTreeMap<String, Option<i32>>,
-}
-
-/// Where an axis is.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct AxisStatus {
-    /// Where the joint is, in its unit.
-    pub position: f64,
-    /// `m` where it slides, `rad` where it turns.
-    pub unit: String,
-    /// Whether it knows its place.
-    pub homed: bool,
-    /// Its lower and its upper soft limit; null at an end that it does not have.
-    pub limits: [Option<f64>; 2],
-}
-
-/// Where the probe touched.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct Probed {
-    /// The axis that was moved.
-    pub axis: String,
-    /// Where its joint was, in its unit.
-    pub position: f64,
-    /// `m` where it slides, `rad` where it turns.
-    pub unit: String,
-}
-
-/// A fault that was latched.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct PastFault {
-    /// When, in seconds since 1970.
-    pub time: u64,
-    /// Its code.
-    pub code: String,
-    /// What was found, in words.
-    pub detail: String,
-    /// The job that was under way; null without one.
-    pub job: Option<String>,
 }
 
 /// The most faults in a status.
@@ -143,13 +48,13 @@ impl StatusBoard {
         let detail = told.map_or_else(|| code.clone(), |told| told.to_string());
         let mut history = locked(&self.history);
         history.add(PastFault { time, code, detail, job: status.job.clone() });
-        status.note_faults(&history);
+        note_faults(status, &history);
     }
 
     /// Goes on with the faults in the file at `path`.
     pub fn keep_faults(&self, path: Option<PathBuf>) {
         let history = FaultHistory::open(path);
-        self.lock().note_faults(&history);
+        note_faults(&mut self.lock(), &history);
         *locked(&self.history) = history;
     }
 
@@ -185,7 +90,7 @@ impl StatusBoard {
         status.fault = fault.is_some().then(|| fault.code().name().to_owned());
         self.remember(&mut status, &fault);
         if let Some((machine, directions)) = locked(&self.machine).as_ref() {
-            status.operated(progress, machine, directions);
+            note_operated(&mut status, progress, machine, directions);
         }
         status.motion_end = MotionEnd::from_wire(progress.motion_end).name().to_owned();
         status.requests = progress.requests;
@@ -218,56 +123,58 @@ impl StatusBoard {
     }
 }
 
-impl Status {
-    fn note_faults(&mut self, history: &FaultHistory) {
-        self.faults = history.newest(MOST_FAULTS);
-        self.faults_file = history.path().map(|path| path.display().to_string());
-    }
+fn note_faults(status: &mut Status, history: &FaultHistory) {
+    status.faults = history.newest(MOST_FAULTS);
+    status.faults_file = history.path().map(|path| path.display().to_string());
+}
 
-    /// What concerns axes and inputs of `machine`.
-    fn operated(&mut self, progress: &Progress, machine: &Machine, directions: &Directions) {
-        let axes = machine.axes.iter().zip(&progress.position).enumerate();
-        let axes = axes.map(|(index, (axis, place))| {
-            let limits = axis.limits.position.map(|limit| limit.is_finite().then_some(limit));
-            let homed = progress.homed >> index & 1 == 1;
-            let unit = axis.unit.name().to_owned();
-            (axis.name.clone(), AxisStatus { position: *place, unit, homed, limits })
-        });
-        self.axes = axes.collect();
-        let is_homed = machine.axes.iter().all(|axis| self.axes[&axis.name].homed);
-        for (direction, name) in DIRECTIONS.iter().enumerate() {
-            let is_axis = machine.axes.iter().any(|axis| axis.name == *name);
-            if directions.lever(direction).is_none() || is_axis {
-                continue;
-            }
-            let area = [machine.area.lower[direction], machine.area.upper[direction]];
-            let (position, unit) = (progress.tool[direction], "m".to_owned());
-            let place = AxisStatus { position, unit, homed: is_homed, limits: area.map(Some) };
-            self.axes.insert((*name).to_owned(), place);
+/// What concerns axes and inputs of `machine`.
+fn note_operated(
+    status: &mut Status,
+    progress: &Progress,
+    machine: &Machine,
+    directions: &Directions,
+) {
+    let axes = machine.axes.iter().zip(&progress.position).enumerate();
+    let axes = axes.map(|(index, (axis, place))| {
+        let limits = axis.limits.position.map(|limit| limit.is_finite().then_some(limit));
+        let homed = progress.homed >> index & 1 == 1;
+        let unit = axis.unit.name().to_owned();
+        (axis.name.clone(), AxisStatus { position: *place, unit, homed, limits })
+    });
+    status.axes = axes.collect();
+    let is_homed = machine.axes.iter().all(|axis| status.axes[&axis.name].homed);
+    for (direction, name) in DIRECTIONS.iter().enumerate() {
+        let is_axis = machine.axes.iter().any(|axis| axis.name == *name);
+        if directions.lever(direction).is_none() || is_axis {
+            continue;
         }
-        let named = |is_homed: bool| {
-            let axes = machine.axes.iter().map(|axis| &axis.name);
-            axes.filter(|name| self.axes[*name].homed == is_homed).cloned().collect()
-        };
-        (self.homed, self.unhomed) = (named(true), named(false));
-        let inputs = machine.operating.bits();
-        let inputs = inputs.map(|(bit, input)| (input.name.clone(), progress.inputs & bit != 0));
-        self.inputs = inputs.collect();
-        let outputs = machine.operating.output_bits();
-        let outputs =
-            outputs.map(|(bit, output)| (output.name.clone(), progress.outputs & bit != 0));
-        self.outputs = outputs.collect();
-        let axis = (progress.probed_axis as usize).checked_sub(1);
-        let probed = |name: &str, unit: &str| Probed {
-            axis: name.to_owned(),
-            position: progress.probed,
-            unit: unit.to_owned(),
-        };
-        self.probed = axis.and_then(|index| match machine.axes.get(index) {
-            Some(axis) => Some(probed(&axis.name, axis.unit.name())),
-            None => Some(probed(DIRECTIONS.get(index.checked_sub(MAX_AXES)?)?, "m")),
-        });
+        let area = [machine.area.lower[direction], machine.area.upper[direction]];
+        let (position, unit) = (progress.tool[direction], "m".to_owned());
+        let place = AxisStatus { position, unit, homed: is_homed, limits: area.map(Some) };
+        status.axes.insert((*name).to_owned(), place);
     }
+    let named = |is_homed: bool| {
+        let axes = machine.axes.iter().map(|axis| &axis.name);
+        axes.filter(|name| status.axes[*name].homed == is_homed).cloned().collect()
+    };
+    (status.homed, status.unhomed) = (named(true), named(false));
+    let inputs = machine.operating.bits();
+    let inputs = inputs.map(|(bit, input)| (input.name.clone(), progress.inputs & bit != 0));
+    status.inputs = inputs.collect();
+    let outputs = machine.operating.output_bits();
+    let outputs = outputs.map(|(bit, output)| (output.name.clone(), progress.outputs & bit != 0));
+    status.outputs = outputs.collect();
+    let axis = (progress.probed_axis as usize).checked_sub(1);
+    let probed = |name: &str, unit: &str| Probed {
+        axis: name.to_owned(),
+        position: progress.probed,
+        unit: unit.to_owned(),
+    };
+    status.probed = axis.and_then(|index| match machine.axes.get(index) {
+        Some(axis) => Some(probed(&axis.name, axis.unit.name())),
+        None => Some(probed(DIRECTIONS.get(index.checked_sub(MAX_AXES)?)?, "m")),
+    });
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

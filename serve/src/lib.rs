@@ -1,0 +1,1 @@
+//! The live page, the HTTP interface and the metrics of a running pipeline.
