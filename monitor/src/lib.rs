@@ -5,6 +5,7 @@
 //! written by functions that are told where to.
 
 pub mod conclusion;
+pub mod hub;
 pub mod latency;
 pub mod marks;
 pub mod recording;

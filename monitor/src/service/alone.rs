@@ -1,7 +1,8 @@
 //! What the monitor does when the supervisor is lost: it waits for the machine to rest, and writes
 //! the summary that nobody else will.
 
-use super::{Job, POLL_INTERVAL, Service};
+use super::recorder::Job;
+use super::{POLL_INTERVAL, Service};
 use crate::conclusion::{self, RunOutcome};
 use crate::run_folder::RunFolder;
 use crate::summary::{ErrorSummary, Outcome};
@@ -28,16 +29,16 @@ impl Service {
     /// The supervisor is lost. Writes the summary of the newest job, unless the supervisor wrote it.
     pub(super) fn conclude_alone(&mut self, machine: &Machine) -> Result<(), ServiceError> {
         let told = |job: &Job| job.folder.file(run_folder::SUMMARY).exists();
-        let Some(job) = self.job.take().filter(|job| !told(job)) else {
-            return self.end_recording();
+        let Some(job) = self.recorder.job.take().filter(|job| !told(job)) else {
+            return self.end();
         };
-        if let Some(recording) = &mut self.recording {
+        if let Some(recording) = &mut self.recorder.recording {
             // Nobody will start what is not being played yet.
             recording.withdrawn = true;
         }
         // Whatever fails here, the summary is still to be written.
         let rested = self.await_rest(job.stream);
-        let ended = self.end_recording();
+        let ended = self.end();
         let run_outcome = self.run_outcome(&job);
         let summary = conclusion::conclude(&job.folder, machine, &run_outcome, job.began);
         if !told(&job) {
@@ -58,23 +59,25 @@ impl Service {
 
     /// Whether the job's stream is over, and its recording complete.
     fn rests(&mut self, stream: u64) -> bool {
-        if self.recording.is_some() {
+        if self.recorder.recording.is_some() {
             return false;
         }
-        let ended = self.controller.is_final == 1 && self.controller.stream == stream;
-        ended || self.newest_command.stream != stream || !self.more_comes()
+        let ended =
+            self.recorder.controller.is_final == 1 && self.recorder.controller.stream == stream;
+        ended || self.recorder.newest_command.stream != stream || !self.more_comes()
     }
 
     /// How a job ended whose supervisor is lost. A stream that the controller ended without a fault
     /// had ended before that.
     fn run_outcome(&self, job: &Job) -> RunOutcome {
-        let is_final = self.controller.is_final == 1 && self.controller.stream == job.stream;
-        let controller = is_final.then_some(self.controller);
+        let is_final =
+            self.recorder.controller.is_final == 1 && self.recorder.controller.stream == job.stream;
+        let controller = is_final.then_some(self.recorder.controller);
         let mut run_outcome = RunOutcome {
             overruns_before: job.overruns_before,
             controller,
-            latched: self.newest_command.fault,
-            drives: self.drives,
+            latched: self.recorder.newest_command.fault,
+            drives: self.recorder.drives,
             ..RunOutcome::default()
         };
         if let Some(refusal) = refusal(&job.folder) {

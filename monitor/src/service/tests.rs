@@ -2,10 +2,14 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
+use crate::conclusion::RecordingState;
 use crate::recording::file::RecordingReader;
 use crate::recording::info::RecordingInfo;
+use crate::run_folder::{FileError, RunFolder};
 use crate::summary::{Outcome, Summary};
-use messages::{Cycle, Fault, FaultCode, Nanoseconds};
+use messages::{
+    Command, ControllerReport, Cycle, Fault, FaultCode, Feedback, JobOffer, Nanoseconds, run_folder,
+};
 use runtime::{Instance, Publisher};
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -200,7 +204,7 @@ fn an_old_job_is_not_recorded_again() {
         bench.reports.greet().unwrap();
         bench.play(5, 0);
         service.poll().unwrap();
-        assert!(service.recording.is_none(), "{case}");
+        assert!(service.recorder.recording.is_none(), "{case}");
         assert_eq!(fs::read_dir(bench.folder.path()).unwrap().count(), before, "{case}");
     }
 }
@@ -214,14 +218,14 @@ fn a_job_whose_folder_is_gone_costs_no_more_than_its_recording() {
     bench.offers.publish(&offer).unwrap();
     bench.play(5, STREAM - 1);
     service.poll().unwrap();
-    assert!(service.recording.is_none() && !gone.exists());
+    assert!(service.recorder.recording.is_none() && !gone.exists());
     // Gone while it is recorded.
     fs::create_dir(&gone).unwrap();
     let offer = JobOffer::new(STREAM - 2, gone.to_str().unwrap()).unwrap();
     bench.offers.publish(&offer).unwrap();
     bench.play(5, STREAM - 2);
     service.poll().unwrap();
-    assert!(service.recording.is_some());
+    assert!(service.recorder.recording.is_some());
     fs::remove_dir_all(&gone).unwrap();
     bench.offer();
     service.poll().unwrap();
@@ -252,7 +256,7 @@ fn silence_ends_a_recording_that_waits_for_its_last_cycles() {
     let last_cycle = Cycle(bench.cycle + 50);
     bench.reports.publish(&ControllerReport { last_cycle, ..report }).unwrap();
     service.poll().unwrap();
-    service.heard = [Instant::now().checked_sub(SILENCE).unwrap(); 2];
+    service.hub.silence_for(SILENCE);
     service.poll().unwrap();
     assert!(matches!(bench.state(), RecordingState::Complete(_)));
 }
@@ -275,7 +279,7 @@ fn a_supervisor_that_dies_leaves_no_job_without_a_summary() {
     let mut service = bench.playing();
     bench.end(1, Fault::default());
     service.poll().unwrap();
-    assert!(service.recording.is_none());
+    assert!(service.recorder.recording.is_none());
     let summary = bench.concluded(&mut service);
     assert_eq!((summary.outcome, summary.error), (Outcome::Completed, None));
     let warnings = summary.warnings.join("; ");
@@ -310,7 +314,7 @@ fn a_supervisor_that_dies_leaves_no_job_without_a_summary() {
     let mut bench = Bench::new();
     let mut service = bench.playing();
     let source = std::io::ErrorKind::StorageFull.into();
-    service.drop_recording(&FileError { path: "samples.bin".into(), source }).unwrap();
+    service.recorder.drop_recording(&FileError { path: "samples.bin".into(), source }).unwrap();
     bench.play(20, STREAM);
     bench.end(0, lost);
     let summary = bench.concluded(&mut service);
