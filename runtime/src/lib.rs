@@ -25,6 +25,7 @@ mod membership;
 pub mod message;
 pub mod operator;
 pub mod peer;
+pub mod peer_user;
 pub mod raw_frames;
 pub mod ready;
 pub mod room;
