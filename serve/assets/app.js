@@ -1,0 +1,163 @@
+// Starts the page: its parts, its views, its keys, and what it shows of the connection.
+
+import { byId, setAttribute, setText, show } from "./dom.js";
+import { connect, http, on } from "./connection.js";
+import { Drawing, offerOrbit } from "./drawing.js";
+import { startEvents } from "./events.js";
+import { startHand } from "./hand.js";
+import { startJobs } from "./jobs.js";
+import { startJog } from "./jog.js";
+import { startLatency } from "./latency.js";
+import { startQueue } from "./queue.js";
+import { announce, lock, startRequests } from "./requests.js";
+import { startScope } from "./scope.js";
+import { BY_HAND, startStatus, status } from "./status.js";
+import { startTheme } from "./theme.js";
+import { Trail } from "./trail.js";
+
+const VIEWS = ["operate", "jobs", "scope", "latency", "events"];
+
+/** Shows one view, and says in the address which. */
+function showView(name, isFocused = false) {
+  const view = VIEWS.includes(name) ? name : VIEWS[0];
+  for (const each of VIEWS) {
+    const tab = byId(`tab-${each}`);
+    const isShown = each === view;
+    setAttribute(tab, "aria-selected", isShown);
+    tab.tabIndex = isShown ? 0 : -1;
+    show(byId(`view-${each}`), isShown);
+    if (isShown && isFocused) tab.focus();
+  }
+  if (location.hash !== `#${view}`) history.replaceState(null, "", `#${view}`);
+  window.dispatchEvent(new CustomEvent("viewshown", { detail: view }));
+}
+
+function startViews() {
+  VIEWS.forEach((view, index) => {
+    const tab = byId(`tab-${view}`);
+    tab.addEventListener("click", () => showView(view));
+    tab.addEventListener("keydown", (event) => {
+      const next = { ArrowRight: index + 1, ArrowLeft: index - 1, Home: 0, End: VIEWS.length - 1 }[event.key];
+      if (next === undefined) return;
+      event.preventDefault();
+      showView(VIEWS[(next + VIEWS.length) % VIEWS.length], true);
+    });
+  });
+  window.addEventListener("hashchange", () => showView(location.hash.slice(1)));
+  showView(location.hash.slice(1));
+}
+
+/** Keys that work anywhere but where somebody types. */
+function startKeys() {
+  const isOn = byId("keys-on");
+  isOn.checked = localStorage.getItem("graver.keys") !== "off";
+  isOn.addEventListener("change", () => localStorage.setItem("graver.keys", isOn.checked ? "on" : "off"));
+  const help = byId("help");
+  byId("help-open").addEventListener("click", () => help.showModal());
+  const hold = () => byId(BY_HAND.includes(status()?.state) ? "stop" : "hold").click();
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.repeat || event.defaultPrevented) return;
+    if (document.querySelector("dialog[open]")) return;
+    if (event.key === "Escape") {
+      hold();
+      return;
+    }
+    const isTyping = event.target.closest("input:not([type=range], [type=checkbox]), textarea, select");
+    if (isTyping || !isOn.checked) return;
+    if (event.shiftKey && event.code === "KeyS") byId("stop").click();
+    else if (event.shiftKey && event.code === "KeyR") byId("resume").click();
+    else if (event.key === "h") hold();
+    else if (event.key === "?") help.showModal();
+    else if (VIEWS[Number(event.key) - 1]) showView(VIEWS[Number(event.key) - 1], true);
+    else return;
+    event.preventDefault();
+  });
+}
+
+function showLink({ open, wasOpen }) {
+  document.body.dataset.link = open ? "open" : "lost";
+  setText(byId("link-word"), open ? "live" : "connecting…");
+  show(byId("banner"), !open);
+  if (open) return;
+  lock(true);
+  setText(byId("banner-title"), "No connection.");
+  setText(byId("banner-text"), "What is shown is old, and nothing can be operated from here. The machine goes on by itself: stop it at the machine. Trying again…");
+  if (wasOpen) announce("The connection is lost", true);
+  http("GET", "status").catch((error) => {
+    if (error.status === 401 && !byId("login").open) byId("login").showModal();
+  });
+}
+
+function startLink() {
+  on("link", showLink);
+  on("hello", ({ role, machine }) => {
+    const operatesNow = role === "operate";
+    document.body.dataset.role = operatesNow ? "operate" : "watch";
+    show(byId("role-word"), !operatesNow);
+    setText(byId("machine-name"), machine.name ?? "Graver");
+    setText(byId("machine-kind"), `${machine.mechanism ?? ""}${machine.simulated ? ", simulated" : ""}`);
+    if (byId("login").open) byId("login").close();
+    lock(!operatesNow);
+  });
+}
+
+/** The drawing of the first view: artwork of the job under way, path and tool. */
+function startDrawing() {
+  const trail = new Trail();
+  const drawing = new Drawing(byId("drawing"), trail);
+  let stream = -1;
+  let isSpatial = null;
+  const fetchArtwork = async () => {
+    try {
+      const artwork = await http("GET", "artwork");
+      drawing.setArtwork(artwork?.strokes?.length ? artwork : null);
+    } catch {
+      // Without a job under way there is none.
+      drawing.setArtwork(null);
+    }
+  };
+  on("hello", ({ machine }) => {
+    drawing.setArea(machine.area, machine.home);
+    if (isSpatial !== machine.is_spatial) offerOrbit(drawing, Boolean(machine.is_spatial));
+    isSpatial = machine.is_spatial;
+    trail.clear();
+    drawing.invalidate();
+    fetchArtwork();
+  });
+  on("path", (message) => {
+    if (message.reset) {
+      trail.clear();
+      drawing.isFitted = true;
+      drawing.invalidate();
+      fetchArtwork();
+    }
+    trail.add(message.points);
+    const last = message.points.at(-1);
+    if (last) drawing.setTool(last.slice(0, 3), last[3] > 0.02);
+  });
+  on("status", ({ status: now }) => {
+    drawing.setTool(now.tool, Boolean(now.lit));
+    // The drawing of a job is known when its plan is; it grows while it is planned.
+    if (now.stream !== stream) {
+      stream = now.stream;
+      if (stream !== 0) fetchArtwork();
+    }
+  });
+  window.addEventListener("viewshown", () => drawing.request());
+}
+
+startTheme();
+startViews();
+startKeys();
+startRequests();
+startLink();
+startStatus();
+startHand();
+startJog();
+startDrawing();
+startQueue();
+startJobs();
+startScope();
+startLatency();
+startEvents();
+connect();
