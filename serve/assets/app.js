@@ -2,18 +2,17 @@
 
 import { byId, setAttribute, setText, show } from "./dom.js";
 import { connect, http, on } from "./connection.js";
-import { Drawing, offerOrbit } from "./drawing.js";
 import { startEvents } from "./events.js";
 import { startHand } from "./hand.js";
 import { startJobs } from "./jobs.js";
 import { startJog } from "./jog.js";
 import { startLatency } from "./latency.js";
+import { startMap } from "./map.js";
 import { startQueue } from "./queue.js";
 import { announce, lock, startRequests } from "./requests.js";
 import { startScope } from "./scope.js";
 import { BY_HAND, startStatus, status } from "./status.js";
 import { startTheme } from "./theme.js";
-import { Trail } from "./trail.js";
 
 const VIEWS = ["operate", "jobs", "scope", "latency", "events"];
 
@@ -74,14 +73,21 @@ function startKeys() {
   });
 }
 
+function showBanner(title, text) {
+  lock(true);
+  setText(byId("banner-title"), title);
+  setText(byId("banner-text"), text);
+  show(byId("banner"), true);
+}
+
 function showLink({ open, wasOpen }) {
   document.body.dataset.link = open ? "open" : "lost";
   setText(byId("link-word"), open ? "live" : "connecting…");
-  show(byId("banner"), !open);
-  if (open) return;
-  lock(true);
-  setText(byId("banner-title"), "No connection.");
-  setText(byId("banner-text"), "What is shown is old, and nothing can be operated from here. The machine goes on by itself: stop it at the machine. Trying again…");
+  if (open) {
+    show(byId("banner"), false);
+    return;
+  }
+  showBanner("No connection.", "What is shown is old, and nothing can be operated from here. The machine goes on by itself: stop it at the machine. Trying again…");
   if (wasOpen) announce("The connection is lost", true);
   http("GET", "status").catch((error) => {
     if (error.status === 401 && !byId("login").open) byId("login").showModal();
@@ -99,51 +105,19 @@ function startLink() {
     if (byId("login").open) byId("login").close();
     lock(!operatesNow);
   });
-}
-
-/** The drawing of the first view: artwork of the job under way, path and tool. */
-function startDrawing() {
-  const trail = new Trail();
-  const drawing = new Drawing(byId("drawing"), trail);
-  let stream = -1;
-  let isSpatial = null;
-  const fetchArtwork = async () => {
-    try {
-      const artwork = await http("GET", "artwork");
-      drawing.setArtwork(artwork?.strokes?.length ? artwork : null);
-    } catch {
-      // Without a job under way there is none.
-      drawing.setArtwork(null);
-    }
-  };
-  on("hello", ({ machine }) => {
-    drawing.setArea(machine.area, machine.home);
-    if (isSpatial !== machine.is_spatial) offerOrbit(drawing, Boolean(machine.is_spatial));
-    isSpatial = machine.is_spatial;
-    trail.clear();
-    drawing.invalidate();
-    fetchArtwork();
+  let isSilent = false;
+  on("silent", ({ error }) => {
+    isSilent = true;
+    document.body.dataset.link = "silent";
+    showBanner("The pipeline does not answer.", `${error ?? ""} What is shown is old; this page goes on when it answers again.`);
   });
-  on("path", (message) => {
-    if (message.reset) {
-      trail.clear();
-      drawing.isFitted = true;
-      drawing.invalidate();
-      fetchArtwork();
-    }
-    trail.add(message.points);
-    const last = message.points.at(-1);
-    if (last) drawing.setTool(last.slice(0, 3), last[3] > 0.02);
+  on("status", () => {
+    if (!isSilent) return;
+    isSilent = false;
+    document.body.dataset.link = "open";
+    show(byId("banner"), false);
+    lock(document.body.dataset.role !== "operate");
   });
-  on("status", ({ status: now }) => {
-    drawing.setTool(now.tool, Boolean(now.lit));
-    // The drawing of a job is known when its plan is; it grows while it is planned.
-    if (now.stream !== stream) {
-      stream = now.stream;
-      if (stream !== 0) fetchArtwork();
-    }
-  });
-  window.addEventListener("viewshown", () => drawing.request());
 }
 
 startTheme();
@@ -154,7 +128,7 @@ startLink();
 startStatus();
 startHand();
 startJog();
-startDrawing();
+startMap();
 startQueue();
 startJobs();
 startScope();

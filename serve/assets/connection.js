@@ -11,7 +11,8 @@ let delay = FIRST_DELAY;
 let lastWord = 0;
 let isOpen = false;
 
-/** Calls `listener` with each message of this type; "link" tells {open, wait}, "scope" a binary picture. */
+/** Calls `listener` with each message of this type; "link" tells {open}, "silent" a pipeline that does not answer, "scope"
+ * a binary picture. */
 export function on(type, listener) {
   if (!listeners.has(type)) listeners.set(type, []);
   listeners.get(type).push(listener);
@@ -54,7 +55,10 @@ function heard(event) {
     console.error("a message that is no JSON:", event.data.slice(0, 200));
     return;
   }
-  emit(message.type, message);
+  if (message.type === "hello") message.machine ??= {};
+  // A server whose pipeline does not answer says so in the place of a status.
+  if (message.type === "status" && !message.status) emit("silent", message);
+  else emit(message.type, message);
 }
 
 /** A binary message: length of the header, the header as JSON, then a block of numbers for each signal. */

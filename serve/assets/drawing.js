@@ -7,7 +7,7 @@ import { fixed } from "./format.js";
 import { Flat, Orbit } from "./projection.js";
 import { drawGrid, drawRulers } from "./rulers.js";
 import { color, onTheme } from "./theme.js";
-import { drawArea, drawArtwork, drawAxes, drawTool } from "./marks.js";
+import { drawArea, drawArtwork, drawAxes, drawBounds, drawTool } from "./marks.js";
 
 /** While a view moves, no more pieces of the path than these are drawn. */
 const QUICK = 40_000;
@@ -22,6 +22,9 @@ export class Drawing {
     this.flat = new Flat();
     this.orbit = new Orbit();
     this.isOrbit = false;
+    /** Called with how far the drawing was dragged [m], where it may be. */
+    this.onPlace = null;
+    this.shift = [0, 0];
     this.showsDark = true;
     this.follows = false;
     this.isFitted = true;
@@ -74,6 +77,28 @@ export class Drawing {
     this.request();
   }
 
+  /** Takes hold of the drawing, if it may be placed and the pointer is on it. */
+  grab(x, y) {
+    const bounds = this.artwork?.bounds;
+    if (!this.onPlace || this.isOrbit || !bounds) return null;
+    const from = this.flat.placeAt(x, y);
+    const margin = 6 / this.flat.scale;
+    const isOn = from.every((value, axis) => value > bounds.lower[axis] - margin && value < bounds.upper[axis] + margin);
+    if (!isOn) return null;
+    return {
+      move: (left, top) => {
+        this.shift = this.flat.placeAt(left, top).map((value, axis) => value - from[axis]);
+        this.isFitted = false;
+        this.invalidate();
+      },
+      end: () => {
+        if (Math.hypot(...this.shift) * this.flat.scale > 3) this.onPlace(this.shift);
+        else this.shift = [0, 0];
+        this.invalidate();
+      },
+    };
+  }
+
   press(button) {
     const projection = this.projection();
     const middle = [projection.width / 2, projection.height / 2];
@@ -110,6 +135,7 @@ export class Drawing {
   /** What is to be marked: {strokes, bounds}, or null. */
   setArtwork(artwork) {
     this.artwork = artwork;
+    this.shift = [0, 0];
     if (this.isFitted) this.fit();
     this.invalidate();
   }
@@ -192,7 +218,10 @@ export class Drawing {
     context.fillStyle = color("ink-paper");
     context.fillRect(0, 0, projection.width, projection.height);
     drawArea(context, projection, this.area, this.home, this.isOrbit ? null : () => drawGrid(context, projection));
-    if (this.artwork) drawArtwork(context, projection, this.artwork.strokes, this.trail === null);
+    if (!this.artwork) return;
+    context.translate(this.shift[0] * projection.scale, -this.shift[1] * projection.scale);
+    drawArtwork(context, projection, this.artwork.strokes, this.trail === null);
+    if (this.trail === null && !this.isOrbit) drawBounds(context, projection, this.artwork.bounds);
   }
 
   drawPath() {

@@ -4,7 +4,7 @@ import { byId, make, setText, show } from "./dom.js";
 import { http, on } from "./connection.js";
 import { clock } from "./format.js";
 import { announce } from "./requests.js";
-import { adviceFor } from "./status.js";
+import { adviceFor, inWords } from "./status.js";
 
 const MOST = 300;
 const WORDS = { info: "", warning: "⚠ Warning: ", fault: "◆ Fault: " };
@@ -30,22 +30,29 @@ export function startEvents() {
   const list = byId("events");
   const faults = byId("faults");
   let isEmpty = true;
-  list.append(make("li", { class: "dim" }, "Nothing happened since this page was opened."));
+  list.append(make("li", { class: "dim" }, "Nothing happened yet."));
+  const opened = Date.now();
+  const told = new Set();
   on("event", ({ level, text, advice, time }) => {
+    // After a lost connection the server tells the newest ones again.
+    const key = `${time} ${text}`;
+    if (told.has(key)) return;
+    told.add(key);
+    const isNew = time > opened;
     if (isEmpty) list.replaceChildren();
     isEmpty = false;
-    list.prepend(entry(level, time > 1e11 ? time / 1e3 : time, text, advice ?? (level === "fault" ? adviceFor(text) : "")));
+    list.prepend(entry(level, time / 1e3, text, advice ?? (level === "fault" ? adviceFor(text) : "")));
     while (list.children.length > MOST) list.lastChild.remove();
-    if (byId("view-events").hidden && level !== "info") {
+    if (isNew && byId("view-events").hidden && level !== "info") {
       unseen += 1;
       count(level === "fault");
     }
-    if (level !== "info") announce(text, level === "fault");
+    if (isNew && level !== "info") announce(text, level === "fault");
   });
   let shown = null;
   const showFaults = (all) => {
     faults.replaceChildren(...(all.length ? [...all].reverse().map((fault) =>
-      entry("fault", fault.time, `${fault.code}${fault.detail && fault.detail !== fault.code ? `: ${fault.detail.replace(`${fault.code}: `, "")}` : ""}`,
+      entry("fault", fault.time, inWords(fault.detail?.startsWith(fault.code) ? fault.detail : `${fault.code}: ${fault.detail}`),
         fault.advice ?? adviceFor(fault.code), fault.job ? `in ${fault.job}` : "")) : [make("li", { class: "dim" }, "No faults.")]));
   };
   on("status", async ({ status }) => {

@@ -1,9 +1,12 @@
 // Pointer, wheel and keys on a canvas, as moves of a projection.
 
-/** Listens on `canvas`; `view` has projection(), changed(), fit() and hover(x, y or null). */
+/**
+ * Listens on `canvas`; `view` has projection(), changed(), fit(), hover(x, y or null), and grab(x, y), which gives
+ * {move(x, y), end()} where there is something to be dragged by itself.
+ */
 export function listen(canvas, view) {
   const pointers = new Map();
-  let moved = false;
+  let grip = null;
 
   const local = (event) => {
     const box = canvas.getBoundingClientRect();
@@ -20,20 +23,23 @@ export function listen(canvas, view) {
   canvas.addEventListener("pointerdown", (event) => {
     if (event.button > 1) return;
     const at = local(event);
-    if (pointers.size === 0 && view.grab?.(at[0], at[1], event)) return;
     canvas.setPointerCapture(event.pointerId);
+    // A finger moves the view only: what it lies on is too easily taken along.
+    grip = pointers.size === 0 && event.pointerType !== "touch" && event.button === 0 ? view.grab?.(...at) : null;
     pointers.set(event.pointerId, at);
-    moved = false;
   });
   canvas.addEventListener("pointermove", (event) => {
     const at = local(event);
     view.hover?.(at[0], at[1]);
     if (!pointers.has(event.pointerId)) return;
+    if (grip) {
+      grip.move(...at);
+      return;
+    }
     const [x, y, apart] = spread();
     pointers.set(event.pointerId, at);
     const [newX, newY, newApart] = spread();
     const projection = view.projection();
-    moved = true;
     if (projection.turnBy && pointers.size === 1 && !event.shiftKey && event.buttons !== 4) {
       projection.turnBy(newX - x, newY - y);
     } else {
@@ -44,7 +50,8 @@ export function listen(canvas, view) {
   });
   const end = (event) => {
     pointers.delete(event.pointerId);
-    if (event.type === "pointerup" && !moved) view.click?.(...local(event));
+    grip?.end();
+    grip = null;
   };
   canvas.addEventListener("pointerup", end);
   canvas.addEventListener("pointercancel", end);

@@ -10,12 +10,16 @@ import { announce, attempt, locked, operates, refuse } from "./requests.js";
 const LARGEST = 64 * 1024 * 1024;
 /** How long nothing is typed before a job is checked again [ms]. */
 const PAUSE = 500;
+/** How often a plan is asked for while the server is busy. */
+const TRIES = 60;
 
 const files = new Map();
 let chosen = null;
 let preview = null;
 let asked = 0;
 let pause = 0;
+/** Takes how far the drawing was dragged in the preview [m]. */
+let placed = null;
 
 async function upload(file) {
   const noteElement = byId("upload-note");
@@ -68,6 +72,7 @@ function choose(id) {
   }
   setText(byId("job-title"), file.name);
   buildForm(byId("job-form"), file.kind, file.values);
+  preview.onPlace = byId("job-form").elements.x ? placed : null;
   preview.isFitted = true;
   check();
 }
@@ -90,16 +95,29 @@ function showCheck(result) {
   }
   const mm = (value, axis) => fixed((value?.[axis] ?? NaN) * 1e3, 1);
   const { lower, upper } = result.bounds ?? {};
-  const [least, most] = result.power ?? [];
+  const [least, most] = result.power ?? [0, 0];
+  const said = (it) => (typeof it === "string" ? it : it.line ? `line ${it.line}: ${it.text}` : it.text);
   box.replaceChildren(
     make("p", { class: "check-word good" }, result.warnings?.length ? "✓ Possible, with warnings" : "✓ Ready to mark"),
     make("dl", { class: "check-facts" },
       fact("time", duration(result.time)), fact("strokes", String(result.strokes)), fact("length", `${fixed(result.length * 1e3, 1)} mm`),
-      fact("power", least === most ? percent(most) : `${percent(least)} to ${percent(most)}`),
-      fact("x", `${mm(lower, 0)} to ${mm(upper, 0)} mm`), fact("y", `${mm(lower, 1)} to ${mm(upper, 1)} mm`)),
+      fact("power", most === 0 ? "never lit" : least === most ? percent(most) : `${percent(least)} to ${percent(most)}`),
+      ...(lower ? ["x", "y", "z"].filter((_, axis) => axis < 2 || upper[2] > lower[2]).map((name, axis) => fact(name, `${mm(lower, axis)} to ${mm(upper, axis)} mm`)) : [])),
     make("ul", { class: "check-notes" },
-      ...(result.warnings ?? []).map((text) => make("li", { class: "warning" }, `⚠ ${text}`)),
-      ...(result.notes ?? []).map((text) => make("li", {}, text))));
+      ...(result.warnings ?? []).map((text) => make("li", { class: "warning" }, `⚠ ${said(text)}`)),
+      ...(result.notes ?? []).map((text) => make("li", {}, said(text)))));
+}
+
+/** Asks for a plan; while the server plans another one, it is asked again. */
+async function planned(path, set, isWanted) {
+  for (let tries = 0; ; tries++) {
+    try {
+      return await http("POST", path, { set });
+    } catch (error) {
+      if (error.status !== 429 || tries >= TRIES || !isWanted()) throw error;
+    }
+    await new Promise((resolve) => setTimeout(resolve, PAUSE));
+  }
 }
 
 /** Checks the chosen job and shows where it lies; an answer that came too late is not shown. */
@@ -107,17 +125,19 @@ async function check() {
   const file = files.get(chosen);
   if (!file) return;
   const mine = ++asked;
+  const isWanted = () => mine === asked;
   const set = settings(file.kind, file.values);
-  const box = byId("check-result");
-  box.replaceChildren(make("p", { class: "check-word wait" }, "… Checking"));
-  const [checked, drawn] = await Promise.allSettled([
-    http("POST", `jobs/${file.id}/check`, { set }),
-    http("POST", `jobs/${file.id}/preview`, { set }),
-  ]);
-  if (mine !== asked) return;
-  if (checked.status === "fulfilled") showCheck(checked.value);
-  else showCheck({ ok: false, error: { message: checked.reason.message } });
-  preview.setArtwork(drawn.status === "fulfilled" && drawn.value?.strokes?.length ? drawn.value : null);
+  byId("check-result").replaceChildren(make("p", { class: "check-word wait" }, "… Checking"));
+  let drawing = null;
+  try {
+    const result = await planned(`jobs/${file.id}/check`, set, isWanted);
+    if (!isWanted()) return;
+    showCheck(result);
+    if (result.ok) drawing = await planned(`jobs/${file.id}/preview`, set, isWanted);
+  } catch (error) {
+    if (isWanted()) showCheck({ ok: false, error: { message: error.message } });
+  }
+  if (isWanted()) preview.setArtwork(drawing?.strokes?.length ? drawing : null);
 }
 
 async function submit(button, extra, what) {
@@ -182,6 +202,13 @@ export function startJobs() {
     pause = setTimeout(check, PAUSE);
   });
   form.addEventListener("submit", (event) => event.preventDefault());
+  placed = (shift) => {
+    ["x", "y"].forEach((name, axis) => {
+      const field = form.elements[name];
+      field.value = Number((Number(field.value) + shift[axis] * 1e3).toFixed(2));
+    });
+    form.dispatchEvent(new Event("input"));
+  };
   const none = () => [];
   const ways = [
     ["job-submit", none, "The job"],

@@ -55,7 +55,11 @@ function jogButton(axis, sign, place, arrow) {
     button.setPointerCapture(event.pointerId);
     press(button, axis, sign);
   });
-  for (const type of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(type, release);
+  for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) button.addEventListener(type, release);
+  // Another button of the pad takes the focus after it was pressed: that is not the end of its press.
+  button.addEventListener("blur", () => {
+    if (held?.button === button) release();
+  });
   button.addEventListener("contextmenu", (event) => event.preventDefault());
   button.addEventListener("keydown", (event) => {
     if (event.key !== " " && event.key !== "Enter") return;
@@ -118,7 +122,9 @@ export function startJog() {
     if (button) press(button, ...way);
   });
   pad.addEventListener("keyup", release);
-  pad.addEventListener("focusout", release);
+  pad.addEventListener("focusout", ({ relatedTarget }) => {
+    if (!pad.contains(relatedTarget)) release();
+  });
   window.addEventListener("blur", release);
   window.addEventListener("pagehide", release);
   document.addEventListener("visibilitychange", release);

@@ -1,5 +1,6 @@
 // What is drawn into a drawing: the working area, strokes and dots, the tool, and the axes of the view in space.
 
+import { fixed } from "./format.js";
 import { color } from "./theme.js";
 
 /** The working area, its home, and the grid upon it. */
@@ -83,6 +84,24 @@ export function drawArtwork(context, projection, strokes, isStrong) {
   for (let index = 0; index < dots.length; index += 2) {
     context.fillRect(dots[index] - size / 2, dots[index + 1] - size / 2, size, size);
   }
+}
+
+/** The box around a drawing, with its size. */
+export function drawBounds(context, projection, bounds) {
+  if (!bounds) return;
+  const [from, to] = [[0, 0], [0, 0]];
+  projection.project(bounds.lower[0], bounds.upper[1], 0, from);
+  projection.project(bounds.upper[0], bounds.lower[1], 0, to);
+  context.strokeStyle = context.fillStyle = color("dim");
+  context.lineWidth = 1;
+  context.setLineDash([4, 4]);
+  context.strokeRect(from[0] - 5, from[1] - 5, to[0] - from[0] + 10, to[1] - from[1] + 10);
+  context.setLineDash([]);
+  const size = [0, 1].map((axis) => fixed((bounds.upper[axis] - bounds.lower[axis]) * 1e3, 1));
+  context.font = "12px system-ui, sans-serif";
+  context.textAlign = "right";
+  context.fillText(`${size[0]} × ${size[1]} mm`, to[0] + 5, to[1] + 20);
+  context.textAlign = "start";
 }
 
 /** The tool: a cross with a ring, and a bright middle while the laser is lit. */

@@ -9,7 +9,7 @@ import { Traces } from "./traces.js";
 
 const SECONDS = [0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
 /** Signals that a scope begins with, the first that the machine has. */
-const FIRST = [/^tool_x$/, /position/, /speed/, /lit|power/];
+const FIRST = [/^progress\.tool\.x$/, /following_error/, /^feedback\.current/, /^feedback\.lit$/];
 
 let traces = null;
 let plot = null;
@@ -127,6 +127,7 @@ function begin(signals) {
     const names = new Set(traces.known.map(({ name }) => name));
     const first = saved.filter((name) => names.has(name));
     const chosen = first.length ? first : FIRST.map((pattern) => traces.known.find(({ name }) => pattern.test(name))?.name).filter(Boolean);
+    if (chosen.length === 0) chosen.push(...traces.known.slice(0, 1).map(({ name }) => name));
     for (const name of new Set(chosen)) traces.add(name);
     run("run");
   } else if (running !== "off") requestSoon();

@@ -35,9 +35,14 @@ export function status() {
   return latest;
 }
 
+/** A code at the beginning of a text as words: "emergency_stop" is "emergency stop". */
+export function inWords(text) {
+  return text.replace(/^[a-z_]+/, (code) => code.replaceAll("_", " "));
+}
+
 function causeOf(now) {
   if (now.cause) return now.cause;
-  if (now.state === "faulted" || now.state === "halted") return now.fault ?? CAUSES[now.state];
+  if (now.state === "faulted" || now.state === "halted") return now.fault ? inWords(now.fault) : CAUSES[now.state];
   if (now.state === "idle" && now.unhomed?.length) return `Not homed: ${now.unhomed.join(", ")}`;
   if (now.state === "idle" && now.planner === "planning") return "Planning the job";
   if (now.state === "running") return now.lit ? "Marking" : "In the dark, on the way to the next stroke";
@@ -123,12 +128,24 @@ function showFault(now) {
   show(byId("fault"), Boolean(now.fault));
   if (!now.fault) return;
   const newest = now.faults?.at(-1);
-  setText(byId("fault-text"), now.fault);
+  setText(byId("fault-text"), inWords(now.fault));
   setText(byId("fault-advice"), newest?.advice ?? (adviceFor(now.fault) || adviceFor(newest?.code)));
+}
+
+/** Says that nothing is known any more, and what was known last. */
+function showLost(word) {
+  document.body.dataset.state = "lost";
+  setText(byId("state-word"), word);
+  setText(byId("state-cause"), latest ? `Last known: ${WORDS[latest.state] ?? latest.state}` : "");
+  document.title = `${word} – Graver`;
 }
 
 /** Shows every status that comes. */
 export function startStatus() {
+  on("link", ({ open }) => {
+    if (!open) showLost("No connection");
+  });
+  on("silent", () => showLost("No pipeline"));
   on("status", ({ status: now }) => {
     latest = now;
     showHeader(now);

@@ -32,7 +32,6 @@ function apply(choice) {
   if (choice === "auto") delete document.documentElement.dataset.theme;
   else document.documentElement.dataset.theme = choice;
   setText(byId("theme-word"), NAMES[choice]);
-  byId("theme").setAttribute("aria-label", `Colour scheme: ${choice === "auto" ? "as the system" : choice}`);
   changed();
 }
 

@@ -90,7 +90,7 @@ export class Traces {
       make("div", { class: "scale" },
         button("−", "finer scale", () => rescale(0.5)), trace.scaleText, button("+", "coarser scale", () => rescale(2)),
         button("↓", "move down", () => shift(-1)), button("↑", "move up", () => shift(1)),
-        button("Auto", "scale by itself", () => (trace.isAuto = true))),
+        button("Auto", "Auto scale", () => (trace.isAuto = true))),
       make("div", { class: "values" }, ...trace.values));
   }
 
