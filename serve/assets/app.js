@@ -3,6 +3,7 @@
 import { byId, setAttribute, setText, show } from "./dom.js";
 import { connect, http, on } from "./connection.js";
 import { startEvents } from "./events.js";
+import { startFaults } from "./faults.js";
 import { startHand } from "./hand.js";
 import { startJobs } from "./jobs.js";
 import { startJog } from "./jog.js";
@@ -52,13 +53,16 @@ function startKeys() {
   isOn.checked = localStorage.getItem("graver.keys") !== "off";
   isOn.addEventListener("change", () => localStorage.setItem("graver.keys", isOn.checked ? "on" : "off"));
   const help = byId("help");
-  byId("help-open").addEventListener("click", () => help.showModal());
+  // Hold and stop stay within reach while the help is open.
+  const toggleHelp = () => (help.open ? help.close() : help.show());
+  byId("help-open").addEventListener("click", toggleHelp);
   const hold = () => byId(BY_HAND.includes(status()?.state) ? "stop" : "hold").click();
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || event.repeat || event.defaultPrevented) return;
-    if (document.querySelector("dialog[open]")) return;
+    if (byId("login").open) return;
     if (event.key === "Escape") {
-      hold();
+      if (help.open) help.close();
+      else hold();
       return;
     }
     const isTyping = event.target.closest("input:not([type=range], [type=checkbox]), textarea, select");
@@ -66,7 +70,7 @@ function startKeys() {
     if (event.shiftKey && event.code === "KeyS") byId("stop").click();
     else if (event.shiftKey && event.code === "KeyR") byId("resume").click();
     else if (event.key === "h") hold();
-    else if (event.key === "?") help.showModal();
+    else if (event.key === "?") toggleHelp();
     else if (VIEWS[Number(event.key) - 1]) showView(VIEWS[Number(event.key) - 1], true);
     else return;
     event.preventDefault();
@@ -134,4 +138,5 @@ startJobs();
 startScope();
 startLatency();
 startEvents();
+startFaults();
 connect();

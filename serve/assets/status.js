@@ -1,6 +1,6 @@
 // State and cause in words, how far the job is, and the readings under the drawing.
 
-import { byId, make, setAttribute, setText, show } from "./dom.js";
+import { byId, make, setAttribute, setText } from "./dom.js";
 import { on } from "./connection.js";
 import { duration, percent, place, speed } from "./format.js";
 import { announce } from "./requests.js";
@@ -105,33 +105,6 @@ function showPipeline(now) {
   });
 }
 
-/** What to do about a fault, where the server does not say it: the manual's table in a few words. */
-const ADVICE = {
-  following_error: "Look for a jam, wrong motor data or friction; the report plots the error.",
-  racking: "Look for a jam or a lost belt on that side; square the axis by hand before it is enabled again.",
-  position_limit: "Was the axis moved by hand?", stale_feedback: "The PC is overloaded: see its real-time settings.",
-  stream_starved: "Look at the planner's process and the load.", overrun: "The PC is overloaded.",
-  stale_command: "The PC is overloaded, or a controller hangs.", stream_start: "Submit the job again.",
-  drive_fault: "Reset, then enable; an axis that sinks needs a brake.",
-  emergency_stop: "Release the emergency stop, then reset and enable.",
-  hard_limit: "Reset, enable, and jog the axis away from its switch.", door_opened: "Close the door, then reset.",
-  homing_failed: "Look at the switch: the inputs show whether it is active.", overload: "Go slower, or use a larger motor.",
-};
-
-/** Advice for the code that a text begins with. */
-export function adviceFor(text) {
-  const code = /^[a-z_]+/.exec(text ?? "")?.[0];
-  return ADVICE[code] ?? (code?.endsWith("_lost") ? "Start that process again, then reset and enable." : "");
-}
-
-function showFault(now) {
-  show(byId("fault"), Boolean(now.fault));
-  if (!now.fault) return;
-  const newest = now.faults?.at(-1);
-  setText(byId("fault-text"), inWords(now.fault));
-  setText(byId("fault-advice"), newest?.advice ?? (adviceFor(now.fault) || adviceFor(newest?.code)));
-}
-
 /** Says that nothing is known any more, and what was known last. */
 function showLost(word) {
   document.body.dataset.state = "lost";
@@ -149,7 +122,6 @@ export function startStatus() {
   on("status", ({ status: now }) => {
     latest = now;
     showHeader(now);
-    showFault(now);
     showReadings(now);
     showPipeline(now);
     setText(byId("motion-end"), ENDS[now.motion_end] ?? "");

@@ -138,6 +138,17 @@ async function scopes(page) {
   await page.click("#scope-cursors");
   await until(page, "cursors measure", () => /Δt/.test(document.getElementById("scope-delta").textContent) && [...document.querySelectorAll(".trace b")].some((it) => /\d/.test(it.textContent)));
   await picture(page, "scope");
+  const saved = await page.evaluate(async () => {
+    let blob = null;
+    const { createObjectURL } = URL;
+    URL.createObjectURL = (it) => createObjectURL.call(URL, (blob = it));
+    document.getElementById("scope-save").click();
+    URL.createObjectURL = createObjectURL;
+    return blob.text();
+  });
+  const lines = saved.trim().split("\n");
+  const columns = new Set(lines.map((line) => line.split(",").length));
+  found(/^time \[s\],/.test(saved) && lines.length > 100 && columns.size === 1, `the picture is saved: ${lines.length} lines, ${lines[0]}`);
   await view(page, "latency");
   await until(page, "latencies are shown", () => document.querySelectorAll(".hop").length > 3);
   await wait(1200);
