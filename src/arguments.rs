@@ -6,6 +6,7 @@ mod offset;
 mod operating;
 mod pipeline;
 mod planning;
+mod queue;
 mod workbench;
 
 pub use self::workbench::{
@@ -27,12 +28,14 @@ pub use planning::{
     ProfileName,
 };
 
+pub use queue::{QueueCommand, QueueJobArguments, QueueMoveArguments};
+
 use crate::exit;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use examples::{
     CALIBRATE_EXAMPLES, CHECK_EXAMPLES, COMPARE_EXAMPLES, EXPORT_EXAMPLES, FIGURES_EXAMPLES,
-    KINEMATICS_EXAMPLES, PLAN_EXAMPLES, RUN_EXAMPLES, SERVICES, SIMULATE_EXAMPLES, SIZE_EXAMPLES,
-    TABLES_EXAMPLES,
+    KINEMATICS_EXAMPLES, PLAN_EXAMPLES, QUEUE_EXAMPLES, RUN_EXAMPLES, SERVICES, SIMULATE_EXAMPLES,
+    SIZE_EXAMPLES, SUBMIT_EXAMPLES, TABLES_EXAMPLES,
 };
 use std::path::PathBuf;
 
@@ -82,7 +85,11 @@ pub enum Command {
     #[command(subcommand)]
     Bench(BenchCommand),
     /// Hand a job to a pipeline that `graver domain` holds, and follow it to its end.
+    #[command(after_help = SUBMIT_EXAMPLES)]
     Submit(SubmitArguments),
+    /// The jobs of a pipeline: list, cancel, move, repeat, and begin those that wait.
+    #[command(subcommand, after_help = QUEUE_EXAMPLES)]
+    Queue(QueueCommand),
     /// Feed hold: laser off at once, then to rest along the path.
     Hold(InstanceArguments),
     /// Go on from a hold without losing or doubling a mark.
@@ -123,8 +130,8 @@ pub enum Command {
     /// The tables of the sources: as printed, with the errata applied, and as modelled.
     #[command(after_help = TABLES_EXAMPLES)]
     Tables(TablesArguments),
-    /// Create and hold an instance's channels, for services that somebody else starts, and run
-    /// the jobs that are submitted.
+    /// Create and hold an instance's channels, start its services or wait for those that somebody else
+    /// starts, and run the jobs that are submitted.
     #[command(after_help = SERVICES)]
     Domain(DomainArguments),
     /// The planner service: reads, plans and checks a job, and streams its setpoints.

@@ -17,7 +17,7 @@ use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
     bench, calibrate, check, compare, export, faults, figures, kinematics, machine, manual, offset,
-    operating, operator, plan, run, service, simulate, size, tables, verify,
+    operating, operator, plan, queue, run, service, simulate, size, submit, tables, verify,
 };
 use exit::{Exit, Failure};
 use runtime::domain::Role;
@@ -51,7 +51,8 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Bench(BenchCommand::Latency(arguments)) => bench::latency::run(arguments),
         Command::Bench(BenchCommand::Plan(arguments)) => bench::planning::run(arguments),
         Command::Bench(BenchCommand::Simulate(arguments)) => bench::simulate(arguments),
-        Command::Submit(arguments) => operator::submit(arguments),
+        Command::Submit(arguments) => submit::run(arguments),
+        Command::Queue(command) => queue::run(command),
         Command::Hold(arguments) => operator::verb(Verb::Hold, arguments),
         Command::Resume(arguments) => operator::verb(Verb::Resume, arguments),
         Command::Stop(arguments) => operator::verb(Verb::Stop, arguments),

@@ -5,12 +5,14 @@
 //! real-time path: it watches, asks and writes down.
 
 mod caps;
+mod cause;
 pub mod configuration;
 pub mod control;
 pub mod fault_history;
 pub mod job_run;
 pub mod operators;
 pub mod power_up;
+pub mod queue;
 mod refusals;
 pub mod services;
 pub mod status;
@@ -24,8 +26,9 @@ use messages::{
     ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorReply, OperatorVerb,
     PlannerReport, Progress, SimulatedInputs,
 };
-use operators::{Operators, Submission};
+use operators::Operators;
 use power_up::PowerUp;
+use queue::JobQueue;
 use runtime::domain::Role;
 use runtime::operator::{OperatorError, OperatorLink};
 use runtime::peer::Peer;
@@ -39,9 +42,6 @@ use std::time::{Duration, Instant};
 
 /// How often the supervisor polls the services.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(10);
-
-/// The number of the job of a pipeline that has one only.
-const ONLY_JOB: u64 = 1;
 
 /// How long the axes may take to come to rest.
 const REST_PATIENCE: Duration = Duration::from_secs(10);
@@ -57,6 +57,15 @@ pub enum ServiceOwner {
     Own,
     /// Somebody else does, such as systemd.
     Others,
+}
+
+/// Where the jobs of a pipeline come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JobSource {
+    /// It has one of its own, which it ends with.
+    Own,
+    /// People submit them.
+    Submitted,
 }
 
 /// The newest of what the services say.
@@ -118,7 +127,9 @@ pub struct Pipeline {
     pub board: Arc<StatusBoard>,
     /// What they ask of the job under way.
     pub control: Arc<JobControl>,
-    operators: Operators,
+    /// The jobs.
+    pub queue: Arc<JobQueue>,
+    _operators: Operators,
     link: Arc<OperatorLink>,
     offers: Publisher<JobOffer>,
     /// Inputs of a simulated machine that people have set.
@@ -127,6 +138,7 @@ pub struct Pipeline {
     subscriptions: Subscriptions,
     services: Services,
     owner: ServiceOwner,
+    jobs: JobSource,
     streams: u64,
     domain: Domain,
 }
@@ -141,6 +153,7 @@ impl Pipeline {
         instance: &Instance,
         configuration: &Configuration,
         owner: ServiceOwner,
+        jobs: JobSource,
     ) -> Result<Self, Failure> {
         for warning in instance.warnings() {
             message::tell(&warning);
@@ -158,10 +171,11 @@ impl Pipeline {
         let link = Arc::new(OperatorLink::start(&domain).map_err(Failure::service)?);
         let board = Arc::new(StatusBoard::default());
         let control = Arc::new(JobControl::default());
-        if owner == ServiceOwner::Own {
+        if jobs == JobSource::Own {
             // Its one job is under way from here on: an operator who says stop means it.
-            control.begin(ONLY_JOB);
+            control.begin();
         }
+        let queue = Arc::new(JobQueue::open(queue::path(instance.name())));
         board.know(&machine, configuration.source.path().as_deref());
         board.keep_faults(fault_history::path(instance.name()));
         let inputs = Arc::new(AtomicU64::new(0));
@@ -170,10 +184,11 @@ impl Pipeline {
             link.clone(),
             board.clone(),
             control.clone(),
+            queue.clone(),
             &machine,
             (machine.drives.kind == DrivesKind::Simulated).then(|| inputs.clone()),
         );
-        let operators = Operators::bind(&domain, answers, owner)?;
+        let operators = Operators::bind(&domain, answers, jobs)?;
         let services = match owner {
             ServiceOwner::Own => Services::start(&domain)?,
             ServiceOwner::Others => Services::of_others(),
@@ -183,7 +198,8 @@ impl Pipeline {
             latest: Latest::default(),
             board,
             control,
-            operators,
+            queue,
+            _operators: operators,
             link,
             offers,
             inputs,
@@ -191,6 +207,7 @@ impl Pipeline {
             subscriptions,
             services,
             owner,
+            jobs,
             streams: 0,
             domain,
         })
@@ -219,7 +236,12 @@ impl Pipeline {
             latest.planner = sample;
         }
         let ended = self.services.poll(&self.domain);
-        self.board.post(&self.latest, self.control.is_held(), &self.services.pids(&self.domain));
+        self.board.post(
+            &self.latest,
+            self.control.is_held(),
+            self.queue.held(),
+            &self.services.pids(&self.domain),
+        );
         Ok(ended)
     }
 
@@ -279,14 +301,19 @@ impl Pipeline {
         self.link.request_within(verb, value, patience)
     }
 
-    /// A job that an operator submitted and nobody has taken yet.
-    pub fn submission(&self) -> Option<Submission> {
-        self.operators.submission()
-    }
-
     /// Who starts the services.
     pub fn owner(&self) -> ServiceOwner {
         self.owner
+    }
+
+    /// Where its jobs come from.
+    pub fn jobs(&self) -> JobSource {
+        self.jobs
+    }
+
+    /// How a service of its own ended without which it can run no job, if one has.
+    pub fn lost(&self) -> Option<&Ended> {
+        self.services.lost()
     }
 
     /// The living process with this role in the domain.
@@ -376,9 +403,20 @@ impl Pipeline {
 
 impl Drop for Pipeline {
     fn drop(&mut self) {
+        self.queue.close();
         self.bring_to_rest();
         self.services.stop();
     }
+}
+
+/// The file called `NAME.KIND` in which something of the instance called `name` outlives its pipeline: in `graver`
+/// below `$XDG_STATE_HOME`, or `~/.local/state` without it; `None` where there is no home.
+fn state_file(name: &str, kind: &str) -> Option<PathBuf> {
+    let absolute =
+        |key: &str| std::env::var_os(key).map(PathBuf::from).filter(|it| it.is_absolute());
+    let below =
+        absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))?;
+    Some(below.join("graver").join(format!("{name}.{kind}")))
 }
 
 /// Whether the controller moves the axes, or may.

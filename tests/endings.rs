@@ -8,7 +8,7 @@ mod support;
 use graver::arguments::{DrivesArguments, DrivesKind, MachineArguments};
 use graver::inputs::MachineSource;
 use graver::pipeline::configuration::Configuration;
-use graver::pipeline::{Pipeline, ServiceOwner};
+use graver::pipeline::{JobSource, Pipeline, ServiceOwner};
 use messages::DrivesReport;
 use runtime::{Domain, Role, Samples, Subscriber};
 use serde_json::Value;
@@ -52,7 +52,7 @@ fn await_planning(place: &Place, running: &mut Running) -> Value {
 
 #[test]
 fn a_signal_while_it_starts_stops_it() {
-    for signal in [INTERRUPT, TERMINATE, HANGUP] {
+    for signal in [INTERRUPT, TERMINATE] {
         let place = Place::new();
         let mut running = start(&place, &lines(4), &[]);
         place.await_status(&mut running, "a pipeline", |_| true);
@@ -65,7 +65,7 @@ fn a_signal_while_it_starts_stops_it() {
 
 #[test]
 fn a_signal_while_it_plans_stops_it() {
-    for signal in [INTERRUPT, TERMINATE, HANGUP] {
+    for signal in [INTERRUPT, TERMINATE] {
         let place = Place::new();
         let mut running = start(&place, SLOW, &[]);
         let services = services(&await_planning(&place, &mut running));
@@ -77,16 +77,28 @@ fn a_signal_while_it_plans_stops_it() {
 
 #[test]
 fn a_signal_while_it_marks_brings_the_axes_to_rest_along_the_path() {
-    for signal in [TERMINATE, HANGUP] {
-        let place = Place::new();
-        let mut running = start(&place, &lines(4), &[]);
-        let services = services(&place.await_played(&mut running, 400));
-        running.signal(signal);
-        let summary = assert_stopped(&place, &running.wait());
-        assert!(number(&summary, "/marks/missing") > 1e-3, "{summary:#}");
-        support::assert_ends_dark_and_at_rest(&place.recording("run"), 2);
-        place.assert_nothing_left(&services);
+    let place = Place::new();
+    let mut running = start(&place, &lines(4), &[]);
+    let services = services(&place.await_played(&mut running, 400));
+    running.signal(TERMINATE);
+    let summary = assert_stopped(&place, &running.wait());
+    assert!(number(&summary, "/marks/missing") > 1e-3, "{summary:#}");
+    support::assert_ends_dark_and_at_rest(&place.recording("run"), 2);
+    place.assert_nothing_left(&services);
+}
+
+#[test]
+fn a_terminal_that_closes_loses_no_job() {
+    let place = Place::new();
+    let mut running = start(&place, &lines(4), &[]);
+    let services = services(&place.await_played(&mut running, 200));
+    running.signal(HANGUP);
+    for service in &services {
+        service.signal(HANGUP).unwrap();
     }
+    let summary = assert_ended(&place, &running.wait(), 0, "completed");
+    assert!(number(&summary, "/marks/missing") < 1e-6, "{summary:#}");
+    place.assert_nothing_left(&services);
 }
 
 #[test]
@@ -151,7 +163,7 @@ fn stop_is_never_refused() {
     });
     // There is nothing to stop.
     place.ask(&["stop"]).accepted();
-    domain.signal(HANGUP);
+    domain.signal(TERMINATE);
     assert_eq!(domain.wait().code, Some(0));
     for process in started {
         process.signal(TERMINATE);
@@ -483,7 +495,8 @@ fn a_panic_of_the_supervisor_unpowers_the_motors() {
     let mut observer = None;
     let panicked = catch_unwind(AssertUnwindSafe(|| {
         let mut pipeline =
-            Pipeline::start(place.instance(), &configuration, ServiceOwner::Others).unwrap();
+            Pipeline::start(place.instance(), &configuration, ServiceOwner::Others, JobSource::Own)
+                .unwrap();
         for role in ["planner", "controller", "drives"] {
             services.push(place.start(&[role, "--instance", place.instance().name()]));
         }

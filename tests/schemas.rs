@@ -19,8 +19,7 @@ use graver::commands::motion::MotionReply;
 use graver::commands::offset::OffsetsReport;
 use graver::commands::plan::PlanReport;
 use monitor::summary::Summary;
-use operator::Status;
-use operator::VerbReply;
+use operator::{Queue, Status, Submitted, VerbReply};
 use schemars::{Schema, schema_for};
 use support::{Place, assert_valid, lines};
 use workbench::calibrate::CalibrationReport;
@@ -43,10 +42,12 @@ fn schemas() -> Vec<(&'static str, Schema)> {
         ("motion", schema_for!(MotionReply)),
         ("offsets", schema_for!(OffsetsReport)),
         ("plan", schema_for!(PlanReport)),
+        ("queue", schema_for!(Queue)),
         ("reply", schema_for!(VerbReply)),
         ("speed", schema_for!(SpeedReport)),
         ("planning", schema_for!(PlanBenchReport)),
         ("status", schema_for!(Status)),
+        ("submitted", schema_for!(Submitted)),
         ("summary", schema_for!(Summary)),
         ("size", schema_for!(SizeReport)),
         ("tables", schema_for!(TablesReport)),

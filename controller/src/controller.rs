@@ -254,7 +254,7 @@ impl Controller {
         let changed = self.state.to_wire() != state_before || outputs.reply.is_some();
         if changed || outputs.report.is_some() || self.cycles.is_multiple_of(self.progress_interval)
         {
-            outputs.progress = Some(self.progress(now, &outputs.command));
+            outputs.progress = Some(self.progress(now, &outputs.command, feedback.laser.is_lit()));
         }
     }
 
@@ -274,7 +274,7 @@ impl Controller {
         outputs.command.state = self.state.to_wire() as u32;
         outputs.command.fault = self.fault;
         outputs.command.outputs = self.switch_outputs();
-        outputs.progress = Some(self.progress(now, &outputs.command));
+        outputs.progress = Some(self.progress(now, &outputs.command, false));
     }
 
     /// Looks at the feedback and the peers: what went by, and the worst of what is wrong.

@@ -1,7 +1,7 @@
 //! The states of the controller, with what each has to remember.
 
 use crate::supervision::Tracking;
-use messages::{CommandMode, ControllerState};
+use messages::{CommandMode, ControllerState, HoldCause};
 
 /// What the controller is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +57,7 @@ pub(crate) enum HomingStage {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AfterRest {
     /// A person decides.
-    Wait,
+    Wait(HoldCause),
     /// The same, once the light before the program's pause has been given.
     Pause,
     /// The stream goes on.
@@ -81,6 +81,17 @@ impl State {
             Self::Jogging => ControllerState::Jogging,
             Self::Probing => ControllerState::Probing,
             Self::Pulsing => ControllerState::Pulsing,
+        }
+    }
+
+    /// Why the stream is held, if it is.
+    pub(crate) fn hold_cause(self) -> HoldCause {
+        match self {
+            Self::Holding(AfterRest::Wait(cause)) => cause,
+            Self::Holding(AfterRest::Pause) => HoldCause::Program,
+            Self::Holding(AfterRest::Resume) => HoldCause::Light,
+            Self::Holding(AfterRest::Supply { .. }) => HoldCause::Setpoints,
+            _ => HoldCause::None,
         }
     }
 

@@ -47,5 +47,5 @@ pub use report::{ControllerReport, DrivesReport, LinkCounters, RealtimeFacts};
 pub use sample::Sample;
 pub use setpoint::Setpoint;
 pub use stall::{StallCause, Stalls};
-pub use state::ControllerState;
+pub use state::{ControllerState, HoldCause};
 pub use time::{Cycle, Nanoseconds};

@@ -4,7 +4,7 @@ use crate::{Fault, Nanoseconds, sample};
 
 sample! {
     /// Published every few cycles; the planner's licence to send more.
-    Progress = "graver.Progress.v6" {
+    Progress = "graver.Progress.v7" {
         /// When it was published.
         published: Nanoseconds,
         /// The stream in the look-ahead, 0 for none.
@@ -17,6 +17,8 @@ sample! {
         room: u64,
         /// Stroke being marked, from 1; 0 for none.
         stroke: u64,
+        /// Line of the job file where the motion under way begins, from 1; 0 where it has none.
+        line: u64,
         /// The newest stream that was finished or given up, 0 for none.
         finished_stream: u64,
         /// Rate at which the stream is played.
@@ -26,6 +28,10 @@ sample! {
         override_rate: f64,
         /// Tool position the plan has now, machine frame [m].
         tool: [f64; 3],
+        /// Speed that the plan gives the tool along its path now, at the rate at which it is played [m/s].
+        speed: f64,
+        /// Laser power that the newest command asks for, as a fraction of full scale; 0 in the dark.
+        power: f64,
         /// Joint reference now, load side [m or rad]: where a new stream must start.
         position: crate::AxisArray,
         /// Digital inputs in the order of the machine file, one bit each: 1 is active.
@@ -47,6 +53,10 @@ sample! {
         state: u32,
         /// 1 if the newest finished stream was played to its end, else 0.
         completed: u32,
+        /// A [`HoldCause`](crate::HoldCause): why a stream that is held stands, 0 while none is.
+        hold_cause: u32,
+        /// 1 if light was measured in the newest cycle, else 0.
+        lit: u32,
         /// The latched fault, if any.
         fault: Fault,
     }

@@ -23,7 +23,7 @@ sample! {
     /// `static_effort + (effort − static_effort)·r² + momentum·ṙ`, and the lead is
     /// `static_lead + (lead − static_lead)·r² + lead_momentum·ṙ` up to the small part of the
     /// transmission's damping.
-    Setpoint = "graver.Setpoint.v3" {
+    Setpoint = "graver.Setpoint.v4" {
         /// The stream this sample belongs to; one job is one stream. Never 0.
         stream: u64,
         /// Position in the stream, from 0 without gaps.
@@ -36,6 +36,8 @@ sample! {
         outputs: u64,
         /// The stroke being marked from here to the next setpoint, from 1; 0 for none.
         stroke: u64,
+        /// Line of the job file where the motion under way begins, from 1; 0 where it has none.
+        line: u64,
         /// Tool centre point in the machine frame [m].
         tool: [f64; 3],
         /// Speed of the tool along the path [m/s].

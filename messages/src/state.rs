@@ -40,6 +40,42 @@ pub enum ControllerState {
     Halted = 11,
 }
 
+/// Why a stream is held. Discriminants are the values in samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u32)]
+pub enum HoldCause {
+    /// It is not.
+    #[default]
+    None = 0,
+    /// A person asked for a feed hold.
+    Person = 1,
+    /// The program pauses (M0).
+    Program = 2,
+    /// A door is open, or was when nobody had resumed since.
+    Door = 3,
+    /// An interlock is missing, or was when nobody had resumed since.
+    Interlock = 4,
+    /// The planner has not sent enough to go on.
+    Setpoints = 5,
+    /// It goes back for light that was not given.
+    Light = 6,
+}
+
+impl HoldCause {
+    /// The cause with this number in a sample; an unknown number reads as [`Self::Person`], for whom a person is asked.
+    pub fn from_wire(value: u32) -> Self {
+        match value {
+            0 => Self::None,
+            2 => Self::Program,
+            3 => Self::Door,
+            4 => Self::Interlock,
+            5 => Self::Setpoints,
+            6 => Self::Light,
+            _ => Self::Person,
+        }
+    }
+}
+
 impl ControllerState {
     /// The state with this number in a sample; an unknown number reads as [`Self::Faulted`].
     pub fn from_wire(value: u32) -> Self {

@@ -2,9 +2,11 @@
 //! its status. The domain holder answers; the command line, the page and software that speaks grbl ask.
 
 pub mod client;
+pub mod queue;
 pub mod request;
 pub mod status;
 
 pub use client::{Client, ClientError};
+pub use queue::{Queue, QueuedJob, Submitted};
 pub use request::{Part, Request, Verb, VerbReply};
 pub use status::{AxisStatus, PastFault, Probed, Status};

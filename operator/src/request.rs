@@ -51,12 +51,34 @@ pub enum Request {
         job: JobRequest,
         /// The run folder.
         out: Option<PathBuf>,
+        /// Whether to answer as soon as it waits, with [`Submitted`](crate::Submitted); else the answer comes when
+        /// it has ended, and is its summary.
+        #[serde(default)]
+        detached: bool,
     },
-    /// Takes a submitted job back: stopped if it is under way, or as soon as its turn comes.
+    /// The jobs: see [`Queue`](crate::Queue).
+    Queue,
+    /// Puts a job that waits at another place; answered with the jobs.
+    Move {
+        /// Its number.
+        job: u64,
+        /// Its new place among those that wait, from 1.
+        place: usize,
+    },
+    /// Submits a job once more, under a new number; answered as a detached one.
+    Repeat {
+        /// Its number.
+        job: u64,
+    },
+    /// Takes a job back: stopped if it is under way, gone at once if it waits; answered with the jobs.
     Withdraw {
         /// Its number.
         job: u64,
     },
+    /// Begins no other job that waits; answered with the jobs.
+    HoldQueue,
+    /// Begins the jobs that wait, one after the other; answered with the jobs.
+    StartQueue,
 }
 
 /// A part of the answer to a submitted job.

@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 pub struct Status {
     /// The controller's state.
     pub state: String,
+    /// Why the machine stands, or does not go on, in words; null where there is nothing to say.
+    pub cause: Option<String>,
     /// What the planner is doing.
     pub planner: String,
     /// The machine file; null for the built-in machine.
@@ -16,6 +18,12 @@ pub struct Status {
     pub stream: u64,
     /// Its job, when it has one.
     pub job: Option<String>,
+    /// The number of the job under way; null without one.
+    pub job_number: Option<u64>,
+    /// The run folder of the job under way; null without one.
+    pub run_folder: Option<String>,
+    /// How long ago the job under way was begun; null without one [s].
+    pub elapsed: Option<f64>,
     /// Setpoints played so far.
     pub played: u64,
     /// Setpoints of the stream that were planned so far; all of them once the plan is complete.
@@ -25,6 +33,18 @@ pub struct Status {
     pub time_left: Option<f64>,
     /// Stroke being marked, from 1; 0 for none.
     pub stroke: u64,
+    /// Strokes of the job; 0 while that is not known.
+    pub strokes: u64,
+    /// Line of the job file where the motion under way begins; null where it has none.
+    pub line: Option<u64>,
+    /// Speed that the plan gives the tool along its path now [m/s].
+    pub speed: f64,
+    /// Laser power that is commanded now, 0 to 1.
+    pub power: f64,
+    /// Whether the laser marks right now.
+    pub lit: bool,
+    /// Whether the job under way is held, by a person, its program, a door, or for want of setpoints.
+    pub held: bool,
     /// Rate at which the stream is played.
     pub rate: f64,
     /// Where the plan has the tool [m].

@@ -33,6 +33,7 @@ pub mod service;
 pub mod signal;
 pub mod socket;
 pub mod stall;
+pub mod terminal;
 pub mod thread;
 pub mod wake;
 

@@ -30,6 +30,13 @@ pub struct Termination {
     pub count: u32,
 }
 
+impl Termination {
+    /// Whether it came because the terminal was closed.
+    pub fn is_closed_terminal(&self) -> bool {
+        self.signal == libc::SIGHUP
+    }
+}
+
 extern "C" fn note(signal: libc::c_int) {
     // A terminal that closes sends it twice, and the second says nothing more.
     if signal == libc::SIGHUP && COUNT.load(Ordering::Relaxed) > 0 {
@@ -45,7 +52,7 @@ extern "C" fn note_continued(_: libc::c_int) {
 
 /// Makes SIGINT, SIGTERM and SIGHUP set the flag instead of ending the process, and notes SIGCONT.
 /// System calls that wait come back with `EINTR`, so that loops check the flag at once. A SIGHUP
-/// that is ignored already, as under `nohup`, stays ignored. SIGBUS ends the process still, but says
+/// that is ignored already, as under `nohup` and after [`outlive_terminal`], stays ignored. SIGBUS ends the process still, but says
 /// why.
 ///
 /// # Errors
@@ -60,6 +67,19 @@ pub fn install() -> io::Result<()> {
     }
     handle(libc::SIGCONT, note_continued)?;
     handle(libc::SIGBUS, explain)
+}
+
+/// Lets a terminal that closes be nothing to this process, nor to those that it starts from now on: SIGHUP is ignored.
+/// Call it before [`install`]. For what must not be lost with a window, such as a job that is marked.
+///
+/// # Errors
+/// What the operating system says.
+pub fn outlive_terminal() -> io::Result<()> {
+    // SAFETY: all zeros is a valid sigaction (no flags, empty mask), completed below.
+    #[allow(unsafe_code)]
+    let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
+    action.sa_sigaction = libc::SIG_IGN;
+    exchange(libc::SIGHUP, Some(&action)).map(drop).map_err(|source| refused(libc::SIGHUP, &source))
 }
 
 fn handle(signal: libc::c_int, handler: extern "C" fn(libc::c_int)) -> io::Result<()> {

@@ -53,6 +53,14 @@ fn signalled_process() {
             own.signal(libc::SIGTERM).unwrap();
             assert_eq!(told(1), Termination { signal: libc::SIGTERM, count: 1 });
         }
+        "outlives" => {
+            default_hang_up();
+            signal::outlive_terminal().unwrap();
+            signal::install().unwrap();
+            own.signal(libc::SIGHUP).unwrap();
+            own.signal(libc::SIGTERM).unwrap();
+            assert_eq!(told(1), Termination { signal: libc::SIGTERM, count: 1 });
+        }
         "pipe" => {
             signal::install().unwrap();
             own.signal(libc::SIGPIPE).unwrap();
@@ -107,6 +115,11 @@ fn each_request_to_end_sets_the_flag_and_counts() {
 #[test]
 fn a_hang_up_that_is_ignored_stays_ignored() {
     check("nohup", "trap '' HUP");
+}
+
+#[test]
+fn a_process_that_outlives_its_terminal_hears_no_hang_up() {
+    check("outlives", "");
 }
 
 #[test]

@@ -98,7 +98,31 @@ Examples:
 
 Each value as printed, as the source's own numbers give it, with the errata applied, and as planned.";
 
+pub(super) const SUBMIT_EXAMPLES: &str = "\
+Examples:
+  graver submit job.ngc                             and follow it to its end
+  graver submit job.ngc --detach                    its number, at once; it outlives this terminal
+  graver submit jobs/letters.toml --set letters.text=S --json
+
+Ctrl-C stops the job that is followed; a second one leaves it to come to rest alone. A terminal that is closed leaves
+the job to go on.";
+
+pub(super) const QUEUE_EXAMPLES: &str = "\
+Examples:
+  graver queue list                                 what has ended, what runs, what waits
+  graver queue cancel 12
+  graver queue move 12 1                            job 12 is the next
+  graver queue repeat 9                             job 9 once more
+  graver queue start                                begin what waits after a restart, a fault or a stop
+
+The jobs are kept on disk. After a start of the pipeline, a fault or `graver stop` those that wait begin only when a
+person starts the queue.";
+
 pub(super) const SERVICES: &str = "\
+Examples:
+  graver domain --services --machine mine.toml      on one's own computer: all that takes jobs
+  graver domain --machine mine.toml                 for services that systemd starts
+
 The services are graver drives, controller, planner and monitor with the same --instance;
 machine and drives are the domain's. deploy/ has systemd units. SIGTERM or Ctrl-C ends it with
-the machine at rest.";
+the machine at rest; a terminal that is closed does not.";

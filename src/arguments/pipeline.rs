@@ -85,6 +85,10 @@ pub struct SubmitArguments {
     /// Run folder; without it `runs/DATE-TIME-JOB`.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Do not follow the job: say its number as soon as it waits. It outlives this terminal; `graver queue` and
+    /// `graver status` tell of it.
+    #[arg(long)]
+    pub detach: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub instance: InstanceArguments,
@@ -103,6 +107,9 @@ pub struct OverrideArguments {
 /// Arguments of `domain`.
 #[derive(Debug, Clone, Args)]
 pub struct DomainArguments {
+    /// Start the four services too, as `run` does; without it somebody else starts them, such as systemd.
+    #[arg(long)]
+    pub services: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub machine: MachineArguments,

@@ -1,20 +1,15 @@
-//! Requests to a running pipeline: hold, resume, override, stop, status, submit.
+//! Requests to a running pipeline: hold, resume, override, stop, status.
 
 use super::{faults, motion};
-use crate::arguments::{InstanceArguments, OverrideArguments, SubmitArguments};
+use crate::arguments::{InstanceArguments, OverrideArguments};
 use crate::exit::{Exit, Failure};
-use crate::output::say;
-use crate::output::{self, ProgressLine};
+use crate::output::{self, say};
 use machine::quantity;
-use monitor::summary::Summary;
-use operator::{Part, PastFault, Request, Verb, VerbReply};
-use planner::request::JobRequest;
+use operator::{PastFault, Request, Verb, VerbReply};
 use runtime::operator::OperatorLink;
 use runtime::socket::{ANSWER_PATIENCE, OperatorClient, SocketError};
-use runtime::{Domain, Instance, Role, message, signal};
+use runtime::{Domain, Instance, Role, message};
 use serde_json::{Value, json};
-use std::ops::ControlFlow;
-use std::path::absolute;
 use std::time::Duration;
 
 /// How long the supervisor may take to answer a stop or a hold, before the controller is asked past
@@ -159,82 +154,7 @@ pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// Hands a job to a running pipeline and follows it to its end.
-///
-/// # Errors
-/// No pipeline, or a job that is refused.
-pub fn submit(arguments: &SubmitArguments) -> Result<Exit, Failure> {
-    let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
-    let mut client = OperatorClient::connect(&instance).map_err(Failure::service)?;
-    signal::install().map_err(Failure::service)?;
-    let whole = |path: &std::path::Path| absolute(path).unwrap_or_else(|_| path.to_owned());
-    let out = match &arguments.out {
-        Some(path) => whole(path),
-        None => {
-            let name = arguments.job.file_stem().unwrap_or_default().to_string_lossy();
-            let here = std::env::current_dir()
-                .map_err(|error| Failure::bad_input(format!("the current directory: {error}")))?;
-            let folder = monitor::run_folder::RunFolder::create_below(&here, &name);
-            folder.map_err(Failure::bad_input)?.path().to_owned()
-        }
-    };
-    // The offsets are those of the pipeline's machine, when the job's turn comes.
-    let set = arguments.set.clone();
-    let job = JobRequest { job: Some(whole(&arguments.job)), set, offsets: None };
-    let request = Request::Submit { job, out: Some(out) };
-    let mut follower = Follower { instance: &instance, job: None, told: 0 };
-    let line = ProgressLine::on_terminal();
-    let request = serde_json::to_value(&request).map_err(Failure::service)?;
-    let reply =
-        client.follow(&request, |part| follower.follow(part, &line)).map_err(Failure::service)?;
-    line.clear();
-    let reply = match reply {
-        ControlFlow::Continue(reply) => checked(reply)?,
-        ControlFlow::Break(message) => return Err(Failure::stopped(message)),
-    };
-    let summary: Summary = serde_json::from_value(reply).map_err(Failure::service)?;
-    Ok(output::summary(&summary, arguments.instance.json))
-}
-
-/// Follows a job that was submitted. A signal takes the job back and is told; a second one leaves
-/// the job to come to rest alone.
-struct Follower<'a> {
-    instance: &'a Instance,
-    job: Option<u64>,
-    /// Signals that were heeded.
-    told: u32,
-}
-
-impl Follower<'_> {
-    fn follow(&mut self, part: Option<Value>, line: &ProgressLine) -> ControlFlow<String> {
-        match part.map(serde_json::from_value) {
-            Some(Ok(Part::Accepted(job))) => self.job = Some(job),
-            Some(Ok(Part::Share(share))) => line.draw(share, "submitted job"),
-            // A part of a later version, or none.
-            Some(Err(_)) | None => {}
-        }
-        let signals = signal::termination().map_or(0, |termination| termination.count);
-        let Some(job) = self.job.filter(|_| signals > self.told) else {
-            return ControlFlow::Continue(());
-        };
-        let before = std::mem::replace(&mut self.told, signals);
-        line.clear();
-        if before > 0 {
-            return ControlFlow::Break(format!("job {job} comes to rest without being waited for"));
-        }
-        match send(&Request::Withdraw { job }, self.instance) {
-            Ok(_) => message::tell(&format!(
-                "stopping job {job}; another Ctrl-C leaves without waiting for it"
-            )),
-            Err(error) => {
-                return ControlFlow::Break(format!("job {job} could not be stopped: {error}"));
-            }
-        }
-        ControlFlow::Continue(())
-    }
-}
-
-fn send(request: &Request, instance: &Instance) -> Result<Value, SocketError> {
+pub(super) fn send(request: &Request, instance: &Instance) -> Result<Value, SocketError> {
     // A supervisor that lives answers a stop sooner, whatever the controller does.
     let urgent = matches!(request, Request::Verb { verb: Verb::Stop | Verb::Hold, .. });
     let patience = if urgent { URGENT_PATIENCE } else { ANSWER_PATIENCE };
@@ -256,7 +176,7 @@ pub(super) fn connect(arguments: &InstanceArguments) -> Result<OperatorClient, F
     OperatorClient::connect(&instance).map_err(Failure::service)
 }
 
-fn checked(reply: Value) -> Result<Value, Failure> {
+pub(super) fn checked(reply: Value) -> Result<Value, Failure> {
     if reply.is_null() {
         return Err(Failure::service("the pipeline ended before it answered"));
     }

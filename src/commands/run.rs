@@ -5,9 +5,9 @@ use crate::exit::{Exit, Failure};
 use crate::files::Claim;
 use crate::inputs::MachineSource;
 use crate::pipeline::configuration::Configuration;
-use crate::pipeline::job_run::JobRun;
-use crate::pipeline::operators::{self, Submission};
-use crate::pipeline::{POLL_INTERVAL, Pipeline, ServiceOwner};
+use crate::pipeline::job_run::{JobRun, job_name};
+use crate::pipeline::queue::Entry;
+use crate::pipeline::{JobSource, POLL_INTERVAL, Pipeline, ServiceOwner};
 use crate::{inputs, output};
 use monitor::run_folder::RunFolder;
 use runtime::{Instance, message, signal};
@@ -32,31 +32,36 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     // Read here only to refuse early; the planner reads it again.
     let job = request.read(&input.machine)?;
     let configuration = Configuration::new(input.source, &arguments.drives)?;
-    // From here on a signal brings the machine to rest before it ends anything.
+    // From here on a signal brings the machine to rest before it ends anything, and a terminal that closes does not end
+    // the job.
+    signal::outlive_terminal().map_err(Failure::service)?;
     signal::install().map_err(Failure::service)?;
-    let mut pipeline = Pipeline::start(&instance, &configuration, ServiceOwner::Own)?;
-    let folder = run_folder(arguments.out.as_deref(), &job.drawing.name)?;
+    let mut pipeline =
+        Pipeline::start(&instance, &configuration, ServiceOwner::Own, JobSource::Own)?;
+    let folder = run_folder(arguments.out.as_deref(), Path::new("."), &job.drawing.name)?;
     let claim = Claim::of(&folder)?;
     let request = request.absolute();
-    let run = JobRun::prepare(&mut pipeline, &request, folder, started, None);
+    let number = pipeline.queue.begin_own(&request, folder.path(), &pipeline.control);
+    let run = JobRun::prepare(&mut pipeline, &request, folder, started, number);
     let summary = run.map(|run| run.homing_first(arguments.home).follow());
     pipeline.shut_down();
     drop(claim);
     Ok(output::summary(&summary?, arguments.instance.json))
 }
 
-fn run_folder(out: Option<&Path>, job: &str) -> Result<RunFolder, Failure> {
+fn run_folder(out: Option<&Path>, below: &Path, job: &str) -> Result<RunFolder, Failure> {
     match out {
         Some(path) => RunFolder::create_at(path),
-        None => RunFolder::create_below(Path::new("."), job),
+        None => RunFolder::create_below(below, job),
     }
     .map_err(Failure::bad_input)
 }
 
-/// Holds a domain for services that somebody else starts, and runs the jobs that operators submit.
+/// Holds a domain, with services of its own or for those that somebody else starts, and runs the jobs that operators
+/// submit.
 ///
 /// # Errors
-/// Bad input, an instance in use, a channel that fails.
+/// Bad input, an instance in use, a channel that fails, a service of its own that has died.
 pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
     let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
     let source = inputs::machine(&arguments.machine)?.source;
@@ -65,13 +70,27 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
         file.offsets()?;
     }
     let configuration = Configuration::new(source.clone(), &arguments.drives)?;
+    signal::outlive_terminal().map_err(Failure::service)?;
     signal::install().map_err(Failure::service)?;
-    let mut pipeline = Pipeline::start(&instance, &configuration, ServiceOwner::Others)?;
-    message::tell(&format!("instance {} waits for its services and jobs", instance.name()));
+    let owner = if arguments.services { ServiceOwner::Own } else { ServiceOwner::Others };
+    let mut pipeline = Pipeline::start(&instance, &configuration, owner, JobSource::Submitted)?;
+    let awaited = if arguments.services { "jobs" } else { "its services and jobs" };
+    message::tell(&format!("instance {} waits for {awaited}", instance.name()));
+    if let Some(why) = pipeline.queue.held() {
+        let waiting = pipeline.queue.list().waiting.len();
+        message::tell(&format!(
+            "{waiting} jobs wait, and the queue is held: {why}; `graver queue start` begins them"
+        ));
+    }
     while signal::termination().is_none() {
-        pipeline.poll()?;
-        if let Some(submission) = pipeline.submission() {
-            run_submission(&mut pipeline, &source, submission);
+        for ended in pipeline.poll()? {
+            message::tell(&ended.to_string());
+        }
+        if let Some(ended) = pipeline.lost() {
+            return Err(Failure::service(format!("{ended}; the pipeline ends")));
+        }
+        if let Some(entry) = pipeline.queue.begin_next(&pipeline.control) {
+            run_submission(&mut pipeline, &source, &entry);
         }
         std::thread::sleep(POLL_INTERVAL);
     }
@@ -80,23 +99,21 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
 }
 
 /// Runs a submitted job to its end; whoever submitted it hears of it in any case.
-fn run_submission(pipeline: &mut Pipeline, source: &MachineSource, submission: Submission) {
+fn run_submission(pipeline: &mut Pipeline, source: &MachineSource, entry: &Entry) {
     let started = Instant::now();
-    let (number, events) = (submission.number, submission.events.clone());
-    let (mut job, out) = (submission.job.clone(), submission.out.clone());
-    let ran = if pipeline.control.begin(number) {
-        run_folder(out.as_deref(), "job").and_then(|folder| {
-            job.offsets = source.offsets()?;
-            let _claim = Claim::of(&folder)?;
-            let run = JobRun::prepare(pipeline, &job, folder, started, Some(submission))?;
-            Ok(run.follow())
-        })
-    } else {
-        Err(Failure::stopped("the job was withdrawn before its turn came"))
-    };
+    let mut job = entry.request();
+    let below = entry.below.as_deref().unwrap_or(Path::new("."));
+    let folder = run_folder(entry.job.out.as_deref().map(Path::new), below, &job_name(&job));
+    let ran = folder.and_then(|folder| {
+        pipeline.queue.note_folder(folder.path());
+        job.offsets = source.offsets()?;
+        let _claim = Claim::of(&folder)?;
+        let run = JobRun::prepare(pipeline, &job, folder, started, entry.job.number)?;
+        Ok(run.follow())
+    });
     if let Err(failure) = ran {
         message::tell(failure.refusal.text.trim());
         pipeline.control.end();
-        operators::tell_end(&events, &failure.summary());
+        pipeline.queue.end(&failure.summary());
     }
 }

@@ -4,7 +4,6 @@
 //! the queue, the start of the machine, and the planner, and a person who says `stop` there means
 //! it. Operators' threads write here, the supervisor's loop reads.
 
-use std::collections::BTreeSet;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// How far the job under way has come.
@@ -21,12 +20,9 @@ pub enum Phase {
 
 #[derive(Debug, Default)]
 struct State {
-    job: u64,
     phase: Phase,
     stopped: bool,
     held: bool,
-    /// Jobs that were taken back while they waited.
-    withdrawn: BTreeSet<u64>,
 }
 
 /// Requests for the job under way.
@@ -36,19 +32,9 @@ pub struct JobControl {
 }
 
 impl JobControl {
-    /// The supervisor takes a job up; `false` when it was withdrawn while it waited.
-    pub fn begin(&self, job: u64) -> bool {
-        let mut state = self.lock();
-        let withdrawn = state.withdrawn.remove(&job);
-        let withdrawn_others = std::mem::take(&mut state.withdrawn);
-        *state = State {
-            job,
-            phase: Phase::Preparing,
-            stopped: withdrawn,
-            held: false,
-            withdrawn: withdrawn_others,
-        };
-        !withdrawn
+    /// The supervisor takes a job up.
+    pub fn begin(&self) {
+        *self.lock() = State { phase: Phase::Preparing, ..State::default() };
     }
 
     /// Hands the job to the controller, unless it is stopped or held; whether it did.
@@ -105,17 +91,6 @@ impl JobControl {
         self.lock().phase
     }
 
-    /// Takes back the job with this number: stops it if it is under way, or as soon as its turn
-    /// comes.
-    pub fn withdraw(&self, job: u64) {
-        let mut state = self.lock();
-        if state.job == job {
-            state.stopped |= state.phase != Phase::None;
-        } else if job > state.job {
-            state.withdrawn.insert(job);
-        }
-    }
-
     fn lock(&self) -> MutexGuard<'_, State> {
         // Every change is whole: a thread that panicked left nothing half done.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
@@ -130,39 +105,25 @@ mod tests {
     fn a_job_that_is_not_played_yet_is_stopped_here() {
         let control = JobControl::default();
         assert_eq!(control.stop(), Phase::None);
-        assert!(control.begin(1));
+        control.begin();
         assert!(!control.is_stopped(), "what was asked before it is not meant for it");
         assert_eq!(control.stop(), Phase::Preparing);
         assert!(control.is_stopped());
         assert!(!control.play());
         control.end();
-        assert!(control.begin(2) && !control.is_stopped() && control.play());
+        control.begin();
+        assert!(!control.is_stopped() && control.play());
     }
 
     #[test]
     fn a_hold_keeps_a_job_from_being_played_until_it_is_resumed() {
         let control = JobControl::default();
         assert!(!control.hold() && !control.resume(), "no job, nothing to hold");
-        control.begin(1);
+        control.begin();
         assert!(control.hold() && control.is_held());
         assert!(!control.play());
         assert!(control.resume() && !control.is_held());
         assert!(control.play());
         assert!(!control.hold() && !control.resume(), "the controller's, once it plays");
-    }
-
-    #[test]
-    fn a_job_is_withdrawn_in_the_queue_and_under_way() {
-        let control = JobControl::default();
-        control.begin(1);
-        control.withdraw(3);
-        control.withdraw(1);
-        assert!(control.is_stopped());
-        control.end();
-        control.withdraw(1);
-        assert!(control.begin(2) && !control.is_stopped());
-        control.end();
-        assert!(!control.begin(3));
-        assert!(control.is_stopped());
     }
 }

@@ -4,6 +4,7 @@
 //! `~/.local/state` without it. Where that cannot be written the faults since the start are known, and
 //! whoever starts the pipeline is told.
 
+use super::state_file;
 use operator::PastFault;
 use runtime::message;
 use std::collections::VecDeque;
@@ -27,11 +28,7 @@ pub struct FaultHistory {
 
 /// The file in which the faults of the instance called `name` are kept; `None` where there is no home.
 pub fn path(name: &str) -> Option<PathBuf> {
-    let absolute =
-        |key: &str| std::env::var_os(key).map(PathBuf::from).filter(|it| it.is_absolute());
-    let below =
-        absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")))?;
-    Some(below.join("graver").join(format!("{name}.faults.jsonl")))
+    state_file(name, "faults.jsonl")
 }
 
 /// The faults in the file at `path`, the oldest first; none where there is no such file. Lines that are none, such as

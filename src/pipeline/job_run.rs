@@ -8,7 +8,6 @@ mod watch;
 use watch::WORD_PATIENCE;
 
 use super::control::JobControl;
-use super::operators::{JobEvent, Submission};
 use super::power_up::{NotReady, PowerUp};
 use super::{POLL_INTERVAL, Pipeline};
 use crate::exit::Failure;
@@ -66,7 +65,8 @@ pub struct JobRun<'a> {
     drives_heard: (Cycle, Instant),
     started: Instant,
     run_outcome: RunOutcome,
-    submission: Option<Submission>,
+    /// Its number in the queue.
+    number: u64,
 }
 
 impl<'a> JobRun<'a> {
@@ -79,13 +79,13 @@ impl<'a> JobRun<'a> {
         job: &JobRequest,
         folder: RunFolder,
         started: Instant,
-        submission: Option<Submission>,
+        number: u64,
     ) -> Result<Self, Failure> {
         folder.clear().map_err(Failure::bad_input)?;
         let request = serde_json::to_vec_pretty(job).map_err(Failure::service)?;
         folder.write(run_folder::REQUEST, request).map_err(Failure::bad_input)?;
         let name = job_name(job);
-        pipeline.board.name_job(Some((&name, folder.path())));
+        pipeline.board.begin_job(number, &name, folder.path(), started);
         let run_outcome = RunOutcome { job: name.clone(), ..RunOutcome::default() };
         Ok(Self {
             control: pipeline.control.clone(),
@@ -102,7 +102,7 @@ impl<'a> JobRun<'a> {
             drives_heard: (Cycle::default(), Instant::now()),
             started,
             run_outcome,
-            submission,
+            number,
         })
     }
 
@@ -137,10 +137,7 @@ impl<'a> JobRun<'a> {
             self.time_left = self.pipeline.latest.time_left().unwrap_or(self.time_left);
             let (share, text) = self.progress();
             line.draw(share, &text);
-            if let Some(submission) = &self.submission {
-                // A submitter that left hears nothing; the job goes on.
-                let _ = submission.events.send(JobEvent::Share(share));
-            }
+            self.pipeline.queue.tell_share(self.number, share);
             std::thread::sleep(POLL_INTERVAL);
         }
         line.clear();
@@ -294,7 +291,8 @@ impl<'a> JobRun<'a> {
     }
 }
 
-fn job_name(job: &JobRequest) -> String {
+/// The name of a job before it is read.
+pub fn job_name(job: &JobRequest) -> String {
     let stem = job.job.as_deref().and_then(|path| path.file_stem());
     stem.map_or_else(|| "letters".to_owned(), |stem| stem.to_string_lossy().into_owned())
 }

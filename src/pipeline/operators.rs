@@ -1,32 +1,26 @@
 //! Requests of operators, taken from the domain's socket.
 //!
 //! Verbs go to the controller, and to the supervisor while the job is not with the controller; a
-//! submitted job waits in a queue for the supervisor's loop, and its progress goes back to whoever
-//! submitted it.
+//! submitted job goes into the queue, and what becomes of it back to whoever follows it.
 
-use super::ServiceOwner;
+use super::JobSource;
 use super::caps::caps;
 use super::control::{JobControl, Phase};
+use super::queue::{JobEvent, JobQueue};
 use super::refusals;
 use super::status::StatusBoard;
 use crate::exit::Failure;
-use crossbeam::channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
+use crossbeam::channel::{Receiver, TryRecvError, unbounded};
 use machine::Machine;
 use messages::{ControllerState, OperatorReply, OperatorRequest, OperatorVerb, Refusal};
-use monitor::summary::Summary;
-use operator::{Part, Request, Verb, VerbReply};
-use planner::request::JobRequest;
+use operator::{Part, Queue, Request, Submitted, Verb, VerbReply};
 use runtime::Domain;
 use runtime::operator::{OperatorError, OperatorLink};
 use runtime::socket::{Conversation, OperatorServer};
 use serde_json::{Value, json};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
-
-/// Jobs that can wait.
-const QUEUE: usize = 8;
 
 /// How long a job that was just started may take to be played, so that it can be held.
 const HOLD_PATIENCE: Duration = Duration::from_secs(1);
@@ -38,37 +32,8 @@ const STOP_PATIENCE: Duration = Duration::from_millis(500);
 /// Pause between two tries to hold it.
 const HOLD_RETRY: Duration = Duration::from_millis(5);
 
-/// A job that an operator submitted.
-pub struct Submission {
-    /// Its number in this pipeline, from 1.
-    pub number: u64,
-    /// The job.
-    pub job: JobRequest,
-    /// The run folder.
-    pub out: Option<PathBuf>,
-    /// Takes parts while it runs and, last, its reply.
-    pub events: Sender<JobEvent>,
-}
-
-/// Tells a submitter how its job ended.
-pub fn tell_end(submitter: &Sender<JobEvent>, summary: &Summary) {
-    let reply =
-        serde_json::to_value(summary).unwrap_or_else(|error| json!({ "error": error.to_string() }));
-    // A submitter that has left is told nothing.
-    let _ = submitter.send(JobEvent::End(reply));
-}
-
-/// What a submitter is told of its job.
-pub enum JobEvent {
-    /// How far it has come, 0 to 1.
-    Share(f64),
-    /// The end: the summary.
-    End(Value),
-}
-
-/// The socket and the queue of submitted jobs.
+/// The domain's socket.
 pub struct Operators {
-    submissions: Receiver<Submission>,
     _server: OperatorServer,
 }
 
@@ -77,34 +42,38 @@ impl Operators {
     ///
     /// # Errors
     /// A socket that cannot be opened.
-    pub fn bind(domain: &Domain, answers: Answers, owner: ServiceOwner) -> Result<Self, Failure> {
-        let (queue, submissions) = bounded(QUEUE);
-        let numbers = AtomicU64::new(1);
+    pub fn bind(domain: &Domain, answers: Answers, jobs: JobSource) -> Result<Self, Failure> {
         let answer = move |request: Value, conversation: &mut Conversation<'_>| {
             let request = match serde_json::from_value(request) {
                 Ok(request) => request,
                 Err(error) => return json!({ "error": format!("not a request: {error}") }),
             };
             match request {
-                Request::Submit { .. } if owner == ServiceOwner::Own => json!({
-                    "error": "this pipeline belongs to a `graver run` and takes no other job; \
-                              submit to a `graver domain`"
-                }),
-                Request::Submit { job, out } => {
-                    let number = numbers.fetch_add(1, Ordering::Relaxed);
+                Request::Submit { .. } | Request::Repeat { .. } | Request::StartQueue
+                    if jobs == JobSource::Own =>
+                {
+                    json!({
+                        "error": "this pipeline belongs to a `graver run` and takes no other job; \
+                                  submit to a `graver domain`"
+                    })
+                }
+                Request::Submit { job, out, detached: true } => {
+                    submitted(answers.queue.submit(&job, out.as_deref(), None))
+                }
+                Request::Submit { job, out, detached: false } => {
                     let (events, follower) = unbounded();
-                    if queue.try_send(Submission { number, job, out, events }).is_err() {
-                        return json!({
-                            "error": format!("{QUEUE} jobs wait already; submit again later")
-                        });
+                    match answers.queue.submit(&job, out.as_deref(), Some(events)) {
+                        Ok(number) => follow(number, &follower, conversation),
+                        Err(error) => json!({ "error": error }),
                     }
-                    follow(number, &follower, conversation)
                 }
+                Request::Repeat { job } => submitted(answers.queue.repeat(job)),
+                Request::Queue => json!(answers.queue.list()),
+                Request::Withdraw { job } => listed(answers.queue.withdraw(job, &answers.control)),
+                Request::Move { job, place } => listed(answers.queue.move_to(job, place)),
+                Request::HoldQueue => json!(answers.queue.hold("a person holds the queue")),
+                Request::StartQueue => json!(answers.queue.start()),
                 Request::Status => json!(answers.board.read()),
-                Request::Withdraw { job } => {
-                    answers.control.withdraw(job);
-                    json!({})
-                }
                 Request::Verb { verb, value } => answers.carry_out(verb, value),
                 Request::Operate { verb, axes, value, second, unit } => {
                     answers.operate(verb, &axes, unit.as_deref(), [value, second])
@@ -114,12 +83,23 @@ impl Operators {
             }
         };
         let server = OperatorServer::bind(domain, answer).map_err(Failure::service)?;
-        Ok(Self { submissions, _server: server })
+        Ok(Self { _server: server })
     }
+}
 
-    /// The oldest job that waits.
-    pub fn submission(&self) -> Option<Submission> {
-        self.submissions.try_recv().ok()
+/// The answer to a job that nobody follows.
+fn submitted(number: Result<u64, String>) -> Value {
+    match number {
+        Ok(number) => json!(Submitted { number }),
+        Err(error) => json!({ "error": error }),
+    }
+}
+
+/// The answer to what changes the queue.
+fn listed(queue: Result<Queue, String>) -> Value {
+    match queue {
+        Ok(queue) => json!(queue),
+        Err(error) => json!({ "error": error }),
     }
 }
 
@@ -155,6 +135,7 @@ pub struct Answers {
     link: Arc<OperatorLink>,
     board: Arc<StatusBoard>,
     control: Arc<JobControl>,
+    queue: Arc<JobQueue>,
     machine: Machine,
     /// Inputs of a simulated machine that are set, one bit each; `None` where the machine is not simulated.
     inputs: Option<Arc<AtomicU64>>,
@@ -166,10 +147,11 @@ impl Answers {
         link: Arc<OperatorLink>,
         board: Arc<StatusBoard>,
         control: Arc<JobControl>,
+        queue: Arc<JobQueue>,
         machine: &Machine,
         inputs: Option<Arc<AtomicU64>>,
     ) -> Self {
-        Self { link, board, control, machine: machine.clone(), inputs }
+        Self { link, board, control, queue, machine: machine.clone(), inputs }
     }
 
     /// Asks the controller for a verb about axes.
@@ -276,6 +258,8 @@ impl Answers {
     /// where the controller does not answer, the supervisor ends the job without it.
     fn stop(&self) -> Value {
         let met = self.control.stop();
+        // Whoever stops the machine does not want it to begin with something else.
+        self.queue.hold("a person stopped the machine");
         let reply =
             self.link.request_within(OperatorVerb::Stop, 0.0, STOP_PATIENCE).map(VerbReply::from);
         match (met, reply) {

@@ -72,6 +72,8 @@ struct Service {
 /// The services that this process has started; dropping them asks those that still run to end.
 pub struct Services {
     services: Vec<Service>,
+    /// The first that ended without which nothing goes on.
+    lost: Option<Ended>,
 }
 
 impl Services {
@@ -90,7 +92,7 @@ impl Services {
 
     /// None of our own.
     pub fn of_others() -> Self {
-        Self { services: Vec::new() }
+        Self { services: Vec::new(), lost: None }
     }
 
     /// The services that have ended since the last poll. A monitor is started again once, if that
@@ -113,7 +115,14 @@ impl Services {
             };
             ended.push(Ended { role: service.role, pid, how: describe(status), recovery });
         }
+        let mut fatal = ended.iter().filter(|ended| ended.recovery == Recovery::Stop);
+        self.lost = self.lost.take().or_else(|| fatal.next().cloned());
         ended
+    }
+
+    /// The first that ended without which nothing goes on.
+    pub fn lost(&self) -> Option<&Ended> {
+        self.lost.as_ref()
     }
 
     /// Whether a service with this role was started here and has not ended.

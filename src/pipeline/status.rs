@@ -1,6 +1,7 @@
 //! What operators see of a running pipeline.
 
 use super::Latest;
+use super::cause::cause;
 use super::fault_history::FaultHistory;
 use super::refusals::DIRECTIONS;
 use machine::{Directions, Machine};
@@ -9,19 +10,27 @@ use monitor::summary::FaultSummary;
 use operator::{AxisStatus, PastFault, Probed, Status};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// A notice board: the supervisor writes, operators' threads read.
 #[derive(Debug, Default)]
 pub struct StatusBoard {
     status: Mutex<Status>,
-    /// The run folder of the job.
-    folder: Mutex<Option<PathBuf>>,
+    /// The job under way.
+    job: Mutex<Option<Job>>,
     /// The machine, once it is known, with the directions of its tool.
     machine: Mutex<Option<(Machine, Directions)>>,
     /// When the newest fault was found.
     newest: Mutex<Nanoseconds>,
     history: Mutex<FaultHistory>,
+}
+
+/// The job under way.
+#[derive(Debug)]
+struct Job {
+    /// Its run folder.
+    folder: PathBuf,
+    begun: Instant,
 }
 
 /// The most faults in a status.
@@ -58,12 +67,21 @@ impl StatusBoard {
         *locked(&self.history) = history;
     }
 
-    /// Writes the latest samples; `held` when a person holds a job that is not played yet.
-    pub fn post(&self, latest: &Latest, held: bool, pids: &[(&'static str, Option<i32>)]) {
+    /// Writes the latest samples. `held` when a person holds a job that is not played yet; `queue_held` is why those
+    /// that wait do not begin.
+    pub fn post(
+        &self,
+        latest: &Latest,
+        held: bool,
+        queue_held: Option<String>,
+        pids: &[(&'static str, Option<i32>)],
+    ) {
         let mut status = self.lock();
         let Latest { progress, drives, planner, .. } = latest;
         let state = ControllerState::from_wire(progress.state);
         let state = if held { ControllerState::Holding } else { state };
+        let begun = locked(&self.job).as_ref().map(|job| job.begun);
+        status.elapsed = begun.map(|begun| begun.elapsed().as_secs_f64());
         status.state = state.name().to_owned();
         status.planner = match PlannerPhase::from_wire(planner.phase) {
             PlannerPhase::Idle => "idle",
@@ -75,9 +93,16 @@ impl StatusBoard {
         .to_owned();
         status.stream = progress.stream;
         status.played = progress.played;
-        status.samples = if planner.stream == progress.stream { planner.samples } else { 0 };
+        let is_planned = planner.stream == progress.stream;
+        status.samples = if is_planned { planner.samples } else { 0 };
+        let is_complete = is_planned && planner.is_complete == 1;
+        status.strokes = if is_complete { planner.strokes } else { 0 };
         status.time_left = latest.time_left();
         status.stroke = progress.stroke;
+        status.line = Some(progress.line).filter(|line| *line > 0);
+        (status.speed, status.power) = (progress.speed, progress.power);
+        status.lit = progress.lit == 1;
+        status.held = state == ControllerState::Holding;
         status.rate = progress.rate;
         status.tool = progress.tool;
         let fault = progress.fault;
@@ -86,8 +111,18 @@ impl StatusBoard {
         let fault = if is_lost { drives.fault } else { fault };
         if is_lost {
             status.state = ControllerState::Faulted.name().to_owned();
+            (status.speed, status.power, status.lit) = (0.0, 0.0, drives.lit == 1);
+            status.held = false;
         }
         status.fault = fault.is_some().then(|| fault.code().name().to_owned());
+        status.cause = match locked(&self.machine).as_ref() {
+            _ if held => Some("held before its first motion: `graver resume`".to_owned()),
+            Some((machine, _)) => cause(progress, &fault, begun.is_some(), machine),
+            None => None,
+        };
+        if status.cause.is_none() && begun.is_none() {
+            status.cause = queue_held.map(|why| format!("the queue is held: {why}"));
+        }
         self.remember(&mut status, &fault);
         if let Some((machine, directions)) = locked(&self.machine).as_ref() {
             note_operated(&mut status, progress, machine, directions);
@@ -102,15 +137,25 @@ impl StatusBoard {
         status.services = pids.iter().map(|(name, pid)| ((*name).to_owned(), *pid)).collect();
     }
 
-    /// Names the job that runs and its run folder, or none.
-    pub fn name_job(&self, job: Option<(&str, &Path)>) {
-        self.lock().job = job.map(|(name, _)| name.to_owned());
-        *locked(&self.folder) = job.map(|(_, folder)| folder.to_owned());
+    /// Names the job that runs, and its run folder.
+    pub fn begin_job(&self, number: u64, name: &str, folder: &Path, begun: Instant) {
+        let mut status = self.lock();
+        (status.job_number, status.job) = (Some(number), Some(name.to_owned()));
+        status.run_folder = Some(folder.display().to_string());
+        *locked(&self.job) = Some(Job { folder: folder.to_owned(), begun });
+    }
+
+    /// No job runs.
+    pub fn end_job(&self) {
+        let mut status = self.lock();
+        (status.job_number, status.job, status.run_folder) = (None, None, None);
+        status.elapsed = None;
+        *locked(&self.job) = None;
     }
 
     /// The run folder of the job that runs.
     pub fn folder(&self) -> Option<PathBuf> {
-        locked(&self.folder).clone()
+        locked(&self.job).as_ref().map(|job| job.folder.clone())
     }
 
     /// What stands there now.

@@ -146,9 +146,15 @@ impl Controller {
         }
     }
 
-    /// How far the stream has come.
-    pub(super) fn progress(&self, now: Nanoseconds, command: &Command) -> Progress {
+    /// How far the stream has come, and whether light was measured.
+    pub(super) fn progress(&self, now: Nanoseconds, command: &Command, lit: bool) -> Progress {
         let lookahead = self.intake.lookahead();
+        let playing = (self.playing != 0).then(|| self.player.now());
+        let setpoint = playing.map(|playing| lookahead.setpoint(playing.time.sequence()));
+        let speed = setpoint.map_or(0.0, |setpoint| setpoint.path_velocity * command.rate);
+        let edges = command.laser.edges().iter().map(|edge| (edge.gate, edge.power));
+        let lights = core::iter::once((command.laser.gate, command.laser.power)).chain(edges);
+        let power = lights.filter(|(gate, _)| *gate != 0).map(|(_, power)| power);
         let mut position = [0.0; MAX_AXES];
         let angles = self.feedforward.now().angle;
         for (actuator, angle) in self.machine.actuators.iter().zip(&angles) {
@@ -163,10 +169,13 @@ impl Controller {
             played: lookahead.played(),
             room: lookahead.room() as u64,
             stroke: command.stroke,
+            line: setpoint.map_or(0, |setpoint| setpoint.line),
             finished_stream: self.intake.finished(),
             rate: command.rate,
             override_rate: self.player.asked_rate(),
             tool: command.tool,
+            speed,
+            power: power.fold(0.0, f64::max),
             position,
             inputs: self.safety.inputs(),
             outputs: self.switching.on(),
@@ -177,6 +186,8 @@ impl Controller {
             motion_end: self.motion_end as u32,
             state: command.state,
             completed: u32::from(self.completed),
+            hold_cause: self.state.hold_cause() as u32,
+            lit: u32::from(lit),
             fault: self.fault,
         }
     }

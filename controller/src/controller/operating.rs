@@ -10,7 +10,8 @@ use crate::supervision::Finding;
 use crate::travel::{Bounds, MOVERS};
 use machine::operating::{DoorAction, Side, StopCategory};
 use messages::{
-    CommandMode, Cycle, Fault, FaultCode, FaultQuantity, Feedback, MAX_AXES, MotionEnd, Nanoseconds,
+    CommandMode, Cycle, Fault, FaultCode, FaultQuantity, Feedback, HoldCause, MAX_AXES, MotionEnd,
+    Nanoseconds,
 };
 
 /// A way until the probe touches, and where it did.
@@ -200,7 +201,9 @@ impl Controller {
             match self.state {
                 State::Running | State::Holding(_) => {
                     self.player.hold();
-                    self.state = State::Holding(AfterRest::Wait);
+                    let is_open = self.safety.is_open();
+                    let cause = if is_open { HoldCause::Door } else { HoldCause::Interlock };
+                    self.state = State::Holding(AfterRest::Wait(cause));
                 }
                 State::Pulsing => {
                     let is_open = self.safety.is_open();

@@ -2,7 +2,9 @@
 
 use super::Controller;
 use crate::state::{AfterRest, State};
-use messages::{Fault, Feedback, MotionEnd, OperatorReply, OperatorRequest, OperatorVerb, Refusal};
+use messages::{
+    Fault, Feedback, HoldCause, MotionEnd, OperatorReply, OperatorRequest, OperatorVerb, Refusal,
+};
 
 /// Why a request is refused.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -81,7 +83,7 @@ impl Controller {
             }
             (OperatorVerb::Hold, State::Running | State::Holding(_)) => {
                 self.player.hold();
-                self.state = State::Holding(AfterRest::Wait);
+                self.state = State::Holding(AfterRest::Wait(HoldCause::Person));
             }
             // Already on its way, as soon as there is something to play.
             (OperatorVerb::Resume, State::Holding(AfterRest::Supply { .. })) => {}

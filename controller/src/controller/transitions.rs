@@ -9,7 +9,9 @@ use crate::supervision::{Finding, Tracking};
 use crate::travel::MOVERS;
 use messages::feedback::status;
 use messages::time::Period;
-use messages::{Cycle, Fault, FaultCode, FaultQuantity, Feedback, MotionEnd, Nanoseconds};
+use messages::{
+    Cycle, Fault, FaultCode, FaultQuantity, Feedback, HoldCause, MotionEnd, Nanoseconds,
+};
 
 /// How long an axis stands still before it counts as at rest without a plan, and as enabled.
 const STANDING: Nanoseconds = Nanoseconds(20_000_000);
@@ -56,7 +58,7 @@ impl Controller {
                 self.player.resume(self.intake.lookahead());
             }
             State::Holding(AfterRest::Pause) if self.player.is_at_rest() => {
-                self.state = State::Holding(AfterRest::Wait);
+                self.state = State::Holding(AfterRest::Wait(HoldCause::Program));
             }
             // Whatever it was held for, it needs the way to stop again.
             State::Holding(AfterRest::Resume) if self.player.is_at_rest() => {

@@ -508,6 +508,7 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         }
         setpoint.stream = self.stream;
         setpoint.sequence = self.sequence;
+        setpoint.line = self.trajectory.pieces.get(self.cursor.piece).map_or(0, |it| it.line);
         self.light(setpoint);
         self.switch(setpoint, self.sequence as f64 * SETPOINT_TIME);
         if self.is_settled() {

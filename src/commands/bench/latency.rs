@@ -5,7 +5,7 @@ use crate::arguments::{LatencyArguments, MachineArguments};
 use crate::exit::{Exit, Failure};
 use crate::output::say;
 use crate::pipeline::configuration::Configuration;
-use crate::pipeline::{POLL_INTERVAL, Pipeline, ServiceOwner};
+use crate::pipeline::{JobSource, POLL_INTERVAL, Pipeline, ServiceOwner};
 use crate::{inputs, output};
 use messages::hop::Hop;
 use messages::plan::PlanFacts;
@@ -165,7 +165,8 @@ fn measure(
         .prefix("graver-bench-")
         .tempdir()
         .map_err(|error| Failure::output(format!("{}: {error}", std::env::temp_dir().display())))?;
-    let mut pipeline = Pipeline::start(&instance, &configuration, ServiceOwner::Own)?;
+    let mut pipeline =
+        Pipeline::start(&instance, &configuration, ServiceOwner::Own, JobSource::Own)?;
     let measured = pipeline.enable().and_then(|()| {
         let period = input.machine.realtime.period;
         read_along(&mut pipeline, &request, folder.path(), &instance, period, arguments.seconds)

@@ -12,7 +12,7 @@ use runtime::{message, signal};
 
 use super::JobRun;
 use crate::exit::error_summary;
-use crate::pipeline::{POLL_INTERVAL, operators};
+use crate::pipeline::POLL_INTERVAL;
 
 /// How long the monitor may take to complete its recording, on a loaded computer or a slow disk.
 const WRITING_PATIENCE: Duration = Duration::from_secs(5);
@@ -60,11 +60,9 @@ impl JobRun<'_> {
         let machine = &self.pipeline.machine;
         self.run_outcome.warnings.splice(0..0, machine.job_warnings());
         let summary = conclusion::conclude(&self.folder, machine, &self.run_outcome, self.started);
-        self.pipeline.board.name_job(None);
+        self.pipeline.board.end_job();
         self.control.end();
-        if let Some(submission) = self.submission.take() {
-            operators::tell_end(&submission.events, &summary);
-        }
+        self.pipeline.queue.end(&summary);
         summary
     }
 

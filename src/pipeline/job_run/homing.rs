@@ -2,7 +2,7 @@
 
 use super::{JobRun, Stage};
 use crate::exit::Failure;
-use crate::pipeline::ServiceOwner;
+use crate::pipeline::JobSource;
 use messages::{ControllerState, MotionEnd, OperatorVerb};
 use monitor::summary::Outcome;
 use std::time::Duration;
@@ -73,9 +73,9 @@ impl JobRun<'_> {
 
     /// A job is refused while an axis does not know its place.
     fn refuse_unhomed(&mut self, axis: &str) {
-        let advice = match self.pipeline.owner() {
-            ServiceOwner::Others => "`graver home` finds its place",
-            ServiceOwner::Own => "`graver run --home` finds its place first",
+        let advice = match self.pipeline.jobs() {
+            JobSource::Submitted => "`graver home` finds its place",
+            JobSource::Own => "`graver run --home` finds its place first",
         };
         self.end_with(format!("axis {axis} is not homed: {advice}"));
         self.run_outcome.outcome = Some(Outcome::Refused);
