@@ -242,7 +242,7 @@ export class Drawing {
     trail.draw(context, this.projection(), first, step, (it, level) => {
       if (level === 0 && !this.showsDark) return;
       it.strokeStyle = color(level === 0 ? "ink-dark" : "ink-mark");
-      it.globalAlpha = [0.7, 0.4, 0.7, 1][level];
+      it.globalAlpha = [1, 0.4, 0.7, 1][level];
       it.lineWidth = level === 0 ? 1 : 2;
       it.stroke();
       it.globalAlpha = 1;

@@ -33,7 +33,7 @@ export class Trail {
   }
 
   push(x, y, z, lit) {
-    if (!Number.isFinite(x + y + z)) return;
+    if (![x, y, z].every(Number.isFinite)) return;
     const v = this.values;
     const last = (this.count - 1) * STRIDE;
     if (this.count > 0) {
