@@ -24,6 +24,7 @@ mod expression;
 mod flow;
 mod interpreter;
 mod lexer;
+mod line_reader;
 mod lines;
 mod parameters;
 #[cfg(test)]
@@ -39,6 +40,7 @@ mod tracer;
 use machine::Machine;
 
 pub use error::GcodeError;
+pub use line_reader::{LineEffect, LineError, LineReader, Modals};
 pub(super) use recognise::is_program;
 pub use steps::Steps;
 pub use survey::{FileSteps, ProgramFacts, ProgramFile, Survey, survey};

@@ -29,41 +29,41 @@ const MINUTE: f64 = 60.0;
 const AIR_ASSIST: u32 = 0;
 
 /// What stays in force from line to line.
-#[derive(Debug)]
-struct Modal {
-    motion: Option<Motion>,
-    plane: Plane,
-    distance: Reference,
-    arc_distance: Reference,
-    feed_mode: FeedMode,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Modal {
+    pub(super) motion: Option<Motion>,
+    pub(super) plane: Plane,
+    pub(super) distance: Reference,
+    pub(super) arc_distance: Reference,
+    pub(super) feed_mode: FeedMode,
     /// Metres per unit.
-    unit: f64,
+    pub(super) unit: f64,
     /// Index of the work coordinate system.
-    system: usize,
+    pub(super) system: usize,
     /// Program zeros of all of them, machine frame [m].
-    origins: [[f64; 3]; 9],
+    pub(super) origins: [[f64; 3]; 9],
     /// That of the one in force [m].
-    origin: Vector3<f64>,
+    pub(super) origin: Vector3<f64>,
     /// The tool's offset that is in force, and that of the machine.
-    tool: Vector3<f64>,
+    pub(super) tool: Vector3<f64>,
     /// What G92 adds to it [m].
-    shift: Vector3<f64>,
+    pub(super) shift: Vector3<f64>,
     /// What G92.3 brings back [m].
-    kept_shift: Vector3<f64>,
+    pub(super) kept_shift: Vector3<f64>,
     /// Feed of G94 [m/s], `None` before any.
-    feed: Option<f64>,
+    pub(super) feed: Option<f64>,
     /// `None` while it is off.
-    laser: Option<LaserMode>,
+    pub(super) laser: Option<LaserMode>,
     /// Fraction of full scale, `None` before any S.
-    level: Option<f64>,
+    pub(super) level: Option<f64>,
     /// Outputs that are on, a bit for each.
-    outputs: u64,
-    corners: Corners,
+    pub(super) outputs: u64,
+    pub(super) corners: Corners,
 }
 
 impl Modal {
     /// Where the program zero is, machine frame [m].
-    fn zero(&self) -> Vector3<f64> {
+    pub(super) fn zero(&self) -> Vector3<f64> {
         self.origin + self.shift + self.tool
     }
 }
@@ -201,6 +201,16 @@ impl Interpreter {
             return Ok(Next::End);
         }
         Ok(call.unwrap_or(Next::Line))
+    }
+
+    /// What is in force.
+    pub(super) fn modal(&self) -> &Modal {
+        &self.modal
+    }
+
+    /// What is in force, to be put back.
+    pub(super) fn modal_mut(&mut self) -> &mut Modal {
+        &mut self.modal
     }
 
     /// Whether coordinates are absolute.

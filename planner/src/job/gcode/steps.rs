@@ -44,7 +44,7 @@ pub struct Steps<R> {
 }
 
 /// What a line turned out to be.
-enum Gathered {
+pub(super) enum Gathered {
     /// Words, or nothing.
     Block,
     /// Left out by `/`.
@@ -56,7 +56,7 @@ enum Gathered {
 }
 
 /// Why a line is refused.
-enum Fault {
+pub(super) enum Fault {
     /// It is not made of words.
     Illegible(Box<Refusal>),
     /// A word of it is not known here, or contradicts another.
@@ -177,53 +177,8 @@ impl<R: Read> Steps<R> {
     /// Reads the present line into the block.
     fn gather(&mut self) -> Result<Gathered, Fault> {
         let Self { lines, block, interpreter, .. } = self;
-        block.clear();
-        let line = lines.line();
         let is_first = interpreter.tracer.line == 1;
-        let meanings = &interpreter.words;
-        let mut words = if is_first {
-            Words::first(line, meanings, interpreter)
-        } else {
-            Words::new(line, meanings, interpreter)
-        };
-        while let Some(token) = words.next().map_err(Fault::Illegible)? {
-            match token {
-                Token::Word(word) => block.take(line, word, meanings).map_err(Fault::Word)?,
-                Token::Further(number, span) => block.cluster.push((number, span)),
-                Token::Setting(target, value) => {
-                    block.begun = true;
-                    block.settings.push((target, value));
-                }
-                Token::Program(at) => {
-                    return flow::statement(line, at).map(Gathered::Statement).map_err(Fault::Word);
-                }
-                Token::Delete => return Ok(Gathered::Deleted),
-                Token::Tape(at) => {
-                    if !block.begun && matches!(words.next(), Ok(None)) {
-                        return Ok(Gathered::Mark);
-                    }
-                    return Err(Fault::Illegible(Refusal::new(
-                        at..at + 1,
-                        "% is not alone on its line",
-                        "tape mark",
-                        "% on a line of its own begins or ends a program; a comment begins with ; or \
-                         stands in ( )",
-                    )));
-                }
-            }
-        }
-        block.check_gathered().map_err(Fault::Word)?;
-        for (target, value) in block.settings.drain(..) {
-            if !interpreter.parameters.set(target, value) {
-                return Err(Fault::Word(Refusal::new(
-                    0..line.len(),
-                    "the program has too many parameters",
-                    "one too many",
-                    "set those again that are no longer needed",
-                )));
-            }
-        }
-        Ok(Gathered::Block)
+        gather(lines.line(), is_first, block, interpreter)
     }
 
     /// Whether the tape mark that was read ends the program: one that a tape mark has begun. Inside
@@ -307,6 +262,61 @@ impl<R: Read> Steps<R> {
         };
         Box::new(GcodeError::new(&self.name, number, &[], &Around::default(), *refusal))
     }
+}
+
+/// Reads `line` into the block, and sets the parameters that it sets; the first line of a file may begin with a byte order
+/// mark.
+pub(super) fn gather(
+    line: &[u8],
+    is_first: bool,
+    block: &mut Block,
+    interpreter: &mut Interpreter,
+) -> Result<Gathered, Fault> {
+    block.clear();
+    let meanings = &interpreter.words;
+    let mut words = if is_first {
+        Words::first(line, meanings, interpreter)
+    } else {
+        Words::new(line, meanings, interpreter)
+    };
+    while let Some(token) = words.next().map_err(Fault::Illegible)? {
+        match token {
+            Token::Word(word) => block.take(line, word, meanings).map_err(Fault::Word)?,
+            Token::Further(number, span) => block.cluster.push((number, span)),
+            Token::Setting(target, value) => {
+                block.begun = true;
+                block.settings.push((target, value));
+            }
+            Token::Program(at) => {
+                return flow::statement(line, at).map(Gathered::Statement).map_err(Fault::Word);
+            }
+            Token::Delete => return Ok(Gathered::Deleted),
+            Token::Tape(at) => {
+                if !block.begun && matches!(words.next(), Ok(None)) {
+                    return Ok(Gathered::Mark);
+                }
+                return Err(Fault::Illegible(Refusal::new(
+                    at..at + 1,
+                    "% is not alone on its line",
+                    "tape mark",
+                    "% on a line of its own begins or ends a program; a comment begins with ; or \
+                     stands in ( )",
+                )));
+            }
+        }
+    }
+    block.check_gathered().map_err(Fault::Word)?;
+    for (target, value) in block.settings.drain(..) {
+        if !interpreter.parameters.set(target, value) {
+            return Err(Fault::Word(Refusal::new(
+                0..line.len(),
+                "the program has too many parameters",
+                "one too many",
+                "set those again that are no longer needed",
+            )));
+        }
+    }
+    Ok(Gathered::Block)
 }
 
 impl<R: Read> Iterator for Steps<R> {
