@@ -23,8 +23,17 @@ impl Stretch {
     }
 }
 
+/// How much of the power that a stream asks for is given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strength {
+    /// The least power at which the source gives light, 0..=1.
+    pub least: f64,
+    /// So many times what the stream asks for, full power at most.
+    pub share: f64,
+}
+
 /// The laser over `stretch`, dark before `dark_until`. Edges keep their stream time; power follows
-/// the rate, so that each length of line gets the same light, down to `min_power`: below it the source
+/// the rate, so that each length of line gets the same light, and the override; down to the least: below it the source
 /// might not light at all. The frequency is that of the setpoint in which the light may begin.
 ///
 /// # Errors
@@ -33,7 +42,7 @@ pub fn laser(
     lookahead: &Lookahead,
     stretch: Stretch,
     dark_until: StreamTime,
-    min_power: f64,
+    strength: Strength,
 ) -> Result<LaserCycle, TooManyEdges> {
     let rate = stretch.rate();
     if stretch.to <= stretch.from || stretch.to <= dark_until {
@@ -50,6 +59,7 @@ pub fn laser(
         && stretch.from == start
         && stretch.to == whole
         && stretch.period == Period::OF_SETPOINTS
+        && strength.share == 1.0
     {
         return Ok(*planned);
     }
@@ -64,7 +74,8 @@ pub fn laser(
         .take_while(|edge| f64::from(edge.offset) <= passed)
         .last()
         .map_or((planned.gate, planned.power), |edge| (edge.gate, edge.power));
-    let power_at_rate = |power: f64| (power * rate).max(power.min(min_power)).min(1.0);
+    let share = rate * strength.share;
+    let power_at_rate = |power: f64| (power * share).max(power.min(strength.least)).min(1.0);
     if start == stretch.from {
         (cycle.gate, cycle.power) = (gate, power_at_rate(power));
     } else if gate != 0 {
@@ -140,6 +151,11 @@ mod tests {
         ring
     }
 
+    /// As planned, from a source that gives no less than `least`.
+    fn planned(least: f64) -> Strength {
+        Strength { least, share: 1.0 }
+    }
+
     fn at(setpoints: f64) -> StreamTime {
         StreamTime((setpoints * ONE as f64).round() as i64)
     }
@@ -150,7 +166,7 @@ mod tests {
         let (mut lit, mut exposure, mut now) = (0.0, 0.0, at(from));
         while now < at(to) {
             let stretch = Stretch { from: now, to: now + at(rate), period: Period::OF_SETPOINTS };
-            let cycle = laser(&ring, stretch, at(dark_until), 0.0).unwrap();
+            let cycle = laser(&ring, stretch, at(dark_until), planned(0.0)).unwrap();
             assert!(cycle.is_valid(SETPOINT_PERIOD), "{cycle:?}");
             let (mut since, mut gate, mut power) = (0.0, cycle.gate, cycle.power);
             let end = GateEdge { offset: 1_000_000, gate: 0, power: 0.0 };
@@ -200,7 +216,7 @@ mod tests {
                 &ring,
                 Stretch { from, to, period: Period::OF_SETPOINTS },
                 StreamTime(0),
-                min_power,
+                planned(min_power),
             )
             .unwrap()
             .power
@@ -213,7 +229,27 @@ mod tests {
         }
         // Nothing is lit for that.
         let dark = Stretch { from: at(4.0), to: at(4.3), period: Period::OF_SETPOINTS };
-        assert_eq!(laser(&ring, dark, StreamTime(0), 0.3), Ok(LaserCycle::OFF));
+        assert_eq!(laser(&ring, dark, StreamTime(0), planned(0.3)), Ok(LaserCycle::OFF));
+    }
+
+    #[test]
+    fn an_override_of_the_power_scales_every_power_up_to_full() {
+        let ring = ring();
+        let whole = |from: f64, share: f64| {
+            let stretch =
+                Stretch { from: at(from), to: at(from + 1.0), period: Period::OF_SETPOINTS };
+            laser(&ring, stretch, StreamTime(0), Strength { least: 0.05, share }).unwrap()
+        };
+        for (share, power) in [(0.5, 0.2), (1.5, 0.6), (2.0, 0.8), (0.1, 0.05), (1.0, 0.4)] {
+            assert!((whole(2.0, share).power - power).abs() < 1e-12, "{share}");
+            let lit = whole(1.0, share);
+            assert_eq!((lit.gate, lit.edges().len(), lit.edges()[0].offset), (0, 1, 250_000));
+            assert!((lit.edges()[0].power - power).abs() < 1e-12, "{share}");
+        }
+        let strong = Strength { least: 0.0, share: 9.0 };
+        let stretch = Stretch { from: at(2.0), to: at(3.0), period: Period::OF_SETPOINTS };
+        assert_eq!(laser(&ring, stretch, StreamTime(0), strong).unwrap().power, 1.0);
+        assert!(!whole(5.0, 2.0).is_lit(), "nothing is lit for it");
     }
 
     #[test]
@@ -225,7 +261,7 @@ mod tests {
                 to: StreamTime::of(sequence + 1),
                 period: Period::OF_SETPOINTS,
             };
-            let cycle = laser(&ring, stretch, StreamTime(0), 0.3);
+            let cycle = laser(&ring, stretch, StreamTime(0), planned(0.3));
             assert_eq!(cycle, Ok(ring.setpoint(sequence).laser));
         }
     }
@@ -235,7 +271,7 @@ mod tests {
         let ring = ring();
         for (from, to) in [(3.0, 2.0), (2.0, 2.0)] {
             let stretch = Stretch { from: at(from), to: at(to), period: Period::OF_SETPOINTS };
-            assert_eq!(laser(&ring, stretch, StreamTime(0), 0.3), Ok(LaserCycle::OFF));
+            assert_eq!(laser(&ring, stretch, StreamTime(0), planned(0.3)), Ok(LaserCycle::OFF));
         }
     }
 
@@ -253,7 +289,7 @@ mod tests {
         }
         let stretch =
             |from, to| Stretch { from: at(from), to: at(to), period: Period::OF_SETPOINTS };
-        let play = |from, to| laser(&ring, stretch(from, to), StreamTime(0), 0.0);
+        let play = |from, to| laser(&ring, stretch(from, to), StreamTime(0), planned(0.0));
         assert_eq!(play(0.0, 1.0).unwrap().edges().len(), 10);
         assert_eq!(play(0.0, 2.0), Err(TooManyEdges));
     }

@@ -12,7 +12,7 @@
 //! lights exactly where light was first left out; where limits hinder the rate, below full rate and with
 //! power in proportion. Where no light was left out, nothing is played again.
 
-use crate::gate::{self, Stretch};
+use crate::gate::{self, Strength, Stretch};
 use crate::latency::Latencies;
 use crate::light::Given;
 use crate::lookahead::Lookahead;
@@ -111,6 +111,8 @@ pub struct Player {
     min_power: f64,
     /// The override asked for.
     asked: f64,
+    /// The override of the power.
+    power: f64,
 }
 
 impl Player {
@@ -134,6 +136,7 @@ impl Player {
             limits: MotionLimits::new(machine),
             min_power: machine.laser.min_power,
             asked: 1.0,
+            power: 1.0,
         }
     }
 
@@ -155,6 +158,17 @@ impl Player {
         let allowed = OVERRIDES.contains(&rate);
         if allowed {
             self.asked = rate;
+        }
+        allowed
+    }
+
+    /// Asks for `power` times the power that the stream asks for, full power at most. `false` and no change when it is not
+    /// within 0.1..=2.
+    #[must_use]
+    pub fn ask_power(&mut self, power: f64) -> bool {
+        let allowed = OVERRIDES.contains(&power);
+        if allowed {
+            self.power = power;
         }
         allowed
     }
@@ -415,7 +429,8 @@ impl Player {
     fn light(&self, lookahead: &Lookahead) -> Result<LaserCycle, TooManyEdges> {
         let period = self.pace.period();
         let stretch = Stretch { from: self.next.time, to: self.after.time, period };
-        gate::laser(lookahead, stretch, self.dark_until, self.min_power)
+        let strength = Strength { least: self.min_power, share: self.power };
+        gate::laser(lookahead, stretch, self.dark_until, strength)
     }
 
     /// Where the digital outputs stand: they do not go back with a rewind.

@@ -39,6 +39,9 @@ pub enum OperatorVerb {
     JogOn = 14,
     /// Switch output `axis`, from 1, on for a `value` of 1 and off for 0.
     Output = 15,
+    /// Override the power of the laser, `value` 0.1..=2: each power that the stream asks for is so many times as much, and
+    /// full power at most.
+    Power = 16,
 }
 
 impl OperatorVerb {
@@ -60,6 +63,7 @@ impl OperatorVerb {
             13 => Self::Probe,
             14 => Self::JogOn,
             15 => Self::Output,
+            16 => Self::Power,
             _ => return None,
         })
     }

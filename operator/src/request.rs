@@ -123,6 +123,8 @@ pub enum Verb {
     JogOn,
     /// Switch an output.
     Output,
+    /// Another power of the laser.
+    Power,
 }
 
 /// The machine's answer to a verb, as `graver hold --json` and its like print it.
@@ -197,6 +199,7 @@ impl From<Verb> for OperatorVerb {
             Verb::Probe => Self::Probe,
             Verb::JogOn => Self::JogOn,
             Verb::Output => Self::Output,
+            Verb::Power => Self::Power,
         }
     }
 }

@@ -115,6 +115,11 @@ impl Controller {
                     return Err(Refused::from(Refusal::TooLarge).beyond(request.value, 2.0));
                 }
             }
+            (OperatorVerb::Power, _) => {
+                if !self.player.ask_power(request.value) {
+                    return Err(Refused::from(Refusal::TooLarge).beyond(request.value, 2.0));
+                }
+            }
             (
                 OperatorVerb::Start,
                 State::Disabled | State::Enabling { .. } | State::Squaring { .. } | State::Idle,
