@@ -26,6 +26,7 @@ pub mod message;
 pub mod operator;
 pub mod peer;
 pub mod peer_user;
+pub mod pseudo_terminal;
 pub mod raw_frames;
 pub mod ready;
 pub mod room;
