@@ -7,6 +7,7 @@ mod operating;
 mod pipeline;
 mod planning;
 mod queue;
+mod serve;
 mod workbench;
 
 pub use self::workbench::{
@@ -29,13 +30,14 @@ pub use planning::{
 };
 
 pub use queue::{QueueCommand, QueueJobArguments, QueueMoveArguments};
+pub use serve::{AccessArguments, ServeArguments};
 
 use crate::exit;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use examples::{
     CALIBRATE_EXAMPLES, CHECK_EXAMPLES, COMPARE_EXAMPLES, EXPORT_EXAMPLES, FIGURES_EXAMPLES,
-    KINEMATICS_EXAMPLES, PLAN_EXAMPLES, QUEUE_EXAMPLES, RUN_EXAMPLES, SERVICES, SIMULATE_EXAMPLES,
-    SIZE_EXAMPLES, SUBMIT_EXAMPLES, TABLES_EXAMPLES,
+    KINEMATICS_EXAMPLES, PLAN_EXAMPLES, QUEUE_EXAMPLES, RUN_EXAMPLES, SERVE_EXAMPLES, SERVICES,
+    SIMULATE_EXAMPLES, SIZE_EXAMPLES, SUBMIT_EXAMPLES, TABLES_EXAMPLES,
 };
 use std::path::PathBuf;
 
@@ -134,6 +136,9 @@ pub enum Command {
     /// starts, and run the jobs that are submitted.
     #[command(after_help = SERVICES)]
     Domain(DomainArguments),
+    /// Let people and programs in beside the command line: grbl 1.1 for a running pipeline.
+    #[command(after_help = SERVE_EXAMPLES)]
+    Serve(ServeArguments),
     /// The planner service: reads, plans and checks a job, and streams its setpoints.
     Planner(ServiceArguments),
     /// The controller service: plays the setpoints and closes the loops.

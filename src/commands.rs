@@ -19,6 +19,7 @@ pub mod plan;
 pub mod pulses;
 pub mod queue;
 pub mod run;
+pub mod serve;
 pub mod service;
 pub mod simulate;
 pub mod size;

@@ -17,7 +17,7 @@ use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
     bench, calibrate, check, compare, export, faults, figures, kinematics, machine, manual, offset,
-    operating, operator, plan, queue, run, service, simulate, size, submit, tables, verify,
+    operating, operator, plan, queue, run, serve, service, simulate, size, submit, tables, verify,
 };
 use exit::{Exit, Failure};
 use runtime::domain::Role;
@@ -72,6 +72,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Compare(arguments) => compare::run(arguments),
         Command::Tables(arguments) => tables::run(arguments),
         Command::Domain(arguments) => run::domain(arguments),
+        Command::Serve(arguments) => serve::run(arguments),
         Command::Planner(arguments) => service::run(Role::Planner, arguments),
         Command::Controller(arguments) => service::run(Role::Controller, arguments),
         Command::Drives(arguments) => service::run(Role::Drives, arguments),

@@ -15,8 +15,10 @@ pub mod power_up;
 pub mod queue;
 mod refusals;
 pub mod services;
+pub mod serving;
 pub mod status;
 
+use crate::arguments::AccessArguments;
 use crate::exit::Failure;
 use configuration::Configuration;
 use control::JobControl;
@@ -34,6 +36,7 @@ use runtime::operator::{OperatorError, OperatorLink};
 use runtime::peer::Peer;
 use runtime::{Domain, DomainError, Instance, Publisher, Samples, Subscriber, message};
 use services::{Ended, Recovery, Services};
+use serving::Serving;
 use status::StatusBoard;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -137,6 +140,7 @@ pub struct Pipeline {
     simulated: Publisher<SimulatedInputs>,
     subscriptions: Subscriptions,
     services: Services,
+    serving: Serving,
     owner: ServiceOwner,
     jobs: JobSource,
     streams: u64,
@@ -206,11 +210,21 @@ impl Pipeline {
             simulated,
             subscriptions,
             services,
+            serving: Serving::default(),
             owner,
             jobs,
             streams: 0,
             domain,
         })
+    }
+
+    /// Lets people and programs in by the ways that `access` names.
+    ///
+    /// # Errors
+    /// A process that cannot be started.
+    pub fn serve(&mut self, access: &AccessArguments) -> Result<(), Failure> {
+        self.serving = Serving::start(&self.domain, access)?;
+        Ok(())
     }
 
     /// Takes the latest samples; call it every [`POLL_INTERVAL`]. Services of its own that have ended are told.
@@ -236,6 +250,7 @@ impl Pipeline {
             latest.planner = sample;
         }
         let ended = self.services.poll(&self.domain);
+        self.serving.poll();
         self.board.post(
             &self.latest,
             self.control.is_held(),
@@ -405,13 +420,14 @@ impl Drop for Pipeline {
     fn drop(&mut self) {
         self.queue.close();
         self.bring_to_rest();
+        self.serving.stop();
         self.services.stop();
     }
 }
 
 /// The file called `NAME.KIND` in which something of the instance called `name` outlives its pipeline: in `graver`
 /// below `$XDG_STATE_HOME`, or `~/.local/state` without it; `None` where there is no home.
-fn state_file(name: &str, kind: &str) -> Option<PathBuf> {
+pub(crate) fn state_file(name: &str, kind: &str) -> Option<PathBuf> {
     let absolute =
         |key: &str| std::env::var_os(key).map(PathBuf::from).filter(|it| it.is_absolute());
     let below =

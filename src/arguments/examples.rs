@@ -118,6 +118,15 @@ Examples:
 The jobs are kept on disk. After a start of the pipeline, a fault or `graver stop` those that wait begin only when a
 person starts the queue.";
 
+pub(super) const SERVE_EXAMPLES: &str = "\
+Examples:
+  graver serve --grbl 7123                          LightBurn, UGS, Rayforge … on this computer
+  graver serve --grbl 192.168.1.5:7123 --grbl-from 192.168.1.0/24
+  graver serve --grbl-tty /tmp/graver               for software that speaks to a serial port only
+  graver domain --services --machine mine.toml --grbl 7123   the same in one command
+
+docs/grbl.md says how to connect each program, and what is supported.";
+
 pub(super) const SERVICES: &str = "\
 Examples:
   graver domain --services --machine mine.toml      on one's own computer: all that takes jobs

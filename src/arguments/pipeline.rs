@@ -1,6 +1,6 @@
 //! Arguments of what runs a job: as processes, in one process, and by services.
 
-use super::{InstanceArguments, MachineArguments};
+use super::{AccessArguments, InstanceArguments, MachineArguments};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -46,6 +46,9 @@ pub struct RunArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub instance: InstanceArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub access: AccessArguments,
     /// Run folder; without it `runs/DATE-TIME-JOB`.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -116,6 +119,9 @@ pub struct DomainArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub drives: DrivesArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub access: AccessArguments,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub instance: InstanceArguments,

@@ -38,6 +38,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     signal::install().map_err(Failure::service)?;
     let mut pipeline =
         Pipeline::start(&instance, &configuration, ServiceOwner::Own, JobSource::Own)?;
+    pipeline.serve(&arguments.access)?;
     let folder = run_folder(arguments.out.as_deref(), Path::new("."), &job.drawing.name)?;
     let claim = Claim::of(&folder)?;
     let request = request.absolute();
@@ -74,6 +75,7 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
     signal::install().map_err(Failure::service)?;
     let owner = if arguments.services { ServiceOwner::Own } else { ServiceOwner::Others };
     let mut pipeline = Pipeline::start(&instance, &configuration, owner, JobSource::Submitted)?;
+    pipeline.serve(&arguments.access)?;
     let awaited = if arguments.services { "jobs" } else { "its services and jobs" };
     message::tell(&format!("instance {} waits for {awaited}", instance.name()));
     if let Some(why) = pipeline.queue.held() {

@@ -208,7 +208,8 @@ impl Service {
     }
 }
 
-fn spawn(domain: &Domain, role: Role) -> Result<ChildProcess, String> {
+/// A command that starts this program once more.
+pub(super) fn program() -> Result<Command, String> {
     let mut command = Command::new(THIS_PROGRAM);
     // By its own name in the list of processes.
     command.arg0(std::env::args_os().next().unwrap_or_else(|| "graver".into()));
@@ -216,12 +217,18 @@ fn spawn(domain: &Domain, role: Role) -> Result<ChildProcess, String> {
         let program = std::env::current_exe();
         command = Command::new(program.map_err(|error| format!("{THIS_PROGRAM}: {error}"))?);
     }
+    Ok(command)
+}
+
+fn spawn(domain: &Domain, role: Role) -> Result<ChildProcess, String> {
+    let mut command = program()?;
     command.arg(role.name()).arg("--instance").arg(domain.instance().name());
     command.stdin(std::process::Stdio::null()).stdout(std::process::Stdio::null());
     ChildProcess::spawn(domain, command).map_err(|error| format!("the {role}: {error}"))
 }
 
-fn describe(status: std::process::ExitStatus) -> String {
+/// How a process ended, in words.
+pub(super) fn describe(status: std::process::ExitStatus) -> String {
     use std::os::unix::process::ExitStatusExt;
     match (status.code(), status.signal()) {
         (Some(code), _) => format!("ended with exit code {code}"),
