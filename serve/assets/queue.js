@@ -57,7 +57,11 @@ function endedItem(job) {
 }
 
 function showQueue(queue) {
-  const { running, waiting = [], ended = [] } = queue ?? {};
+  const { running, waiting = [], ended = [], held = null } = queue ?? {};
+  isHeld = held !== null;
+  setText(byId("queue-held"), isHeld ? `Held: ${held}` : "");
+  setText(byId("queue-hold"), isHeld ? "Start queue" : "Hold queue");
+  byId("queue-hold").classList.toggle("primary", isHeld);
   const items = waiting.map((job, index) => queueItem(job, index, waiting.length));
   if (running) items.unshift(queueItem(running, -1));
   if (items.length === 0) items.push(make("li", { class: "dim" }, "Nothing waits."));
@@ -67,6 +71,9 @@ function showQueue(queue) {
   show(byId("queue-count"), count > 0);
   setText(byId("queue-count"), String(count));
 }
+
+/** Whether those that wait do not begin. */
+let isHeld = false;
 
 const NAMES = { "report.html": "report", "path.svg": "path", "summary.json": "summary", "samples.mcap": "recording" };
 
@@ -92,6 +99,10 @@ async function showHistory() {
 /** Shows the queue whenever it changes, and the history with it. */
 export function startQueue() {
   let lastEnded = null;
+  byId("queue-hold").addEventListener("click", () => attempt(byId("queue-note"), async () => {
+    byId("queue-note").textContent = "";
+    showQueue(await http("POST", `queue/${isHeld ? "start" : "hold"}`, {}));
+  }));
   on("queue", ({ queue }) => {
     showQueue(queue);
     const newest = queue?.ended?.at(-1)?.number ?? 0;
