@@ -106,3 +106,13 @@ fn a_shorter_cycle_counts_the_same_latency_in_more_cycles() {
     ];
     assert_accurate("corexy", &changes, 15e-6);
 }
+
+#[test]
+fn places_that_were_measured_before_the_deadline_are_held_to_the_plan_of_that_instant() {
+    // Drives on a bus measure half a cycle before: 125 um at 0.25 m/s.
+    for (mode, bound) in [("position", 15e-6), ("velocity", 25e-6)] {
+        let modes = ["x", "y", "z"].map(|axis| format!("axis.{axis}.mode={mode}"));
+        let modes: Vec<&str> = modes.iter().map(String::as_str).collect();
+        assert_accurate("servo_gantry", &modes, bound);
+    }
+}

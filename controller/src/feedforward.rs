@@ -1,6 +1,6 @@
 //! What the plan asks of the motors, before any feedback.
 //!
-//! References belong to the instant of the measurement. The velocity reference is the difference
+//! References belong to the instant of the measurement, which may be before the deadline at which it is told. The velocity reference is the difference
 //! of two position references, because the measured velocity is the difference of two encoder
 //! positions: any other pair costs 95–250 µm at the tool (source 003, the pilot).
 //!
@@ -89,8 +89,8 @@ impl Feedforward {
                     Some(Winding::new(motor, period, latency.acts))
                 })
                 .collect(),
-            plan: Recent::of(resting, latencies.ahead + kept),
-            off: Recent::of(Off::default(), latencies.longest() + kept),
+            plan: Recent::of(resting, latencies.ahead + latencies.oldest() + kept),
+            off: Recent::of(Off::default(), latencies.longest_answered() + kept),
             now: resting,
             latencies,
         }
@@ -260,27 +260,33 @@ impl Feedforward {
     /// Where the plan has the motor with this index at the end of the cycle of the command, or `back`
     /// cycles before that.
     fn planned(&self, index: usize, back: usize) -> Point {
-        let Delay { cycles, part, .. } = self.latencies.actuators[index].behind;
-        let later = self.plan.back(cycles + back);
-        if part == 0.0 {
-            return later.point(index);
-        }
-        let earlier = self.plan.back(cycles + back + 1);
-        earlier.between(later, 1.0 - part, self.cycle_time, index)
+        self.plan_before(index, back, self.latencies.actuators[index].behind)
     }
 
-    /// What the motor with this index has been told for the instant of the feedback, or `back` cycles before
-    /// that.
+    /// What the motor with this index has been told for the instant of the measurement that the feedback tells, or
+    /// `back` cycles before that.
     fn at_feedback(&self, index: usize, back: usize) -> Point {
-        let Latency { acts: Delay { cycles, part, .. }, .. } = self.latencies.actuators[index];
+        let Latency { measured, answered: Delay { cycles, part, .. }, .. } =
+            self.latencies.actuators[index];
         let sent = 1 + ANSWER + back;
         let off = |values: fn(&Off) -> &ActuatorArray| {
             let value = |back: usize| values(self.off.back(back))[index];
             let later = value(sent + cycles);
             if part == 0.0 { later } else { later + (value(sent + cycles + 1) - later) * part }
         };
-        let planned = self.plan.back(self.latencies.ahead + sent).point(index);
+        let planned = self.plan_before(index, self.latencies.ahead + sent, measured);
         planned.off(off(|off| &off.angle), off(|off| &off.speed))
+    }
+
+    /// What the plan has for the motor with this index `back` cycles before the player's newest instant, and by `time`
+    /// before that.
+    fn plan_before(&self, index: usize, back: usize, time: Delay) -> Point {
+        let later = self.plan.back(back + time.cycles);
+        if time.part == 0.0 {
+            return later.point(index);
+        }
+        let earlier = self.plan.back(back + time.cycles + 1);
+        earlier.between(later, 1.0 - time.part, self.cycle_time, index)
     }
 
     /// Looks up what the motors have been told for the instant of the feedback.

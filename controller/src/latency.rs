@@ -21,6 +21,10 @@ pub struct Latency {
     pub acts: Delay,
     /// From there to the instant that the player has come to.
     pub behind: Delay,
+    /// From the measurement that is told at a deadline to that deadline.
+    pub measured: Delay,
+    /// From the deadline at which that was sent which acted at the measurement, to the one at which it is told.
+    pub answered: Delay,
 }
 
 /// The latencies of a machine's drives.
@@ -42,20 +46,27 @@ impl Latencies {
         let times = || machine.actuators.iter().map(|actuator| actuator.latency);
         let longest = times().fold(gate, Nanoseconds::max);
         let ahead = Delay::of(longest, period).whole_cycles();
-        let latency = |time: Nanoseconds| Latency {
+        let latency = |time: Nanoseconds, age: Nanoseconds| Latency {
             acts: Delay::of(time, period),
             behind: Delay::of(period.of(ahead as u64) - time, period),
+            measured: Delay::of(age, period),
+            answered: Delay::of(time + age, period),
         };
-        let mut actuators = [latency(longest); MAX_ACTUATORS];
-        for (slot, time) in actuators.iter_mut().zip(times()) {
-            *slot = latency(time);
+        let mut actuators = [latency(longest, Nanoseconds(0)); MAX_ACTUATORS];
+        for (slot, actuator) in actuators.iter_mut().zip(&machine.actuators) {
+            *slot = latency(actuator.latency, actuator.age);
         }
-        Self { ahead, actuators, gate: latency(gate) }
+        Self { ahead, actuators, gate: latency(gate, Nanoseconds(0)) }
     }
 
-    /// The longest of the actuators', in whole cycles.
-    pub fn longest(&self) -> usize {
-        self.actuators.iter().map(|latency| latency.acts.whole_cycles()).max().unwrap_or(0)
+    /// The longest time from a command to what is told of it, in whole cycles.
+    pub fn longest_answered(&self) -> usize {
+        self.actuators.iter().map(|latency| latency.answered.whole_cycles()).max().unwrap_or(0)
+    }
+
+    /// The age of the oldest measurement, in whole cycles.
+    pub fn oldest(&self) -> usize {
+        self.actuators.iter().map(|latency| latency.measured.whole_cycles()).max().unwrap_or(0)
     }
 }
 
@@ -76,7 +87,7 @@ mod tests {
         let times = |latency: Latency| {
             [latency.acts, latency.behind].map(|delay| (delay.cycles, delay.part))
         };
-        assert_eq!((latencies.ahead, latencies.longest()), (2, 2));
+        assert_eq!((latencies.ahead, latencies.longest_answered()), (2, 2));
         assert_eq!(times(latencies.actuators[0]), [(1, 0.75), (0, 0.25)]);
         assert_eq!(times(latencies.actuators[1]), [(0, 0.0), (2, 0.0)]);
         assert_eq!(times(latencies.gate), [(0, 0.5), (1, 0.5)]);

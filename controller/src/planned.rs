@@ -3,6 +3,7 @@
 use crate::lookahead::Lookahead;
 use crate::player::Instant;
 use machine::Actuator;
+use messages::math::hermite;
 use messages::time::SETPOINT_TIME;
 use messages::{ActuatorArray, MAX_ACTUATORS, Nanoseconds};
 
@@ -189,15 +190,4 @@ struct Demand {
 fn slope(values: &[f64]) -> f64 {
     let rise = |distance: usize| values[3 + distance] - values[3 - distance];
     (45.0 * rise(1) - 9.0 * rise(2) + rise(3)) / 60.0
-}
-
-/// Value and slope at `at` in 0..1 of the cubic with these values and slopes at 0 and 1.
-fn hermite(from: f64, from_slope: f64, to: f64, to_slope: f64, at: f64) -> (f64, f64) {
-    let rise = to - from;
-    let square = 3.0 * rise - 2.0 * from_slope - to_slope;
-    let cube = from_slope + to_slope - 2.0 * rise;
-    (
-        from + at * (from_slope + at * (square + at * cube)),
-        from_slope + at * (2.0 * square + at * 3.0 * cube),
-    )
 }

@@ -48,6 +48,7 @@ use machine::{
     Actuator, ActuatorMode, Axis, LaserSource, Machine, Mechanism, MechanismVisitor, Motor,
 };
 use messages::delay::{Delay, Recent};
+use messages::math::hermite;
 use messages::random::SplitMix64;
 use messages::time::Period;
 use messages::{
@@ -214,6 +215,10 @@ pub struct Plant<const N: usize, M: Mechanism<N>, const A: usize = N> {
     /// Where between two counts each encoder stands at the origin, −0.5..0.5 [counts].
     phase: SVector<f64, A>,
     state: State<N, A>,
+    /// How long before a deadline each place was measured that is told then.
+    age: [Delay; A],
+    /// Angles and speeds at the newest deadlines [rad, rad/s].
+    turned: Recent<[SVector<f64, A>; 2]>,
     /// Where it was a substep before.
     passed: State<N, A>,
     in_force: Option<Actuation>,
@@ -288,8 +293,14 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
             load,
             load_speed: SVector::zeros(),
         };
+        let age = core::array::from_fn(|row| {
+            actuators.get(row).map_or(Delay::default(), |it| Delay::of(it.age, period))
+        });
+        let oldest = age.iter().map(|age| age.whole_cycles()).max().unwrap_or(0);
         Ok(Self {
             period,
+            age,
+            turned: Recent::of([state.angle, state.speed], oldest + 1),
             brake: Brake::of(axes, actuators),
             servos: core::array::from_fn(|row| {
                 let actuator = actuators.get(row)?;
@@ -440,6 +451,19 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
         }
     }
 
+    /// The angle of a motor when its place was measured [rad].
+    fn turned(&self, row: usize) -> f64 {
+        let Delay { cycles, part, .. } = self.age[row];
+        let [later, later_speed] = self.turned.back(cycles);
+        if part == 0.0 {
+            return later[row];
+        }
+        let [earlier, earlier_speed] = self.turned.back(cycles + 1);
+        let [from, to] =
+            [earlier_speed, later_speed].map(|speed| speed[row] * self.period.seconds());
+        hermite(earlier[row], from, later[row], to, 1.0 - part).0
+    }
+
     fn measure(&mut self) -> Measurement {
         let mut measurement = Measurement::default();
         let pulses = self.stepping.as_ref().map(Stepping::counts);
@@ -450,7 +474,7 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
                     self.origin[row] + pulses[row] as f64 * self.resolution[row];
                 continue;
             }
-            let turned = (self.state.angle[row] - self.origin[row]) / self.resolution[row];
+            let turned = (self.turned(row) - self.origin[row]) / self.resolution[row];
             let counts = (turned + self.phase[row]).round();
             measurement.counts[row] = counts as i64;
             measurement.position[row] = self.origin[row] + counts * self.resolution[row];
@@ -547,6 +571,7 @@ impl<const N: usize, M: Mechanism<N>, const A: usize> Plant<N, M, A> {
     fn cycle(&mut self) {
         let Some(in_force) = self.in_force else { return };
         self.advance(&in_force);
+        self.turned.push([self.state.angle, self.state.speed]);
         let Delay { cycles, .. } = self.gate_latency;
         let [before, after] = [cycles + 1, cycles].map(|back| *self.gate.back(back));
         let gate = LaserCycle::across(&before, &after, self.gate_latency, self.period);

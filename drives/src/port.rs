@@ -17,7 +17,8 @@
 //! - [`Port::send`] is called once a cycle, at its deadline, and returns at once: the bus works while we
 //!   think. The actuation acts from this instant and the [latency](ActuatorProfile::latency) of each actuator
 //!   on, until the next one takes its place.
-//! - [`Port::receive`] follows it. The measurement is that of this deadline; its `laser` tells what was fired
+//! - [`Port::receive`] follows it. The measurement is that of this deadline, but for places, which may be older by the
+//!   [age](machine::Drives::age) of the drives; its `laser` tells what was fired
 //!   between the deadline before and this one, by our clock. A port waits for it within a time of its own,
 //!   a small part of the period. Where nothing came, it gives the measurement before as it was, and counts
 //!   that; from how many in a row on that is a fault is the port's to say.

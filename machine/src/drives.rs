@@ -4,6 +4,7 @@
 mod words;
 
 use messages::Nanoseconds;
+use messages::time::Period;
 
 pub use words::fault_text;
 
@@ -44,6 +45,18 @@ pub struct Drives {
     /// From the deadline at which an actuation is sent until its gate edges count from [ns]. How long a
     /// motor's target takes is [`crate::Actuator::latency`].
     pub gate_latency: Nanoseconds,
+}
+
+impl Drives {
+    /// How long before a deadline the place of a motor was measured that is told then, in cycles of `period`, if its
+    /// targets act by `latency`. On a bus drives measure at the sync signal at which they take their targets, and the
+    /// next frame fetches that.
+    pub fn age(&self, latency: Nanoseconds, period: Period) -> Nanoseconds {
+        match self.kind {
+            DrivesKind::Ethercat(_) => Nanoseconds((period.time() - latency).0.max(0)),
+            DrivesKind::Simulated | DrivesKind::Hostmot2(_) => Nanoseconds(0),
+        }
+    }
 }
 
 impl Default for Drives {

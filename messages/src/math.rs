@@ -16,6 +16,17 @@ pub fn nearest_turn(angle: f64, reference: f64) -> f64 {
     angle + TURN * ((reference - angle) / TURN).round()
 }
 
+/// Value and slope at `at` in 0..1 of the cubic with these values and slopes at 0 and 1.
+pub fn hermite(from: f64, from_slope: f64, to: f64, to_slope: f64, at: f64) -> (f64, f64) {
+    let rise = to - from;
+    let square = 3.0 * rise - 2.0 * from_slope - to_slope;
+    let cube = from_slope + to_slope - 2.0 * rise;
+    (
+        from + at * (from_slope + at * (square + at * cube)),
+        from_slope + at * (2.0 * square + at * 3.0 * cube),
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::{TURN, nearest_turn};

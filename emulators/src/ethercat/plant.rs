@@ -55,6 +55,7 @@ impl Plant {
         let mut motors = Machine { realtime, ..machine.clone() };
         for actuator in &mut motors.actuators {
             (actuator.mode, actuator.latency) = (ActuatorMode::Voltage, Nanoseconds(0));
+            actuator.age = Nanoseconds(0);
         }
         motors.drives.gate_latency = Nanoseconds(0);
         let port = SimulatedPlant::new(&motors, options).map_err(PlantError::Plant)?;

@@ -215,6 +215,7 @@ pub(super) fn axis(
             },
             mode: mode(table, &motor, diagnostics),
             latency: Nanoseconds(0),
+            age: Nanoseconds(0),
             square: drive.square,
         };
         actuators.push((drive, actuator));

@@ -13,28 +13,39 @@ use messages::time::Period;
 struct DeadTime {
     period: Period,
     latency: Nanoseconds,
+    /// How old the measurement is.
+    age: Nanoseconds,
 }
 
 impl DeadTime {
-    /// In cycles of `period`, with a drive that acts by `latency` after it is told.
-    fn of(period: Period, latency: Nanoseconds) -> Self {
-        Self { period, latency }
+    /// In cycles of `period`, with a drive that measures and acts at the deadline.
+    fn at_once(period: Period) -> Self {
+        Self { period, latency: Nanoseconds(0), age: Nanoseconds(0) }
+    }
+
+    /// In cycles of `period`, with the drive of `actuator`.
+    fn of(period: Period, actuator: &Actuator) -> Self {
+        Self { period, latency: actuator.latency, age: actuator.age }
     }
 
     /// From a measurement to the start of the cycle in which its answer acts [s].
     fn seconds(self) -> f64 {
-        self.period.seconds() + self.latency.seconds()
+        self.period.seconds() + self.latency.seconds() + self.age.seconds()
     }
 
     /// What makes a loop swing, in words.
     fn words(self) -> String {
         let milliseconds = |time: f64| format!("{} ms", time * 1e3);
         let cycle = milliseconds(self.period.seconds());
-        if self.latency == Nanoseconds(0) {
-            return format!("in a control cycle of {cycle}");
+        let [latency, age] = [self.latency, self.age].map(|time| milliseconds(time.seconds()));
+        let mut words = format!("in a control cycle of {cycle}");
+        if self.latency != Nanoseconds(0) {
+            words += &format!(" with a drive that acts {latency} after it is told");
         }
-        let latency = milliseconds(self.latency.seconds());
-        format!("in a control cycle of {cycle} with a drive that acts {latency} after it is told")
+        if self.age != Nanoseconds(0) {
+            words += &format!(" and measures {age} before it tells");
+        }
+        words
     }
 }
 
@@ -49,7 +60,7 @@ pub(super) struct DeadTimes {
 impl DeadTimes {
     /// In cycles of `period`, with drives that act at once.
     pub(super) fn at_once(period: Period) -> Self {
-        let dead = DeadTime::of(period, Nanoseconds(0));
+        let dead = DeadTime::at_once(period);
         Self { position: dead, velocity: dead, current: dead }
     }
 }
@@ -63,11 +74,11 @@ pub(super) fn slow_down(
     diagnostics: &mut Diagnostics,
 ) {
     let is_stepper = matches!(actuator.motor, Motor::Stepper(_));
-    if actuator.latency == Nanoseconds(0) || is_stepper {
+    if actuator.latency + actuator.age == Nanoseconds(0) || is_stepper {
         return;
     }
-    let by_drive = DeadTime::of(period, Nanoseconds(0));
-    let here = DeadTime::of(period, actuator.latency);
+    let by_drive = DeadTime::at_once(period);
+    let here = DeadTime::of(period, actuator);
     let [position, velocity, current] = match actuator.mode {
         ActuatorMode::Position => [by_drive; 3],
         ActuatorMode::Velocity => [here, by_drive, by_drive],
@@ -97,7 +108,7 @@ pub(super) fn gains(
             &defaults
         }
     };
-    let usual = DeadTime::of(Period::OF_SETPOINTS, Nanoseconds(0)).seconds();
+    let usual = DeadTime::at_once(Period::OF_SETPOINTS).seconds();
     // The place of a default is that of its table.
     let in_time = |value: f64, span: Span, dead: DeadTime| Spanned {
         value: if span == loops.span { value * (usual / dead.seconds()).min(1.0) } else { value },

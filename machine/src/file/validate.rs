@@ -54,6 +54,9 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let drives = drives::build(&table.drives, &mut actuators, &operating, &mut diagnostics);
     if diagnostics.is_empty() {
         for ((drive, own), actuator) in driven.iter_mut().zip(&mut actuators) {
+            if actuator.motor.dc().is_some() {
+                actuator.age = drives.age(actuator.latency, realtime.period);
+            }
             loops::slow_down(actuator, &drive.table, realtime.period, &mut diagnostics);
             *own = actuator.clone();
         }
