@@ -12,6 +12,7 @@
 #![deny(rustdoc::broken_intra_doc_links)]
 
 pub mod allocation;
+pub mod bounded;
 pub mod channel;
 pub mod child;
 pub mod clock;
