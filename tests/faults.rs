@@ -98,21 +98,24 @@ impl Aftermath {
     }
 }
 
-/// Asserts that every length of the job is marked, missing or unrecorded, and none of it twice.
+/// Asserts that every length of the job is marked, missing, unrecorded or left, and none of it twice.
 fn assert_balanced(summary: &Value, what: &str) {
     let marks = |key: &str| number(summary, &format!("/marks/{key}"));
-    let sum = marks("length") + marks("missing") - marks("double");
+    let left = summary.pointer("/left/length").and_then(Value::as_f64).unwrap_or(0.0);
+    let sum = marks("length") + marks("missing") + left - marks("double");
     // Each stroke end may be off by the accuracy of a stroke end.
     let ends = 2.0 * 20e-6 * number(summary, "/job/strokes");
     let length = number(summary, "/job/length");
     assert!((sum - length).abs() <= ends, "{what}: {sum} of {length}: {}", summary["marks"]);
 }
 
-/// Asserts that marks of a run that was cut short say that something is missing, and that what was
-/// marked lies where it should.
+/// Asserts that marks of a run that was cut short say that something is left or may be missing, and that what
+/// was marked lies where it should.
 fn assert_true_marks(summary: &Value, what: &str) {
-    let missing = number(summary, "/marks/missing");
-    assert!(missing > 1e-3, "{what}: only {missing} m missing");
+    let left = number(summary, "/left/length") + number(summary, "/marks/unrecorded");
+    assert!(left > 1e-3, "{what}: only {left} m left");
+    let lost = number(summary, "/marks/missing") - number(summary, "/marks/unrecorded");
+    assert!(lost < 1e-4, "{what}: {lost} m missing of what it had come to");
     assert_balanced(summary, what);
     assert!(number(summary, "/marks/error_max") <= 20e-6, "{what}: {summary:#}");
     assert_eq!(number(summary, "/marks/stray"), 0.0, "{what}");

@@ -149,11 +149,24 @@ fn an_interrupt_stops_laser_then_axes_then_processes() {
         support::assert_valid("summary", &summary);
         assert_eq!(summary["outcome"], "stopped");
         assert_eq!(summary["fault"], Value::Null);
-        assert!(number(&summary, "/marks/missing") > 1e-3, "{summary:#}");
+        assert_judged_by_what_was_due(&summary);
         assert!(number(&summary, "/marks/error_max") < 20e-6, "{summary:#}");
         support::assert_ends_dark_and_at_rest(&place.recording("run"), 2);
         place.assert_nothing_left(&services);
     }
+}
+
+/// Asserts that of a job that was broken off nothing is missing but what is left, and that it says where to go on.
+fn assert_judged_by_what_was_due(summary: &Value) {
+    let marks = |key: &str| number(summary, &format!("/marks/{key}"));
+    let left = |key: &str| number(summary, &format!("/left/{key}"));
+    let sum = marks("length") + marks("missing") + left("length") - marks("double");
+    let length = number(summary, "/job/length");
+    assert!((sum - length).abs() < 1e-4, "{sum} of {length}: {summary:#}");
+    assert!(marks("missing") < 1e-4 && left("length") > 1e-3, "{summary:#}");
+    assert_eq!(summary["marks"]["strokes_lost"], 0, "{summary:#}");
+    assert_eq!(left("from_stroke"), left("strokes_done") + 1.0, "{summary:#}");
+    assert_eq!(left("from_stroke"), left("place/stroke"), "{summary:#}");
 }
 
 #[test]
@@ -221,8 +234,21 @@ fn stop_gives_the_job_up_and_status_tells_all_along() {
         assert_eq!(place.ask(&[verb]).code, Some(1), "{verb}");
     }
     place.ask(&["stop"]).accepted();
-    let summary = running.wait().json(1);
+    let ended = running.wait();
+    let summary = ended.json(1);
     assert_eq!(summary["outcome"], "stopped");
+    assert_judged_by_what_was_due(&summary);
+    // What is left is what the job marks that goes on from there.
+    let [stroke, strokes] = ["from_stroke", "strokes"].map(|key| &summary["left"][key]);
+    let goes_on = format!("marking.from_stroke={stroke}");
+    let rest = place.graver(&["plan", job.to_str().unwrap(), "--set", &goes_on, "--json"]).json(0);
+    let begun = number(&summary, "/left/begun");
+    let left = number(&summary, "/left/length") + begun;
+    assert!((number(&rest, "/length") - left).abs() < 1e-6, "{rest:#}");
+    assert_eq!(
+        rest["strokes"].as_u64().unwrap() + stroke.as_u64().unwrap() - 1,
+        strokes.as_u64().unwrap()
+    );
     support::assert_ends_dark_and_at_rest(&place.recording("run"), 2);
     place.assert_nothing_left(&services);
 }

@@ -11,6 +11,12 @@ pub struct PlanFacts {
     pub name: String,
     /// Strokes and dots to mark.
     pub strokes: usize,
+    /// Strokes and dots of the job before those, which it says to pass over.
+    #[serde(default)]
+    pub passed_over: u64,
+    /// Whether the job has been planned to its end.
+    #[serde(default)]
+    pub is_whole: bool,
     /// Length to mark [m].
     pub length: f64,
     /// From the first motion to the last [s].

@@ -17,8 +17,8 @@ use crate::run_analysis::{Clock, RunAnalysis, RunResults};
 use crate::run_folder::RunFolder;
 use crate::summary::text::length;
 use crate::summary::{
-    DrivesSummary, ErrorSummary, FaultSummary, JobSummary, MachineSummary, Outcome, Realtime,
-    StallSummary, Summary,
+    DrivesSummary, ErrorSummary, FaultSummary, JobSummary, LeftSummary, MachineSummary, Outcome,
+    Realtime, StallSummary, Summary,
 };
 use machine::{Actuator, Machine};
 use messages::artwork::Artwork;
@@ -135,6 +135,7 @@ pub fn summarise(
         match &results.marks {
             Ok(evaluation) => {
                 summary.warnings.extend(warnings(evaluation));
+                summary.left = LeftSummary::of(evaluation, plan);
                 summary.marks = Some(evaluation.marks.clone());
             }
             Err(reason) => summary.warnings.push(reason.to_string()),
@@ -169,7 +170,7 @@ fn end(summary: &mut Summary, machine: &Machine, run_outcome: &RunOutcome) {
 
 /// What a person should know of marks that are not judged whole.
 fn warnings(evaluation: &MarkEvaluation) -> Vec<String> {
-    let MarkEvaluation { marks, unrecorded_strokes, unknown, open_end } = evaluation;
+    let MarkEvaluation { marks, unrecorded_strokes, unknown, open_end, left: _ } = evaluation;
     let Some((first, last)) = unrecorded_strokes else { return Vec::new() };
     let Marks { unrecorded, .. } = marks;
     let strokes = if first == last {

@@ -6,6 +6,9 @@
 //! names, so that light which comes late is found where it falls. A hold that backs up and resumes
 //! adds a run of light to its stroke: a gap between the runs is missing, an overlap is double.
 //!
+//! A job that was not played to its end is judged by what it had come to: what was not due yet is *left*,
+//! not missing.
+//!
 //! What passed while nobody recorded is *unrecorded*, from where the job had come before a gap to
 //! where light first fell or was due after it: missing, because nobody saw it marked.
 //!
@@ -20,10 +23,10 @@ pub mod tool_path;
 use crate::recording::CycleRecord;
 use crate::recording::continuity::Succession;
 use coverage::Coverage;
-use frontier::{Frontier, Unseen, first_light, last_light};
+use frontier::{Frontier, Place, Unseen, first_light, last_light};
 use line::{Foot, Line};
 use messages::ControllerReport;
-use messages::artwork::Artwork;
+use messages::artwork::{Artwork, Stroke, distance};
 use messages::time::{Period, SETPOINT_TIME};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -45,7 +48,7 @@ pub enum Source {
 pub struct Marks {
     /// Length of the tool's true path with the laser on [m].
     pub length: f64,
-    /// Length of the job that is not known to be marked [m].
+    /// Length that the job had come to and that is not known to be marked [m].
     pub missing: f64,
     /// How much of `missing` passed while nobody recorded [m]: it may be marked all the same.
     #[serde(default)]
@@ -60,7 +63,7 @@ pub struct Marks {
     pub tracking_max: f64,
     /// Root mean square of that distance over the time lit [m].
     pub tracking_rms: f64,
-    /// The worst single stroke end that was not marked [m]; a lost stroke counts whole.
+    /// The worst single stroke end that the job had come to and that was not marked [m]; a lost stroke counts whole.
     pub missing_end_max: f64,
     /// The longest mark beyond a single stroke end [m].
     pub double_end_max: f64,
@@ -70,7 +73,7 @@ pub struct Marks {
     pub speed_max: f64,
     /// How the tool's position was known.
     pub source: Source,
-    /// Strokes, dots included, that are known to have got no light at all.
+    /// Strokes, dots included, that the job was through with and that are known to have got no light at all.
     pub strokes_lost: u64,
     /// Length marked while no stroke was asked for [m]; counted in `length` and `double`.
     pub stray: f64,
@@ -87,6 +90,55 @@ pub struct MarkEvaluation {
     pub unknown: u64,
     /// Whether nobody can tell what light the job still had after its last record.
     pub open_end: bool,
+    /// What the job had not come to when it ended; `None` of one that was played to its end.
+    pub left: Option<Left>,
+}
+
+/// What of a job was not due yet when it ended, as far as it was planned.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Left {
+    /// The stroke to go on with, from 1: the first that is not done.
+    pub stroke: u64,
+    /// How much of that stroke has been marked, or should have been [m].
+    pub begun: f64,
+    /// Where that is in the drawing; `None` behind the last stroke that was planned.
+    pub place: Option<DrawnPlace>,
+    /// Length that was not due yet [m]. What may have passed while nobody recorded is not counted.
+    pub length: f64,
+}
+
+/// A place on a stroke.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DrawnPlace {
+    /// Line of the job file that the stroke comes from, from 1; 0 when it has none.
+    pub line: u64,
+    /// The place, machine frame [m].
+    pub position: [f64; 3],
+    /// The lower and the upper corner of the box around the stroke [m].
+    pub bounds: [[f64; 3]; 2],
+}
+
+impl DrawnPlace {
+    /// The place on `stroke` at arc length `along` [m]; `None` of one without points.
+    fn on(stroke: &Stroke, along: f64) -> Option<Self> {
+        let first = stroke.points.first()?;
+        let mut bounds = [*first; 2];
+        let (mut position, mut left) = (*first, along);
+        for pair in stroke.points.windows(2) {
+            let [from, to] = pair else { continue };
+            let length = distance(from, to);
+            if left > 0.0 && length > 0.0 {
+                let part = (left / length).min(1.0);
+                position = std::array::from_fn(|axis| from[axis] + part * (to[axis] - from[axis]));
+            }
+            left -= length;
+            for axis in 0..3 {
+                bounds[0][axis] = bounds[0][axis].min(to[axis]);
+                bounds[1][axis] = bounds[1][axis].max(to[axis]);
+            }
+        }
+        Some(Self { line: stroke.line, position, bounds })
+    }
 }
 
 /// What is known of the end of a job's stream.
@@ -273,7 +325,13 @@ impl<'a> MarkEvaluator<'a> {
             return Err(Unevaluated::Unrecorded);
         }
         let Some(newest) = self.newest else { return Err(Unevaluated::ToolUnknown) };
-        let open_end = self.hide_the_end(&newest, end);
+        let completed = matches!(end, StreamEnd::Reported(report) if report.completed == 1);
+        let (open_end, hidden) = self.hide_the_end(&newest, end);
+        let due = match (completed, hidden) {
+            (true, _) => Place::end(self.artwork),
+            (false, Some(hidden)) => self.frontier.place.max(hidden),
+            (false, None) => self.frontier.place,
+        };
         let (speed_min, speed_max) = self.sums.speed.or(self.sums.run_speed).unwrap_or((0.0, 0.0));
         let mut marks = Marks {
             length: self.sums.length,
@@ -293,9 +351,18 @@ impl<'a> MarkEvaluator<'a> {
             stray: self.sums.stray,
         };
         let mut unrecorded_strokes: Option<(u64, u64)> = None;
+        let reached = self.frontier.place;
+        let mut left = Left { stroke: reached.stroke, ..Left::default() };
         for (number, (stroke, state)) in (1..).zip(self.artwork.strokes.iter().zip(&self.strokes)) {
-            let extent = state.coverage.extent(stroke.length());
-            if state.coverage.is_lost() {
+            let length = stroke.length();
+            let come_to = due.along(number, length);
+            if number == reached.stroke {
+                left.begun = reached.along(number, length);
+                left.place = DrawnPlace::on(stroke, left.begun);
+            }
+            left.length += length - come_to;
+            let extent = state.coverage.extent(length, come_to);
+            if number < due.stroke && state.coverage.is_lost() {
                 marks.strokes_lost += 1;
             }
             if state.coverage.is_hidden() {
@@ -305,7 +372,7 @@ impl<'a> MarkEvaluator<'a> {
             marks.missing += extent.missing + extent.unrecorded;
             marks.unrecorded += extent.unrecorded;
             // A dot has no length to mark twice; straying from it is its error.
-            if stroke.length() > 0.0 {
+            if length > 0.0 {
                 marks.double += extent.double;
                 for end in extent.double_ends {
                     marks.double_end_max = marks.double_end_max.max(end);
@@ -315,7 +382,8 @@ impl<'a> MarkEvaluator<'a> {
                 marks.missing_end_max = marks.missing_end_max.max(end);
             }
         }
-        Ok(MarkEvaluation { marks, unrecorded_strokes, unknown: self.unknown, open_end })
+        let left = (!completed).then_some(left);
+        Ok(MarkEvaluation { marks, unrecorded_strokes, unknown: self.unknown, open_end, left })
     }
 
     fn moment(&mut self, moment: Moment) {

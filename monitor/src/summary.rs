@@ -5,6 +5,7 @@
 
 pub mod drives;
 pub mod fault;
+pub mod left;
 pub mod stalls;
 pub mod text;
 
@@ -19,6 +20,7 @@ use std::collections::BTreeMap;
 
 pub use drives::{DrivesSummary, LinkSummary};
 pub use fault::FaultSummary;
+pub use left::LeftSummary;
 pub use stalls::StallSummary;
 
 /// How a run ended.
@@ -81,6 +83,10 @@ pub struct Summary {
     pub report_time: f64,
     /// What was marked; null when nothing of it was recorded.
     pub marks: Option<Marks>,
+    /// What of the job was not due yet when it ended, and where to go on; null of a job that was played to its end,
+    /// or whose marks are not judged.
+    #[serde(default)]
+    pub left: Option<LeftSummary>,
     /// How complete the recording is; null without one.
     pub recording: Option<RecordingSummary>,
     /// Setpoint minus feedback at the motors.
@@ -229,6 +235,7 @@ impl Summary {
             plan_time: 0.0,
             report_time: 0.0,
             marks: None,
+            left: None,
             recording: None,
             following_error: FollowingError::default(),
             limits: LimitUse::default(),

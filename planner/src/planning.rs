@@ -310,6 +310,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         self.front.sampler.has_ended()
     }
 
+    /// Strokes that were passed over before the first.
+    pub(crate) fn passed_over(&self) -> u64 {
+        self.operations.passed()
+    }
+
     /// How much faster than the job asks for it is marked.
     pub(crate) fn rate(&self) -> f64 {
         self.rate

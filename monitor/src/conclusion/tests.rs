@@ -218,6 +218,46 @@ fn nothing_recorded_or_an_end_that_nobody_knows_is_said() {
 }
 
 #[test]
+fn a_job_that_was_stopped_is_judged_by_what_it_had_come_to_and_says_where_to_go_on() {
+    // Stopped after 41 lit cycles; the same line a second time was never begun.
+    let line = artwork().strokes.remove(0);
+    let artwork = Artwork { strokes: vec![line.clone(), Stroke { line: 2, ..line }] };
+    let last = FIRST + 1 + 41;
+    let mut analysis = RunAnalysis::new(&artwork, Clock::Virtual, Period::OF_SETPOINTS);
+    for cycle in FIRST..=last + LIGHT_LAG {
+        let mut record = record(cycle);
+        if cycle > last {
+            record.command.state = ControllerState::Stopping as u32;
+            record.command.laser = LaserCycle::OFF;
+            record.command.stroke = 0;
+        }
+        if cycle > last + 1 {
+            record.feedback.laser = LaserCycle::OFF;
+        }
+        analysis.push(&record);
+    }
+    let stopped = ControllerReport { last_cycle: Cycle(last), completed: 0, ..report() };
+    let results = analysis.finish(StreamEnd::Reported(&stopped));
+    let plan = PlanFacts { strokes: 2, passed_over: 6, is_whole: true, ..plan() };
+    let outcome = ended(stopped);
+    let summary = summarise(&Machine::builtin(), &plan, &outcome, Some(&results), Clock::Virtual);
+    let (marks, left) = (summary.marks.as_ref().unwrap(), summary.left.unwrap());
+    assert_eq!((marks.missing, marks.strokes_lost, marks.double), (0.0, 0, 0.0), "{marks:?}");
+    assert!((marks.length + left.length - 2.0 * LENGTH).abs() < 1e-12, "{left:?}");
+    assert_eq!((left.strokes_done, left.strokes, left.from_stroke), (6, 8, 7));
+    assert!((left.begun - marks.length).abs() < 1e-9 && left.begun > 0.01, "{left:?}");
+    let place = left.place.unwrap();
+    assert_eq!((place.stroke, place.line, place.upper), (7, Some(1), [LENGTH, 0.0, 0.0]));
+    assert!((place.position[0] - left.begun).abs() < 1e-12, "{place:?}");
+    let text = summary.text();
+    assert!(text.contains("left              6 of 8 strokes done, 10."), "{text}");
+    assert!(text.contains("go on with --set marking.from_stroke=7"), "{text}");
+    // One that was played to its end has nothing left.
+    let whole = examined(FIRST..=LAST + LIGHT_LAG);
+    assert_eq!(summary_of(&ended(report()), Some(&whole)).left, None);
+}
+
+#[test]
 fn overruns_are_those_of_the_run() {
     let overruns = |before: u64| {
         let drives = Some(DrivesReport { overruns: 12, ..DrivesReport::default() });

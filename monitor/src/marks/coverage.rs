@@ -81,22 +81,23 @@ impl Coverage {
         self.hidden.iter().any(|(from, to)| from == to || to - from > NOTABLE)
     }
 
-    /// How a stroke of `length` [m] was covered. Call after [`Self::end`].
-    pub fn extent(&self, length: f64) -> Extent {
+    /// How a stroke of `length` [m] was covered that should have been marked up to `due` [m], all of it or less.
+    /// Call after [`Self::end`].
+    pub fn extent(&self, length: f64, due: f64) -> Extent {
         let known = || self.stretches.iter();
         let all = || known().chain(&self.hidden);
         if all().next().is_none() {
-            return Extent { missing: length, missing_ends: [length; 2], ..Extent::default() };
+            return Extent { missing: due, missing_ends: [due; 2], ..Extent::default() };
         }
         let low = all().fold(f64::INFINITY, |low, stretch| low.min(stretch.0));
         let high = all().fold(f64::NEG_INFINITY, |high, stretch| high.max(stretch.1));
-        let missing_ends = [low.clamp(0.0, length), (length - high).clamp(0.0, length)];
+        let missing_ends = [low.clamp(0.0, due), (due - high).clamp(0.0, due)];
         let double_ends =
             [measure(known(), f64::NEG_INFINITY, 0.0).0, measure(known(), length, f64::INFINITY).0];
         let (once, twice) = measure(known(), 0.0, length);
         let passed = measure(all(), 0.0, length).0;
         Extent {
-            missing: (length - passed).max(0.0),
+            missing: (due - measure(all(), 0.0, due).0).max(0.0),
             double: twice + double_ends[0] + double_ends[1],
             unrecorded: (passed - once).max(0.0),
             missing_ends,
@@ -140,7 +141,7 @@ mod tests {
             run.iter().for_each(|&at| coverage.mark(at));
             coverage.end();
         }
-        let extent = coverage.extent(10.0);
+        let extent = coverage.extent(10.0, 10.0);
         let pairs = [
             (extent.missing, expect.missing),
             (extent.double, expect.double),
@@ -189,6 +190,27 @@ mod tests {
     }
 
     #[test]
+    fn what_was_not_due_is_not_missing() {
+        let check = |runs: &[&[f64]], due: f64, missing: f64, double: f64, ends: [f64; 2]| {
+            let mut coverage = Coverage::default();
+            for run in runs {
+                run.iter().for_each(|&at| coverage.mark(at));
+                coverage.end();
+            }
+            let extent = coverage.extent(10.0, due);
+            let found = (extent.missing, extent.double, extent.missing_ends);
+            assert_eq!(found, (missing, double, ends), "{runs:?} {due}");
+        };
+        check(&[&[0.0, 4.0]], 4.0, 0.0, 0.0, [0.0; 2]);
+        check(&[&[0.0, 4.0]], 5.0, 1.0, 0.0, [0.0, 1.0]);
+        check(&[], 4.0, 4.0, 0.0, [4.0; 2]);
+        check(&[], 0.0, 0.0, 0.0, [0.0; 2]);
+        // Light beyond what was due is on the stroke all the same.
+        check(&[&[1.0, 5.0]], 4.0, 1.0, 0.0, [1.0, 0.0]);
+        check(&[&[0.0, 5.0], &[3.0, 4.0]], 4.0, 0.0, 1.0, [0.0; 2]);
+    }
+
+    #[test]
     fn what_is_hidden_is_neither_marked_nor_missing() {
         let check =
             |run: &[f64], hidden: &[(f64, f64)], missing: f64, unrecorded: f64, ends: [f64; 2]| {
@@ -196,7 +218,7 @@ mod tests {
                 run.iter().for_each(|&at| coverage.mark(at));
                 coverage.end();
                 hidden.iter().for_each(|&(from, to)| coverage.hide(from, to));
-                let extent = coverage.extent(10.0);
+                let extent = coverage.extent(10.0, 10.0);
                 let found = (extent.missing, extent.unrecorded, extent.missing_ends);
                 assert_eq!(found, (missing, unrecorded, ends), "{run:?} {hidden:?}");
                 assert!(coverage.is_hidden() && !coverage.is_lost());

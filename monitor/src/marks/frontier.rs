@@ -46,6 +46,15 @@ impl Place {
         place
     }
 
+    /// How far along a stroke of this number and `length` [m] the job is at this place [m].
+    pub(super) fn along(self, stroke: u64, length: f64) -> f64 {
+        match stroke.cmp(&self.stroke) {
+            Ordering::Less => length,
+            Ordering::Equal => self.at.clamp(0.0, length),
+            Ordering::Greater => 0.0,
+        }
+    }
+
     /// Whether this is before `other` in the order of marking.
     pub(super) fn is_before(self, other: Self) -> bool {
         let order = self.stroke.cmp(&other.stroke).then(self.at.total_cmp(&other.at));

@@ -133,8 +133,12 @@ impl MarkEvaluator<'_> {
     }
 
     /// Hides what the job may still have marked after its last record, and in a gap after which
-    /// nothing was lit; whether nobody can tell how far that was.
-    pub(super) fn hide_the_end(&mut self, newest: &Moment, end: StreamEnd<'_>) -> bool {
+    /// nothing was lit; whether nobody can tell how far that was, and up to where it was hidden.
+    pub(super) fn hide_the_end(
+        &mut self,
+        newest: &Moment,
+        end: StreamEnd<'_>,
+    ) -> (bool, Option<Place>) {
         let last = newest.stamp.cycle;
         let (last_cycle, completed) = match end {
             StreamEnd::Reported(report) => (Some(report.last_cycle.0), report.completed == 1),
@@ -150,7 +154,7 @@ impl MarkEvaluator<'_> {
         let over = |unseen: &Unseen| told.zip(unseen.after).is_some_and(|(told, it)| told <= it);
         let unseen = self.unseen.take().filter(|unseen| !over(unseen));
         let (from, cycles) = match (unseen, lacking) {
-            (None, 0) => return false,
+            (None, 0) => return (false, None),
             (None, lacking) => (self.frontier.place, told.map(|_| lacking)),
             (Some(unseen), lacking) => {
                 let cycles = unseen.cycles.filter(|_| lacking == 0 || told.is_some());
@@ -161,7 +165,7 @@ impl MarkEvaluator<'_> {
         let to = self.farthest(from, bound);
         self.hide(from, to);
         let bounded = bound.and(self.fastest).is_some();
-        !bounded && !completed && from.is_before(to)
+        (!bounded && !completed && from.is_before(to), Some(to))
     }
 
     /// How far the job can have come from a place in so many cycles; `None` is any number.

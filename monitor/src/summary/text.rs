@@ -42,6 +42,7 @@ pub fn rows(summary: &Summary) -> Vec<(String, String)> {
     rows.times(summary);
     rows.binding(&summary.binding);
     rows.marks(summary.marks.as_ref());
+    rows.add("left", summary.left.map(|left| left.to_string()).unwrap_or_default());
     rows.axes(summary);
     rows.cycles(summary);
     rows.realtime(&summary.realtime);
@@ -68,6 +69,9 @@ impl Rows {
         }
         if let Some(error) = &summary.error {
             self.add("error", error.message.as_str());
+        }
+        if let Some(place) = summary.left.and_then(|left| left.place) {
+            self.add("ended in", place.to_string());
         }
     }
 

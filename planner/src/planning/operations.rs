@@ -72,6 +72,11 @@ impl<'a> OperationQueue<'a> {
         self.first += count;
     }
 
+    /// Strokes that were passed over before the first.
+    pub(crate) fn passed(&self) -> u64 {
+        self.passed
+    }
+
     /// What a person should know of what has been made so far.
     pub(crate) fn notes(&self) -> &[Note] {
         &self.operations.notes

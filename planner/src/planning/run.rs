@@ -113,6 +113,8 @@ impl Facts<'_> {
         PlanFacts {
             name: self.name.to_owned(),
             strokes: account.strokes as usize,
+            passed_over: planning.passed_over(),
+            is_whole: planning.is_complete(),
             length: account.length,
             duration: planning.duration(),
             samples: planning.samples(),

@@ -188,20 +188,19 @@ fn where_the_job_was_broken_off_only_what_may_have_been_marked_is_hidden() {
         let stopped = ControllerReport { last_cycle, ..ControllerReport::default() };
         let evaluation = evaluator.finish(StreamEnd::Reported(&stopped)).unwrap();
         let Marks { missing, unrecorded, strokes_lost, .. } = evaluation.marks;
-        near(evaluation.marks.length + missing, art.length(), ROUNDING, "sum");
-        (
-            ((missing - unrecorded) / STEP).round(),
-            (unrecorded / STEP).round(),
-            strokes_lost,
-            evaluation.open_end,
-        )
+        let left = evaluation.left.unwrap();
+        near(evaluation.marks.length + missing + left.length, art.length(), ROUNDING, "sum");
+        near(missing - unrecorded, 0.0, ROUNDING, "missing");
+        // What is recorded ends 30 steps along the first of the three strokes.
+        assert_eq!((left.stroke, (left.begun / STEP).round(), strokes_lost), (1, 30.0, 0));
+        ((left.length / STEP).round(), (unrecorded / STEP).round(), evaluation.open_end)
     };
-    // Stopped at 30 ms and recorded to the end: all the rest is missing, whatever the speed.
+    // Stopped at 30 ms and recorded to the end: all the rest is left, whatever the speed.
     let stopped = cut(&records, &[31..500]);
-    assert_eq!(evaluate(&stopped, 28, SPEED), (90.0, 0.0, 2, false));
+    assert_eq!(evaluate(&stopped, 28, SPEED), (90.0, 0.0, false));
     // Four cycles more were played, at most at twice the speed: 8 steps; or nobody knows.
-    assert_eq!(evaluate(&stopped, 32, SPEED), (82.0, 8.0, 2, false));
-    assert_eq!(evaluate(&stopped, 32, 0.0), (0.0, 90.0, 0, true));
+    assert_eq!(evaluate(&stopped, 32, SPEED), (82.0, 8.0, false));
+    assert_eq!(evaluate(&stopped, 32, 0.0), (0.0, 90.0, true));
     // A gap and dark cycles after it, to the end.
     let mut late = cut(&records, &[31..36]);
     late.truncate(late.iter().position(|record| record.command.stream_time > 0.0465).unwrap());
@@ -209,7 +208,7 @@ fn where_the_job_was_broken_off_only_what_may_have_been_marked_is_hidden() {
         (record.feedback.laser, record.command.laser) = (LaserCycle::OFF, LaserCycle::OFF);
         (record.command.stroke, record.command.state) = (0, ControllerState::Stopping as u32);
     }
-    assert_eq!(evaluate(&late, 44, SPEED), (78.0, 12.0, 1, false));
+    assert_eq!(evaluate(&late, 44, SPEED), (78.0, 12.0, false));
 }
 
 #[test]
@@ -225,9 +224,9 @@ fn without_a_report_the_watchdog_says_that_no_light_follows() {
     };
     assert_eq!(evaluate(&kept, StreamEnd::Unknown), (90.0, 0, true));
     // Drives died: what it had been told fell for two cycles more, at most at twice the speed.
-    assert_eq!(evaluate(&kept, StreamEnd::Silenced), (4.0, 2, false));
+    assert_eq!(evaluate(&kept, StreamEnd::Silenced), (4.0, 0, false));
     kept.last_mut().unwrap().feedback.status |= status::WATCHDOG_TRIPPED;
-    assert_eq!(evaluate(&kept, StreamEnd::Unknown), (0.0, 2, false));
+    assert_eq!(evaluate(&kept, StreamEnd::Unknown), (0.0, 0, false));
 }
 
 #[test]
