@@ -1,6 +1,8 @@
-//! The report of a run: one page that opens offline, and the picture of the path by itself.
+//! The report of a run: one page to explore offline, and the picture of the path by itself.
 
 pub mod chart;
+mod column;
+mod data;
 pub mod html;
 pub mod page;
 pub mod path;

@@ -76,7 +76,14 @@ impl<'a> RunAnalysis<'a> {
     /// The same, of `machine`: where drives does not see the tool, it is found by the motors.
     #[must_use]
     pub fn with_machine(self, machine: &Machine) -> Self {
-        Self { finder: Some(ToolFinder::new(machine)), ..self }
+        let finder = Some(ToolFinder::new(machine));
+        Self { finder, ..self.with_actuators(machine.actuators.len()) }
+    }
+
+    /// The same, of a machine with so many actuators: there are no curves of more.
+    #[must_use]
+    pub fn with_actuators(self, actuators: usize) -> Self {
+        Self { trace: self.trace.with_actuators(actuators), ..self }
     }
 
     /// Takes the next record.

@@ -2,16 +2,18 @@
 //! second, and no extreme is lost.
 
 pub mod envelope;
-pub mod outline;
+pub mod event;
+pub mod track;
 
 use crate::marks::tool_path::{Interval, LitSpan, LitSpans, Moment, ToolPath};
 use crate::recording::CycleRecord;
 use crate::recording::continuity::Succession;
 use envelope::Envelope;
+use event::Events;
 use messages::hop::{Hop, latencies};
 use messages::time::Period;
 use messages::{LaserCycle, MAX_ACTUATORS, Nanoseconds};
-use outline::{Outline, OutlinePoint};
+use track::{Light, Track, TrackPoint};
 
 /// Share of `time` in which the laser marked, 0..=1.
 pub fn lit_share(laser: &LaserCycle, time: Nanoseconds) -> f64 {
@@ -21,7 +23,11 @@ pub fn lit_share(laser: &LaserCycle, time: Nanoseconds) -> f64 {
 /// The longest time of skipped cycles that the curves show as a gap; a longer one looks no different.
 const LONGEST_GAP: Nanoseconds = Nanoseconds(60_000_000_000);
 
-/// The curves of a run over time and its paths in the plane.
+/// The most straight parts of a lit or dark stretch of an interval.
+const MOST_PARTS: u64 = 50;
+
+/// The curves of a run over time and the way of its tool. All of them tell time from the first record on, in
+/// which cycles that nobody recorded have their place.
 #[derive(Debug)]
 pub struct Trace {
     /// The period of the cycle.
@@ -29,10 +35,17 @@ pub struct Trace {
     path: ToolPath,
     waiting: Option<CycleRecord>,
     timed: bool,
-    /// Paths of the tool with the laser on, from edge to edge.
-    pub marked: Outline,
-    /// Paths of the tool in the dark.
-    pub dark: Outline,
+    actuators: usize,
+    /// Cycles before the next record.
+    recorded: u64,
+    /// Cycles before the next interval.
+    passed: u64,
+    /// Where the newest interval ends.
+    tail: Option<TrackPoint>,
+    /// The way of the tool.
+    pub track: Track,
+    /// What happened to the stream.
+    pub events: Events,
     /// Distance of the tool from the plan while lit [m].
     pub deviation_lit: Envelope,
     /// Distance of the tool from the plan in the dark, while a stream is played [m].
@@ -60,8 +73,12 @@ impl Trace {
             path: ToolPath::default(),
             waiting: None,
             timed,
-            marked: Outline::default(),
-            dark: Outline::default(),
+            actuators: MAX_ACTUATORS,
+            recorded: 0,
+            passed: 0,
+            tail: None,
+            track: Track::default(),
+            events: Events::default(),
             deviation_lit: Envelope::default(),
             deviation_dark: Envelope::default(),
             speed: Envelope::default(),
@@ -71,6 +88,17 @@ impl Trace {
             voltage: std::array::from_fn(|_| Envelope::default()),
             latency: std::array::from_fn(|_| Envelope::default()),
         }
+    }
+
+    /// The same, of a machine with so many actuators.
+    #[must_use]
+    pub fn with_actuators(self, actuators: usize) -> Self {
+        Self { actuators: actuators.min(MAX_ACTUATORS), ..self }
+    }
+
+    /// Time from the first record to the last [s].
+    pub fn time(&self) -> f64 {
+        self.period.of(self.passed).seconds()
     }
 
     /// Takes the next record. Over cycles that nobody recorded the curves have a gap.
@@ -84,14 +112,16 @@ impl Trace {
         };
         self.of_records().for_each(|envelope| envelope.skip(absent));
         let answered = record.is_answered();
-        for _ in 0..u64::from(feedback.skipped).min(self.period.cycles_for(LONGEST_GAP)) {
+        let skipped = u64::from(feedback.skipped).min(self.period.cycles_for(LONGEST_GAP));
+        self.recorded += absent + skipped;
+        for _ in 0..skipped {
             let curves = [&mut self.following_error, &mut self.current, &mut self.voltage];
             curves.into_iter().flatten().for_each(|envelope| envelope.push(None));
             if self.timed {
                 self.latency.iter_mut().for_each(|envelope| envelope.push(None));
             }
         }
-        for index in 0..MAX_ACTUATORS {
+        for index in 0..self.actuators {
             let pick = |values: &messages::ActuatorArray| values.get(index).copied();
             let curves = [
                 (&mut self.following_error, answered, &command.following_error),
@@ -113,9 +143,11 @@ impl Trace {
         if succession != Succession::Next {
             // A cycle needs the records at both its ends: one more of them is not known.
             self.of_intervals().for_each(|envelope| envelope.skip(absent + 1));
-            self.marked.end();
-            self.dark.end();
+            self.passed += absent + 1;
+            self.end_track();
         }
+        self.events.push(self.recorded, record);
+        self.recorded += 1;
     }
 
     /// The curves with a value for each record.
@@ -136,8 +168,7 @@ impl Trace {
         if let Some(interval) = self.path.finish() {
             self.interval(&interval);
         }
-        self.marked.end();
-        self.dark.end();
+        self.end_track();
     }
 
     fn push_latency(&mut self, record: &CycleRecord) {
@@ -158,7 +189,8 @@ impl Trace {
     }
 
     fn interval(&mut self, interval: &Interval) {
-        for _ in 1..interval.end.stamp.elapsed.min(self.period.cycles_for(LONGEST_GAP)) {
+        let elapsed = interval.end.stamp.elapsed.min(self.period.cycles_for(LONGEST_GAP));
+        for _ in 1..elapsed {
             let curves = [
                 &mut self.power,
                 &mut self.speed,
@@ -182,36 +214,53 @@ impl Trace {
         self.deviation_lit.push(deviation.filter(|_| any));
         self.deviation_dark.push(deviation.filter(|_| !any && interval.end.planned.is_some()));
         if known {
-            self.draw(interval, &lit);
+            self.draw(interval, &lit, brightest);
+        } else {
+            self.end_track();
         }
+        self.passed += elapsed;
     }
 
-    fn draw(&mut self, interval: &Interval, lit: &LitSpans) {
+    fn draw(&mut self, interval: &Interval, lit: &LitSpans, power: f64) {
         let mut done = 0.0;
-        for &LitSpan { from, to, .. } in lit.as_slice() {
+        for &LitSpan { from, to, stroke } in lit.as_slice() {
             if from > done {
-                self.marked.end();
-                draw_part(&mut self.dark, interval, done, from);
+                self.draw_part(interval, done, from, Light::Dark);
             }
-            if from > 0.0 {
-                self.dark.end();
-            }
-            draw_part(&mut self.marked, interval, from, to);
+            let stroke = u32::try_from(stroke).unwrap_or(u32::MAX);
+            self.draw_part(interval, from, to, Light::Lit { stroke, power: power as f32 });
             done = to;
         }
         if done < 1.0 {
-            self.marked.end();
-            draw_part(&mut self.dark, interval, done, 1.0);
-        } else {
-            self.dark.end();
+            self.draw_part(interval, done, 1.0, Light::Dark);
         }
     }
-}
 
-fn draw_part(outline: &mut Outline, interval: &Interval, from: f64, to: f64) {
-    for part in [from, 0.5 * (from + to), to] {
-        let tool = interval.tool(part);
-        let deviation = interval.deviation(part).unwrap_or_default();
-        outline.add(OutlinePoint { tool: [tool.x, tool.y], deviation: [deviation.x, deviation.y] });
+    /// Draws from part `from` to part `to` of an interval; its end is the next one's beginning.
+    fn draw_part(&mut self, interval: &Interval, from: f64, to: f64, light: Light) {
+        let begin = self.period.of(self.passed).seconds();
+        let point = |part: f64, light: Light| {
+            let deviation: [f64; 3] = interval.deviation(part).unwrap_or_default().into();
+            TrackPoint {
+                time: begin + part * interval.time(),
+                tool: interval.tool(part).into(),
+                deviation: deviation.map(|along| along as f32),
+                light,
+            }
+        };
+        // Cycles that drives skipped make a long interval: what lies between is not straight.
+        let parts = interval.end.stamp.elapsed.min(MOST_PARTS);
+        for step in 0..parts {
+            let part = from + (to - from) * (step as f64 / parts as f64);
+            self.track.add(point(part, light));
+        }
+        self.tail = Some(point(to, Light::Unknown));
+    }
+
+    /// Ends a stretch without a gap, at the end of its last interval.
+    fn end_track(&mut self) {
+        if let Some(tail) = self.tail.take() {
+            self.track.add(tail);
+        }
     }
 }

@@ -42,7 +42,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     folder.as_ref().map_or(Ok(()), RunFolder::clear).map_err(Failure::bad_input)?;
     let period = input.machine.realtime.period;
     let mut recording = folder.as_ref().map(|folder| Recording::begin(folder, period));
-    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, period);
+    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, period)
+        .with_actuators(input.machine.actuators.len());
     let options = PlantOptions { seed: arguments.seed, ..PlantOptions::default() };
     let simulated = simulate(&input.machine, &input.plant, &plan, options, |records| {
         records.iter().for_each(|record| analysis.push(record));

@@ -1,4 +1,4 @@
-//! A page that opens offline: one HTML file with its pictures inside, no script, no reference to a network.
+//! A page that opens offline: one HTML file with its pictures inside, no reference to a network.
 
 use super::chart::{GRID, INK, PAPER};
 use plotters::style::RGBColor;
@@ -25,6 +25,11 @@ fn hexadecimal(colour: RGBColor) -> String {
 
 /// A whole page: `body` is HTML, `title` plain text.
 pub fn document(title: &str, body: &str) -> String {
+    document_with(title, "", body)
+}
+
+/// The same with more elements in its head.
+pub fn document_with(title: &str, head: &str, body: &str) -> String {
     let (ink, grid, paper) = (hexadecimal(INK), hexadecimal(GRID), hexadecimal(PAPER));
     format!(
         r#"<!DOCTYPE html>
@@ -59,10 +64,10 @@ th {{ font-weight: 600; white-space: nowrap; }}
 .warning td {{ color: #C77700; }}
 .outcome {{ display: inline-block; margin: 0; padding: .1rem .7rem; border-radius: 1rem; color: #FFF;
   background: #B3413C; }}
-.completed {{ background: #1F8A5B; }}
-.stopped {{ background: #B07A12; }}
+.completed {{ background: #1B7D52; }}
+.stopped {{ background: #8A5F0A; }}
 </style>
-</head>
+{head}</head>
 <body>
 {body}</body>
 </html>

@@ -1,7 +1,8 @@
-//! The report page: one HTML file with its pictures inside, no script, no reference to a network.
+//! The report page: one HTML file without a reference to a network. It tells everything in text and still pictures;
+//! where scripts run, views to explore the run take the place of the pictures.
 
 use super::chart::{CURVES, Chart, Curve, colour};
-use super::html::{document, escape, figure, section};
+use super::html::{document_with, escape, figure, section};
 use super::{PictureError, Report};
 use crate::latency::HopLatency;
 use crate::summary::text::{latency, rows};
@@ -14,6 +15,38 @@ use std::fmt::Write;
 /// Height of a chart, in page units.
 const HEIGHT: u32 = 260;
 
+/// The most that the page takes [bytes], whatever the run.
+const MOST_BYTES: usize = 19_500_000;
+
+/// The rows of the summary that stand at the head of the page.
+const FACTS: [&str; 8] =
+    ["fault", "error", "ended in", "time", "marked", "contour error", "missing", "left"];
+
+/// Nothing is fetched from anywhere.
+const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
+    script-src 'unsafe-inline'; style-src 'unsafe-inline'\">\n";
+
+/// The sheet of the views, beside that of all pages.
+const STYLE: &str = include_str!("assets/report.css");
+
+/// The scripts of the views, in one module: what they declare they all see.
+const SCRIPTS: [&str; 14] = [
+    include_str!("assets/words.js"),
+    include_str!("assets/bytes.js"),
+    include_str!("assets/curve.js"),
+    include_str!("assets/track.js"),
+    include_str!("assets/clock.js"),
+    include_str!("assets/camera.js"),
+    include_str!("assets/ruler.js"),
+    include_str!("assets/painter.js"),
+    include_str!("assets/gestures.js"),
+    include_str!("assets/path_view.js"),
+    include_str!("assets/chart.js"),
+    include_str!("assets/transport.js"),
+    include_str!("assets/places.js"),
+    include_str!("assets/main.js"),
+];
+
 /// Points of a latency distribution per factor of ten in rarity.
 const POINTS_PER_NINE: u32 = 20;
 
@@ -23,28 +56,54 @@ impl Report<'_> {
     /// # Errors
     /// [`PictureError`] when a picture's numbers cannot be drawn.
     pub fn page(&self) -> Result<String, PictureError> {
-        let mut body = String::new();
         let title = format!("{} on {}", self.summary.job.name, self.summary.machine.name);
         let outcome = self.summary.outcome.name();
+        let script = SCRIPTS.concat();
+        let still = self.still()?;
+        let data = self.data(MOST_BYTES.saturating_sub(still.len() + script.len()))?;
+        let body = format!(
+            "<header>\n<h1>{title}</h1>\n<p class=\"outcome {outcome}\">{outcome}</p>\n</header>\n\
+             {facts}<main>\n<div id=\"explorer\"></div>\n<div class=\"still\">\n{still}</div>\n</main>\n{data}\
+             <script type=\"module\">\n{script}</script>\n",
+            title = escape(&title),
+            facts = self.facts(),
+        );
+        Ok(document_with(&title, &format!("{POLICY}<style>\n{STYLE}</style>\n"), &body))
+    }
+
+    /// The run in text and still pictures.
+    fn still(&self) -> Result<String, PictureError> {
+        let mut body = section("Summary", &self.summary_table());
         let mut put = |text: String| body.push_str(&text);
-        put(format!("<h1>{}</h1>\n<p class=\"outcome {outcome}\">{outcome}</p>\n", escape(&title)));
-        put(section("Summary", &self.summary_table()));
-        put(section(
+        put(pictures(
             "Path",
             &figure(self.picture()?, "Planned and truly marked path, seen from above."),
         ));
-        if !self.trace.marked.paths().is_empty() {
+        if self.anything_marked() {
             let (picture, gain) = self.magnified_picture()?;
             let note =
                 format!("The same with every deviation from the plan drawn {gain} times as large.");
-            put(section("Deviation, magnified", &figure(picture, &note)));
+            put(pictures("Deviation, magnified", &figure(picture, &note)));
         }
-        put(section("Tool", &self.tool_charts()?));
-        put(section("Axes", &self.motor_charts()?));
+        put(pictures("Tool", &self.tool_charts()?));
+        put(pictures("Axes", &self.motor_charts()?));
         if self.histograms.named().any(|(_, histogram)| !histogram.is_empty()) {
             put(section("Latency", &self.latency_charts()?));
         }
-        Ok(document(&title, &body))
+        Ok(body)
+    }
+
+    /// What everybody asks first.
+    fn facts(&self) -> String {
+        let mut list = String::from("<dl class=\"facts\">\n");
+        for (name, value) in rows(self.summary) {
+            if FACTS.contains(&name.as_str()) {
+                let (name, value) = (escape(&name), escape(&value));
+                // Writing to a string cannot fail.
+                let _ = writeln!(list, "<div><dt>{name}</dt><dd>{value}</dd></div>");
+            }
+        }
+        list + "</dl>\n"
     }
 
     fn summary_table(&self) -> String {
@@ -178,13 +237,19 @@ impl Report<'_> {
             hops.map(|(hop, envelope)| self.curve(hop.name(), colour(hop as usize), envelope, 1e6))
                 .collect(),
         );
+        let over = figure(over.draw()?, "The hops inside a cycle, over the run.");
         Ok(table
             + &figure(
                 distribution.draw_distribution()?,
                 "How long each hop took in that share of the cycles at most.",
             )
-            + &figure(over.draw()?, "The hops inside a cycle, over the run."))
+            + &format!("<div class=\"picture\">\n{over}</div>\n"))
     }
+}
+
+/// A section of still pictures, which the views take the place of.
+fn pictures(name: &str, content: &str) -> String {
+    format!("<div class=\"picture\">\n{}</div>\n", section(name, content))
 }
 
 fn over_time(up: &str, at_least: (f64, f64), curves: Vec<Curve>) -> Chart<'_> {

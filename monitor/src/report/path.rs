@@ -5,7 +5,7 @@ use super::chart::{
     styled,
 };
 use super::{PictureError, Report};
-use crate::trace::outline::OutlinePoint;
+use crate::trace::track::{Light, Track, TrackPoint};
 use messages::artwork::Artwork;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -15,6 +15,9 @@ pub(super) const MILLIMETRES: f64 = 1e3;
 
 /// The most points of the plan drawn; more are thinned evenly.
 const PLAN_POINTS: usize = 40_000;
+
+/// The most points of the way of the tool drawn.
+const TRACK_POINTS: usize = 40_000;
 
 /// A line that stays within this is a dot [mm].
 const DOT: f64 = 0.02;
@@ -40,6 +43,11 @@ impl Report<'_> {
         Ok((self.draw_path("magnified deviation", Some(gain))?, gain))
     }
 
+    /// Whether there was any light.
+    pub(super) fn anything_marked(&self) -> bool {
+        self.trace.track.points().iter().any(|point| point.light.is_lit())
+    }
+
     /// A round number by which the largest deviation becomes visible.
     fn gain(&self) -> f64 {
         let largest = self.trace.deviation_lit.range().map_or(0.0, |(_, high)| high);
@@ -59,7 +67,7 @@ impl Report<'_> {
     /// The rectangle around the plan and the marks [m].
     fn extent(&self) -> ([f64; 2], [f64; 2]) {
         let plan = || self.artwork.strokes.iter().flat_map(|stroke| &stroke.points);
-        let marks = || self.trace.marked.paths().iter().flatten();
+        let marks = || self.trace.track.points().iter().filter(|point| point.light.is_lit());
         let along = |axis: usize| {
             let planned = plan().filter_map(move |point| point.get(axis).copied());
             let marked = marks().filter_map(move |point| point.tool.get(axis).copied());
@@ -74,6 +82,7 @@ impl Report<'_> {
         let sheet = Sheet::around(x, y);
         let Sheet { x, y, height, .. } = sheet;
         let plan = thinned(self.artwork);
+        let track = self.trace.track.thinned(TRACK_POINTS);
         draw(title, height, |area| {
             let mut chart = frame(area).build_cartesian_2d(
                 x[0] * MILLIMETRES..x[1] * MILLIMETRES,
@@ -83,8 +92,8 @@ impl Report<'_> {
             // Magnified, the way in the dark would only be in the way.
             let dark = CURVES[7].mix(0.7).stroke_width(FINE);
             if gain.is_none() {
-                for path in self.trace.dark.paths() {
-                    curve(&mut chart, dark, millimetres(path, 0.0))?;
+                for path in paths(&track, |light| light == Light::Dark) {
+                    curve(&mut chart, dark, millimetres(&path, 0.0))?;
                 }
             }
             let planned = match gain {
@@ -95,10 +104,10 @@ impl Report<'_> {
                 curve(&mut chart, planned, line)?;
             }
             let marked = CURVES[0].stroke_width(FINE + 1);
-            for path in self.trace.marked.paths() {
-                curve(&mut chart, marked, millimetres(path, gain.map_or(0.0, |gain| gain - 1.0)))?;
+            for path in paths(&track, Light::is_lit) {
+                curve(&mut chart, marked, millimetres(&path, gain.map_or(0.0, |gain| gain - 1.0)))?;
             }
-            if self.trace.marked.paths().is_empty() {
+            if !self.anything_marked() {
                 let middle = ((WIDTH * FINE / 2) as i32, (height * FINE / 2) as i32);
                 area.draw(&Text::new("nothing was marked", middle, centred()))?;
             }
@@ -196,13 +205,29 @@ pub(super) fn curve<'b>(
     Ok(())
 }
 
+/// The stretches of a track with light of one kind, each up to the point at which it ends.
+fn paths(track: &Track, kind: impl Fn(Light) -> bool) -> Vec<Vec<TrackPoint>> {
+    let mut paths: Vec<Vec<TrackPoint>> = Vec::new();
+    let mut open = false;
+    for point in track.points() {
+        let goes_on = kind(point.light);
+        match paths.last_mut() {
+            Some(path) if open => path.push(*point),
+            _ if goes_on => paths.push(vec![*point]),
+            _ => {}
+        }
+        open = goes_on;
+    }
+    paths
+}
+
 /// A path [mm], moved by its deviation times `extra`.
-fn millimetres(path: &[OutlinePoint], extra: f64) -> Vec<(f64, f64)> {
+fn millimetres(path: &[TrackPoint], extra: f64) -> Vec<(f64, f64)> {
     path.iter()
-        .map(|OutlinePoint { tool, deviation }| {
+        .map(|TrackPoint { tool: [x, y, _], deviation: [along_x, along_y, _], .. }| {
             (
-                (tool[0] + extra * deviation[0]) * MILLIMETRES,
-                (tool[1] + extra * deviation[1]) * MILLIMETRES,
+                (x + extra * f64::from(*along_x)) * MILLIMETRES,
+                (y + extra * f64::from(*along_y)) * MILLIMETRES,
             )
         })
         .collect()

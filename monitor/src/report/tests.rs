@@ -1,9 +1,11 @@
 //! The report of a synthetic run: a circle and a cross, with the faults a person should see.
 #![allow(clippy::unwrap_used)]
 
+use super::column::Layout;
 use super::*;
 use crate::latency::IntervalLog;
 use crate::marks::StreamEnd;
+use crate::recording::CycleRecord;
 use crate::run_analysis::{Clock, RunAnalysis};
 use crate::stage::{Inputs, MonitorStage, Outputs};
 use crate::summary::{JobSummary, MachineSummary, Outcome};
@@ -11,6 +13,7 @@ use messages::artwork::Stroke;
 use messages::feedback::status;
 use messages::time::{Period, SETPOINT_TIME as CYCLE_TIME};
 use messages::{Command, Cycle, Feedback, LaserCycle, Nanoseconds, math};
+use serde_json::Value;
 use std::time::{Duration, SystemTime};
 
 const SPEED: f64 = 0.1;
@@ -152,6 +155,188 @@ fn the_page_shows_the_run_and_needs_no_network() {
         assert!(!addresses.contains(reference), "{reference}");
     }
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
+
+    // What the script reads.
+    let header = header(&page);
+    assert_eq!((&header["stride"], &header["strokes"]), (&1.into(), &2.into()));
+    let curve = |chart: &str, name: &str| {
+        let curves = header["curves"].as_array().unwrap();
+        let of = |curve: &&Value| curve["chart"] == chart && curve["name"] == name;
+        let curve = curves.iter().find(of).unwrap();
+        let [low, step] = ["low", "step"].map(|key| curve[key].as_f64().unwrap());
+        let value = |steps: i64| (steps > 0).then_some(low + (steps - 1) as f64 * step);
+        columns(&page, curve).remove(0).into_iter().map(value).collect::<Vec<_>>()
+    };
+    let speeds = curve("speed", "tool");
+    assert_eq!(speeds.len(), 999);
+    assert!((speeds[300].unwrap() - SPEED).abs() < 0.01 * SPEED, "{:?}", speeds[300]);
+    let voltages = curve("voltage", "b");
+    assert!((voltages[100].unwrap() - 12.0 * math::sin(2.0)).abs() < 1e-3, "{:?}", voltages[100]);
+    let lit = |time: usize| curve("deviation", "lit")[time].is_some();
+    assert!(lit(300) && !lit(680) && lit(760) && !lit(900));
+
+    let track = columns(&page, &header["track"]);
+    let [times, x, y, light, strokes] = [0, 1, 2, 7, 8].map(|column| &track[column]);
+    let at = times.iter().position(|time| *time == 300_000).unwrap();
+    let (planned, _) = plan(0.3);
+    for (steps, planned) in [(x[at], planned[0]), (y[at], planned[1])] {
+        assert!((steps as f64 * 1e-7 - planned).abs() < 1e-5, "{steps} {planned}");
+    }
+    assert_eq!((light[at], strokes[at]), (2 + 200, 1));
+    assert_eq!(light.last(), Some(&0), "nobody knows what comes after the end");
+
+    let planned = columns(&page, &header["plan"]);
+    assert_eq!(planned[4], [1, 2], "lines of the strokes");
+    // The circle, and the line, each with its last point of no stroke.
+    assert_eq!(planned[3].iter().filter(|stroke| **stroke == 0).count(), 2);
+    assert_eq!(planned[0].last(), Some(&900_000));
+}
+
+/// The header of the data in a page.
+fn header(page: &str) -> Value {
+    let (_, rest) = page.split_once("id=\"run\">").unwrap();
+    serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
+}
+
+/// The columns that an entry of the header names.
+fn columns(page: &str, entry: &Value) -> Vec<Vec<i64>> {
+    let layouts: Vec<Layout> = serde_json::from_value(entry["layouts"].clone()).unwrap();
+    let numbers = entry["columns"].as_array().unwrap();
+    (numbers.iter().zip(layouts))
+        .map(|(number, layout)| {
+            let (_, rest) = page.split_once(&format!("id=\"column-{number}\">")).unwrap();
+            column::tests::read(layout, rest.split_once("</script>").unwrap().0)
+        })
+        .collect()
+}
+
+#[test]
+fn a_long_run_is_told_in_wider_buckets_and_no_extreme_is_lost() {
+    let mut trace = Trace::new(false, Period::OF_SETPOINTS);
+    for cycle in 0..200_000_u64 {
+        let noise = math::sin(cycle as f64 * 0.7) * math::sin(cycle as f64 * 0.011);
+        let spike = if cycle == 123_457 { 5.0 } else { 0.0 };
+        trace.speed.push(Some(1.0 + 0.3 * noise + spike));
+        trace.voltage[1].push(Some(noise));
+    }
+    let machine =
+        MachineSummary { actuators: vec!["a".into(), "b".into()], ..MachineSummary::default() };
+    let summary = Summary::new(Outcome::Completed, JobSummary::default(), machine);
+    let report = Report {
+        summary: &summary,
+        artwork: &Artwork::default(),
+        trace: &trace,
+        torque_constants: &[],
+        histograms: &HopHistograms::new(),
+    };
+    let whole = report.data(usize::MAX).unwrap();
+    assert_eq!(header(&whole)["stride"], 1);
+    let budget = 200_000;
+    let small = report.data(budget).unwrap();
+    assert!(small.len() < budget, "{} bytes", small.len());
+    let header = header(&small);
+    let stride = header["stride"].as_u64().unwrap();
+    assert!((2..=64).contains(&stride), "{stride}");
+    let curve = &header["curves"][0];
+    let [lowest, above] = columns(&small, curve).try_into().unwrap();
+    let spike = 123_457 / stride as usize;
+    let [low, step] = ["low", "step"].map(|key| curve[key].as_f64().unwrap());
+    let highest = low + (lowest[spike] + above[spike] - 1) as f64 * step;
+    assert!((highest - 6.0).abs() < 0.4, "{highest}");
+    assert_eq!(lowest.len(), 200_000_usize.div_ceil(stride as usize));
+}
+
+/// To look at: GRAVER_KEEP_REPORT=folder cargo test --workspace --lib -- --ignored an_hour
+#[test]
+#[ignore = "takes a minute"]
+fn an_hour_fits_into_twenty_megabytes() {
+    const CYCLES: u64 = 3_600_000;
+    let circle = |turn: f64, radius: f64| {
+        let (sine, cosine) = math::sin_cos(turn);
+        [0.1 + radius * cosine, 0.1 + radius * sine, 0.0]
+    };
+    // Round and round, at 0.1 m/s, a little wider with each turn; every fifth turn in the dark.
+    let place = |cycle: u64| {
+        let radius = 0.002 + 2e-8 * cycle as f64;
+        let turn = 0.1 * CYCLE_TIME / 2e-8 * math::ln(radius / 0.002);
+        (circle(turn, radius), (turn / math::TURN) as u64)
+    };
+    let mut artwork = Artwork::default();
+    for cycle in (0..CYCLES).step_by(5) {
+        let (point, turn) = place(cycle);
+        if turn as usize >= artwork.strokes.len() {
+            artwork.strokes.push(Stroke { points: Vec::new(), line: turn + 1 });
+        }
+        if turn % 5 < 4 || artwork.strokes[turn as usize].points.is_empty() {
+            artwork.strokes[turn as usize].points.push(point);
+        }
+    }
+    let (feedbacks, commands) = samples(1000);
+    let mut analysis =
+        RunAnalysis::new(&artwork, Clock::Real, Period::OF_SETPOINTS).with_actuators(6);
+    for cycle in 0..CYCLES {
+        let (planned, turn) = place(cycle);
+        let (mut feedback, mut command) =
+            (feedbacks[(cycle % 1000) as usize], commands[(cycle % 1000) as usize]);
+        let shift = Nanoseconds((cycle / 1000) as i64 * 1_000_000_000);
+        for stamp in [
+            &mut feedback.deadline,
+            &mut feedback.measured,
+            &mut feedback.published,
+            &mut feedback.command_received,
+            &mut feedback.command_published,
+        ] {
+            *stamp = Nanoseconds(stamp.0 + shift.0);
+        }
+        for stamp in [&mut command.received, &mut command.published] {
+            *stamp = Nanoseconds(stamp.0 + shift.0);
+        }
+        // In the plane, the deviation of the short run.
+        let places = feedback.tool.iter_mut().zip(command.tool).zip(planned).take(2);
+        places.for_each(|((tool, before), planned)| *tool += planned - before);
+        for axis in 2..6 {
+            let wave = math::sin(0.01 * cycle as f64 + axis as f64);
+            command.following_error[axis] = command.following_error[axis % 2] * wave;
+            command.voltage[axis] = 9.0 * wave + command.following_error[0] * 100.0;
+            feedback.current[axis] = 0.4 * wave + 0.1 * feedback.current[axis % 2];
+        }
+        (feedback.cycle, command.cycle) = (Cycle(cycle), Cycle(cycle));
+        feedback.command_cycle = Cycle(cycle.saturating_sub(1));
+        command.tool = planned;
+        feedback.laser.gate = if turn % 5 < 4 { turn as u32 + 1 } else { 0 };
+        (command.stroke, command.stream_time) = (0, cycle as f64 * CYCLE_TIME);
+        analysis.push(&CycleRecord { feedback, command });
+    }
+    let results = analysis.finish(StreamEnd::Unknown);
+    let names: Vec<String> = ["x", "y", "z", "a", "b", "c"].map(str::to_owned).into();
+    let machine = MachineSummary {
+        name: "hour".into(),
+        mechanism: "serial".into(),
+        axes: names.clone(),
+        actuators: names,
+    };
+    let job = JobSummary {
+        name: "spiral".into(),
+        strokes: artwork.strokes.len() as u64,
+        length: artwork.length(),
+    };
+    let summary = Summary::new(Outcome::Completed, job, machine);
+    let report = Report {
+        summary: &summary,
+        artwork: &artwork,
+        trace: &results.trace,
+        torque_constants: &[0.0136; 6],
+        histograms: &results.histograms,
+    };
+    let page = report.page().unwrap();
+    if let Some(kept) = std::env::var_os("GRAVER_KEEP_REPORT") {
+        let folder = RunFolder::create_at(kept.as_ref()).unwrap();
+        folder.write(run_folder::REPORT, &page).unwrap();
+    }
+    assert!(page.len() < 20_000_000, "{} bytes", page.len());
+    let header = header(&page);
+    assert_eq!(header["time"], 3599.999);
+    assert!(header["track"]["tolerance"].as_f64().unwrap() < 2e-5, "{}", header["track"]);
 }
 
 #[test]
