@@ -223,13 +223,13 @@ impl Reporter {
 
 /// Three lengths as a report has them.
 fn place(settings: &Settings, place: [f64; 3]) -> String {
-    let (unit, digits) = if settings.in_inches { (INCH, 4) } else { (MILLIMETRE, 3) };
+    let (unit, digits, last) =
+        if settings.in_inches { (INCH, 4, 1e-4) } else { (MILLIMETRE, 3, 1e-3) };
     // No minus before a zero.
-    let smallest = 0.5 * f64::powi(0.1, digits);
     let told = place.map(|length| {
         let value = length / unit;
-        let value = if value.abs() < smallest { 0.0 } else { value };
-        format!("{value:.*}", digits as usize)
+        let value = if value.abs() < 0.5 * last { 0.0 } else { value };
+        format!("{value:.digits$}")
     });
     told.join(",")
 }

@@ -1,6 +1,8 @@
 //! What each program says first, and what it wants to hear: from what they send on a wire.
 
-use crate::bench::Bench;
+use machine::operating::{Homing, HomingMethod, Side};
+
+use crate::bench::{Bench, machine};
 
 /// The settings in `$$`.
 fn settings(lines: &[String]) -> Vec<(u16, f64)> {
@@ -178,13 +180,49 @@ fn air_is_switched_without_a_job() {
     let mut bench = Bench::new();
     bench.send("M8\n");
     bench.pass(0.7);
-    assert_eq!(bench.machine.status.outputs["air"], true);
+    assert!(bench.machine.status.outputs["air"]);
     bench.lines();
     assert!(bench.ask("$G\n")[0].contains(" M8 "));
     bench.send("M9\n");
     bench.pass(0.7);
-    assert_eq!(bench.machine.status.outputs["air"], false);
+    assert!(!bench.machine.status.outputs["air"]);
     bench.send([0xA0]);
-    assert_eq!(bench.machine.status.outputs["air"], true);
+    assert!(bench.machine.status.outputs["air"]);
     assert_eq!(bench.machine.programs(), [""; 0]);
+}
+
+#[test]
+fn a_machine_that_has_to_find_its_place_is_homed_and_unlocked_by_that() {
+    let mut with_switch = machine();
+    with_switch.operating.homing[0] = Some(Homing {
+        method: HomingMethod::Switch,
+        side: Side::Lower,
+        speed: 0.05,
+        latch_speed: 0.01,
+        position: 0.0,
+        order: 0,
+        current: 0.0,
+    });
+    let name = with_switch.axes[0].name.clone();
+    let mut bench = Bench::of(with_switch);
+    bench.machine.status.unhomed = vec![name.clone()];
+    bench.machine.status.state = "disabled".into();
+    bench.pass(0.1);
+    assert_eq!(bench.state(), "Alarm");
+    let lines = bench.ask("$$\n");
+    assert!(
+        lines.contains(&"$24=600.000".to_owned()) && lines.contains(&"$25=3000.000".to_owned())
+    );
+    assert_eq!(bench.ask("$H\n"), [""; 0], "it powers the motors, homes, and answers then");
+    bench.pass(0.15);
+    assert_eq!(bench.state(), "Home");
+    bench.pass(0.5);
+    assert_eq!(bench.lines(), ["ok"]);
+    assert_eq!(bench.state(), "Idle");
+    bench.send(format!("$H{name}\n"));
+    bench.pass(0.1);
+    bench.send("\x18");
+    bench.pass(0.5);
+    assert!(!bench.lines().contains(&"ok".to_owned()), "a reset forgets the line");
+    assert_eq!(bench.ask("$HQ\n").last().unwrap(), "error:3");
 }

@@ -72,11 +72,12 @@ fn a_job_over_grbl_marks_what_the_same_file_marks() {
     client.until_state("Idle");
     let summary = summary(&place);
     assert_eq!(summary["outcome"], "completed");
+    assert_eq!(summary["digest"], expected["digest"], "the same commands, bit for bit");
     for part in ["length", "missing", "double"] {
         let [one, other] = [&expected, &summary].map(|it| it["marks"][part].as_f64().unwrap());
-        assert!((one - other).abs() < 1e-6, "{part}: {one} and {other}");
+        // What the plant marks with them differs where the computer is busy.
+        assert!((one - other).abs() < 1e-4, "{part}: {one} and {other}");
     }
-    assert_eq!(summary["digest"], expected["digest"]);
 
     // Over a jog, a hold and a reset it stays an orderly machine.
     client.send("$J=G91 X5 F6000\n");

@@ -139,7 +139,7 @@ fn the_same_command_as_utf_8_and_comments_with_accents_are_understood() {
     // Ö is C3 96, which alone would be a rapid override, ä is C3 A4, and a dash E2 80 94.
     assert_eq!(bench.ask("(Öl für Räder – 10 %)\n"), ["ok"]);
     assert_eq!(bench.ask("G21 (a\u{a0}b)\n"), ["ok"]);
-    assert_eq!(bench.machine.status.outputs["air"], false);
+    assert!(!bench.machine.status.outputs["air"]);
 }
 
 #[test]
