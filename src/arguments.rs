@@ -22,7 +22,7 @@ pub use operating::{
 };
 pub use pipeline::{
     DomainArguments, DrivesArguments, DrivesKind, OverrideArguments, RunArguments,
-    ServiceArguments, SimulateArguments, SubmitArguments,
+    ServiceArguments, SimulateArguments, StatusArguments, SubmitArguments,
 };
 pub use planning::{
     CheckArguments, ExportArguments, KinematicsArguments, KinematicsVerb, PlanArguments,
@@ -122,7 +122,7 @@ pub enum Command {
     #[command(subcommand)]
     Offset(OffsetCommand),
     /// Say what a running pipeline is doing, with the process ids of its services.
-    Status(InstanceArguments),
+    Status(StatusArguments),
     /// Say what faults an instance had, also before its start, whether or not it runs.
     Faults(InstanceArguments),
     /// Compare machines on the same job: time, error, what their motors must give, stiffness, and who

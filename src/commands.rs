@@ -23,6 +23,7 @@ pub mod serve;
 pub mod service;
 pub mod simulate;
 pub mod size;
+pub mod status;
 pub mod submit;
 pub mod tables;
 pub mod verify;

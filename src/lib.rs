@@ -17,7 +17,8 @@ use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
     bench, calibrate, check, compare, export, faults, figures, kinematics, machine, manual, offset,
-    operating, operator, plan, queue, run, serve, service, simulate, size, submit, tables, verify,
+    operating, operator, plan, queue, run, serve, service, simulate, size, status, submit, tables,
+    verify,
 };
 use exit::{Exit, Failure};
 use runtime::domain::Role;
@@ -67,7 +68,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Input(arguments) => operating::input(arguments),
         Command::Output(arguments) => operating::output(arguments),
         Command::Offset(command) => offset::run(command),
-        Command::Status(arguments) => operator::status(arguments),
+        Command::Status(arguments) => status::run(arguments),
         Command::Faults(arguments) => faults::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Tables(arguments) => tables::run(arguments),

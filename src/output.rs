@@ -1,11 +1,13 @@
 //! What commands print: JSON for scripts on standard output, text for people on standard error.
 
+pub mod progress;
+
 use crate::exit::{Exit, Failure};
 use messages::finite::first_not_finite;
 use monitor::summary::Summary;
 use runtime::message;
 use serde::Serialize;
-use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::io::{self, ErrorKind, Write};
 
 /// Writes one line for people on standard error, as `eprintln!` would; what cannot be written there
 /// is dropped.
@@ -30,6 +32,20 @@ pub fn json(value: &impl Serialize) -> Result<(), Failure> {
     let mut text = serde_json::to_string_pretty(value).map_err(Failure::output)?;
     text.push('\n');
     printed(io::stdout().lock().write_all(text.as_bytes()))
+}
+
+/// Prints one JSON object in a line of its own, for a stream of them; whether anybody still reads.
+///
+/// # Errors
+/// When standard output cannot be written.
+pub fn json_line(value: &impl Serialize) -> Result<bool, Failure> {
+    let mut text = serde_json::to_string(value).map_err(Failure::output)?;
+    text.push('\n');
+    let mut output = io::stdout().lock();
+    match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+        written => printed(written).map(|()| true),
+    }
 }
 
 /// Judges what became of writing to standard output. Whoever reads there and leaves has read
@@ -67,39 +83,5 @@ pub fn failure(failure: &Failure, as_json: bool) {
     if as_json {
         // Where standard output cannot be written there is nobody to tell.
         let _ = json(&failure.summary());
-    }
-}
-
-/// A line of progress on the terminal, drawn again in place; nothing where there is no terminal.
-#[derive(Debug)]
-pub struct ProgressLine {
-    shown: bool,
-}
-
-impl ProgressLine {
-    /// A line that is drawn if standard error is a terminal.
-    pub fn on_terminal() -> Self {
-        Self { shown: std::io::stderr().is_terminal() }
-    }
-
-    /// Draws `share` of the whole, 0 to 1, and what is going on.
-    pub fn draw(&self, share: f64, text: &str) {
-        const WIDTH: usize = 30;
-        if !self.shown {
-            return;
-        }
-        let filled = ((share.clamp(0.0, 1.0) * WIDTH as f64) as usize).min(WIDTH);
-        let bar: String = "█".repeat(filled) + &"░".repeat(WIDTH - filled);
-        message::write(format_args!(
-            "\r\x1b[K{bar} {:3.0} % {text}",
-            share.clamp(0.0, 1.0) * 100.0
-        ));
-    }
-
-    /// Clears the line.
-    pub fn clear(&self) {
-        if self.shown {
-            message::write(format_args!("\r\x1b[K"));
-        }
     }
 }

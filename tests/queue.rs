@@ -9,6 +9,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use support::{KILL, PATIENCE, Place, Running, TERMINATE, assert_valid, lines, services};
 
+/// A line that takes a minute and a half.
+const LONG: &str = "G21 G90 G54\nM3 S800 F20\nG0 X-15 Y0\nG1 X15\nM5\nM2\n";
+
 /// A pipeline that takes jobs, with services of its own.
 struct Desk {
     place: Place,
@@ -113,7 +116,7 @@ fn a_pipeline_with_services_of_its_own_runs_what_is_submitted() {
 #[test]
 fn jobs_that_wait_survive_the_end_of_their_pipeline_and_begin_when_a_person_says_so() {
     let desk = Desk::new();
-    let long = desk.place.file("long.ngc", &lines(20));
+    let long = desk.place.file("long.ngc", LONG);
     let short = desk.place.file("short.ngc", &lines(1));
     assert_eq!(desk.detach(&long), 1);
     desk.await_running(1);
@@ -171,7 +174,9 @@ fn a_job_outlives_whoever_submitted_it() {
     follower.signal(KILL);
     assert_eq!(follower.wait().code, None);
     let closed = desk.submit(&job, &[]);
-    desk.until("two jobs", |queue| numbers(&queue["waiting"]) == [2]);
+    desk.until("a second job", |queue| {
+        queue["running"]["number"] == 2 || !find(&queue["waiting"], 2).is_null()
+    });
     closed.signal(support::HANGUP);
     let left = closed.wait();
     assert!(left.error.contains("job 2 goes on"), "{}", left.error);
@@ -184,7 +189,7 @@ fn a_job_outlives_whoever_submitted_it() {
 #[test]
 fn a_stop_of_the_machine_holds_what_waits() {
     let desk = Desk::new();
-    let job = desk.place.file("job.ngc", &lines(20));
+    let job = desk.place.file("job.ngc", LONG);
     desk.detach(&job);
     desk.detach(&job);
     desk.await_running(1);
@@ -198,5 +203,27 @@ fn a_stop_of_the_machine_holds_what_waits() {
     // The job under way is stopped as one that waits is taken back.
     desk.queue(&["cancel", "2"]);
     assert_eq!(desk.ended(2)["outcome"], "stopped");
+    desk.end();
+}
+
+#[test]
+fn a_job_that_is_withdrawn_while_it_is_planned_is_gone_at_once() {
+    let desk = Desk::new();
+    // Hours of motion, planned to the end before anything moves: the last line is out of reach.
+    let text = format!(
+        "G21 G90 G54\nM3 S800 F1\nG0 X-15 Y0\n{}G1 X1000\nM5\nM2\n",
+        "G1 X15\nG1 X-15\n".repeat(20)
+    );
+    let long = desk.place.file("long.ngc", &text);
+    let short = desk.place.file("short.ngc", &lines(1));
+    desk.detach(&long);
+    desk.detach(&short);
+    desk.until("planning", |_| {
+        desk.place.status().is_some_and(|status| status["cause"] == "planning")
+    });
+    desk.queue(&["cancel", "1"]);
+    let withdrawn = desk.ended(1);
+    assert_eq!((&withdrawn["outcome"], &withdrawn["message"]), (&json!("stopped"), &Value::Null));
+    assert_eq!(desk.ended(2)["outcome"], "completed");
     desk.end();
 }

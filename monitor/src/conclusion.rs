@@ -17,7 +17,7 @@ use crate::run_analysis::{Clock, RunAnalysis, RunResults};
 use crate::run_folder::RunFolder;
 use crate::summary::text::length;
 use crate::summary::{
-    DrivesSummary, ErrorSummary, FaultSummary, JobSummary, LeftSummary, MachineSummary, Outcome,
+    DrivesSummary, ErrorSummary, FaultSummary, JobPlace, JobSummary, LeftSummary, MachineSummary, Outcome,
     Realtime, StallSummary, Summary,
 };
 use machine::{Actuator, Machine};
@@ -47,6 +47,8 @@ pub struct RunOutcome {
     pub outcome: Option<Outcome>,
     /// Why, in words.
     pub error: Option<ErrorSummary>,
+    /// Where the job was when it was last heard of, without its place in the drawing.
+    pub place: Option<JobPlace>,
     /// The controller's final report of this stream, if it came.
     pub controller: Option<ControllerReport>,
     /// The fault that the controller has latched at the end, if any.
@@ -258,6 +260,9 @@ pub fn conclude(
         }
     }
     let mut summary = summarise(machine, &plan, &run_outcome, results.as_ref(), Clock::Real);
+    if summary.outcome != Outcome::Completed {
+        summary.place = run_outcome.place.map(|place| place.within(&drawn));
+    }
     summary.report_time = began.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
     write(folder, machine, &drawn, &mut summary, results.as_ref());

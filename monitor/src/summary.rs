@@ -6,6 +6,7 @@
 pub mod drives;
 pub mod fault;
 pub mod left;
+mod place;
 pub mod stalls;
 pub mod text;
 
@@ -21,6 +22,7 @@ use std::collections::BTreeMap;
 pub use drives::{DrivesSummary, LinkSummary};
 pub use fault::FaultSummary;
 pub use left::LeftSummary;
+pub use place::JobPlace;
 pub use stalls::StallSummary;
 
 /// How a run ended.
@@ -61,6 +63,9 @@ pub struct Summary {
     pub fault: Option<FaultSummary>,
     /// What was refused, or why it was aborted.
     pub error: Option<ErrorSummary>,
+    /// Where the job was; null of one that was completed, and where it is not known.
+    #[serde(default)]
+    pub place: Option<JobPlace>,
     /// The job.
     pub job: JobSummary,
     /// The machine.
@@ -127,6 +132,19 @@ pub struct ErrorSummary {
     pub column: Option<u64>,
     /// What is wrong, and what would be right.
     pub message: String,
+}
+
+impl std::fmt::Display for ErrorSummary {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(file) = &self.file {
+            write!(formatter, "{file}:")?;
+            for number in [self.line, self.column].into_iter().map_while(|it| it) {
+                write!(formatter, "{number}:")?;
+            }
+            write!(formatter, " ")?;
+        }
+        write!(formatter, "{}", self.message)
+    }
 }
 
 /// The job of a run.
@@ -225,6 +243,7 @@ impl Summary {
             outcome,
             fault: None,
             error: None,
+            place: None,
             job,
             machine,
             drives: DrivesSummary::default(),

@@ -24,6 +24,8 @@ pub struct Status {
     pub run_folder: Option<String>,
     /// How long ago the job under way was begun; null without one [s].
     pub elapsed: Option<f64>,
+    /// How much of the job has been played, 0 to 1.
+    pub share: f64,
     /// Setpoints played so far.
     pub played: u64,
     /// Setpoints of the stream that were planned so far; all of them once the plan is complete.

@@ -97,6 +97,18 @@ pub struct SubmitArguments {
     pub instance: InstanceArguments,
 }
 
+/// Arguments of `status`.
+#[derive(Debug, Clone, Args)]
+pub struct StatusArguments {
+    /// Go on until Ctrl-C or the end of the pipeline: one line that is drawn again, or with --json an object a line,
+    /// twice a second.
+    #[arg(long)]
+    pub watch: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub instance: InstanceArguments,
+}
+
 /// Arguments of `override`.
 #[derive(Debug, Clone, Args)]
 pub struct OverrideArguments {

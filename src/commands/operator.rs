@@ -1,11 +1,11 @@
-//! Requests to a running pipeline: hold, resume, override, stop, status.
+//! Requests to a running pipeline: hold, resume, override, stop.
 
-use super::{faults, motion};
+use super::motion;
 use crate::arguments::{InstanceArguments, OverrideArguments};
 use crate::exit::{Exit, Failure};
 use crate::output::{self, say};
 use machine::quantity;
-use operator::{PastFault, Request, Verb, VerbReply};
+use operator::{Request, Verb, VerbReply};
 use runtime::operator::OperatorLink;
 use runtime::socket::{ANSWER_PATIENCE, OperatorClient, SocketError};
 use runtime::{Domain, Instance, Role, message};
@@ -15,9 +15,6 @@ use std::time::Duration;
 /// How long the supervisor may take to answer a stop or a hold, before the controller is asked past
 /// it.
 const URGENT_PATIENCE: Duration = Duration::from_secs(1);
-
-/// Faults of before that a status shows.
-const FAULTS_SHOWN: usize = 3;
 
 /// Asks for a verb without argument.
 ///
@@ -96,62 +93,6 @@ fn ask_controller(
     })?;
     message::tell(&format!("{silent}; the controller was asked directly"));
     serde_json::to_value(reply).map_err(Failure::service)
-}
-
-/// Says what the pipeline is doing.
-///
-/// # Errors
-/// No pipeline.
-pub fn status(arguments: &InstanceArguments) -> Result<Exit, Failure> {
-    let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
-    let status = checked(send(&Request::Status, &instance).map_err(Failure::service)?)?;
-    if arguments.json {
-        output::json(&status)?;
-        return Ok(Exit::Done);
-    }
-    let text = |key: &str| status[key].as_str().unwrap_or("none").to_owned();
-    say!("state      {}", text("state"));
-    if status["job"].is_string() {
-        say!("job        {}", text("job"));
-        say!("planner    {}", text("planner"));
-        say!("played     {} of {} setpoints", status["played"], status["samples"]);
-        if let Some(left) = status["time_left"].as_f64() {
-            say!("time left  {}", monitor::summary::text::duration(left));
-        }
-        say!("stroke     {}", status["stroke"]);
-        say!("rate       {:.0} %", status["rate"].as_f64().unwrap_or(0.0) * 100.0);
-    }
-    let axes = serde_json::from_value(status["axes"].clone()).unwrap_or_default();
-    say!("axes       {}", motion::places(&axes, &[]));
-    let active = status["inputs"].as_object().into_iter().flatten();
-    let active = active.filter(|(_, level)| level.as_bool() == Some(true));
-    let active = active.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
-    if status["inputs"].as_object().is_some_and(|inputs| !inputs.is_empty()) {
-        say!("inputs     {}", if active.is_empty() { "none active" } else { &active });
-    }
-    let on = status["outputs"].as_object().into_iter().flatten();
-    let on = on.filter(|(_, level)| level.as_bool() == Some(true));
-    let on = on.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
-    if status["outputs"].as_object().is_some_and(|outputs| !outputs.is_empty()) {
-        say!("outputs    {}", if on.is_empty() { "none on" } else { &on });
-    }
-    say!("fault      {}", text("fault"));
-    let faults: Vec<PastFault> =
-        serde_json::from_value(status["faults"].clone()).unwrap_or_default();
-    for past in faults.iter().skip(faults.len().saturating_sub(FAULTS_SHOWN)) {
-        say!("  {}", faults::line(past));
-    }
-    if faults.len() > FAULTS_SHOWN {
-        say!("  and others before them: graver faults");
-    }
-    say!("cycles     {}, {} overruns", status["cycles"], status["overruns"]);
-    for (name, pid) in status["services"].as_object().into_iter().flatten() {
-        match pid.as_i64() {
-            Some(pid) => say!("{name:<10} pid {pid}"),
-            None => say!("{name:<10} not running"),
-        }
-    }
-    Ok(Exit::Done)
 }
 
 pub(super) fn send(request: &Request, instance: &Instance) -> Result<Value, SocketError> {

@@ -45,6 +45,9 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let number = pipeline.queue.begin_own(&request, folder.path(), &pipeline.control);
     let run = JobRun::prepare(&mut pipeline, &request, folder, started, number);
     let summary = run.map(|run| run.homing_first(arguments.home).follow());
+    if let Err(failure) = &summary {
+        pipeline.queue.end(&failure.summary());
+    }
     pipeline.shut_down();
     drop(claim);
     Ok(output::summary(&summary?, arguments.instance.json))

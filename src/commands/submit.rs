@@ -3,15 +3,20 @@
 use super::operator::{checked, send};
 use crate::arguments::SubmitArguments;
 use crate::exit::{Exit, Failure};
-use crate::output::{self, ProgressLine, say};
+use crate::output::progress::{JobProgress, ProgressLine};
+use crate::output::{self, say};
 use monitor::summary::Summary;
-use operator::{Part, Request, Submitted};
+use operator::{Part, Request, Status, Submitted};
 use planner::request::JobRequest;
 use runtime::socket::{ANSWER_PATIENCE, OperatorClient};
 use runtime::{Instance, message, signal};
 use serde_json::{Value, json};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf, absolute};
+use std::time::Duration;
+
+/// How long the pipeline may take to say how far the job has come.
+const STATUS_PATIENCE: Duration = Duration::from_millis(200);
 
 /// Hands a job to a running pipeline and follows it to its end.
 ///
@@ -41,7 +46,7 @@ pub fn run(arguments: &SubmitArguments) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     let mut follower = Follower { instance: &instance, job: None, told: 0 };
-    let line = ProgressLine::on_terminal();
+    let line = ProgressLine::begin();
     let request = json!(Request::Submit { job, out, detached: false });
     let reply =
         client.follow(&request, |part| follower.follow(part, &line)).map_err(Failure::service)?;
@@ -76,13 +81,34 @@ struct Follower<'a> {
 }
 
 impl Follower<'_> {
+    fn progress(&self) -> Option<JobProgress> {
+        // One that hangs must not keep a signal waiting.
+        let mut client = OperatorClient::connect(self.instance).ok()?;
+        let status = client.request_within(&json!(Request::Status), STATUS_PATIENCE).ok()?;
+        let status: Status = serde_json::from_value(status).ok()?;
+        if status.job_number == self.job {
+            return Some(JobProgress::of(&status));
+        }
+        let state = match status.job_number {
+            Some(number) => format!("job {} waits, job {number} is under way", self.job?),
+            None => status.cause.unwrap_or_else(|| "waiting".to_owned()),
+        };
+        Some(JobProgress { state, ..JobProgress::default() })
+    }
+
     fn follow(&mut self, part: Option<Value>, line: &ProgressLine) -> ControlFlow<String> {
         match part.map(serde_json::from_value) {
-            Some(Ok(Part::Accepted(job))) => self.job = Some(job),
-            Some(Ok(Part::Share(share))) => line.draw(share, "submitted job"),
-            // A part of a later version, or none.
-            Some(Err(_)) | None => {}
+            Some(Ok(Part::Accepted(job))) => {
+                self.job = Some(job);
+                say!(
+                    "job {job}: Ctrl-C stops it, a closed terminal does not; `submit --detach` follows no job, and \
+                     `graver queue` shows it from anywhere"
+                );
+            }
+            // How far it has come is in the status, with all else. Or it is a part of a later version, or none.
+            Some(Ok(Part::Share(_)) | Err(_)) | None => {}
         }
+        line.draw(|| self.progress());
         let termination = signal::termination();
         let signals = termination.map_or(0, |termination| termination.count);
         let Some(job) = self.job.filter(|_| signals > self.told) else {

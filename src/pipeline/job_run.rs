@@ -2,6 +2,7 @@
 
 mod conclude;
 mod homing;
+mod place;
 mod progress;
 mod watch;
 
@@ -11,7 +12,7 @@ use super::control::JobControl;
 use super::power_up::{NotReady, PowerUp};
 use super::{POLL_INTERVAL, Pipeline};
 use crate::exit::Failure;
-use crate::output::ProgressLine;
+use crate::output::progress::{JobProgress, ProgressLine};
 use messages::{Cycle, Fault, OperatorVerb, PlannerPhase, run_folder};
 use monitor::conclusion::RunOutcome;
 use monitor::run_folder::RunFolder;
@@ -47,7 +48,6 @@ pub struct JobRun<'a> {
     pipeline: &'a mut Pipeline,
     control: Arc<JobControl>,
     folder: RunFolder,
-    name: String,
     /// Whether axes that do not know their place are homed first.
     homes: bool,
     /// Its number for planner and controller; `None` before it was offered.
@@ -61,6 +61,8 @@ pub struct JobRun<'a> {
     quiet: Option<Instant>,
     /// What was left of the job when it was last played [s].
     time_left: f64,
+    /// The job file.
+    file: Option<String>,
     /// The newest cycle of drives that was heard of, and when.
     drives_heard: (Cycle, Instant),
     started: Instant,
@@ -86,12 +88,11 @@ impl<'a> JobRun<'a> {
         folder.write(run_folder::REQUEST, request).map_err(Failure::bad_input)?;
         let name = job_name(job);
         pipeline.board.begin_job(number, &name, folder.path(), started);
-        let run_outcome = RunOutcome { job: name.clone(), ..RunOutcome::default() };
+        let run_outcome = RunOutcome { job: name, ..RunOutcome::default() };
         Ok(Self {
             control: pipeline.control.clone(),
             pipeline,
             folder,
-            name,
             homes: false,
             stream: None,
             stage: Stage::Starting(PowerUp::begin()),
@@ -99,6 +100,7 @@ impl<'a> JobRun<'a> {
             refused: None,
             quiet: None,
             time_left: 0.0,
+            file: job.job.as_ref().map(|file| file.display().to_string()),
             drives_heard: (Cycle::default(), Instant::now()),
             started,
             run_outcome,
@@ -108,7 +110,7 @@ impl<'a> JobRun<'a> {
 
     /// Follows the job to its end and writes its summary.
     pub fn follow(mut self) -> Summary {
-        let line = ProgressLine::on_terminal();
+        let line = ProgressLine::begin();
         loop {
             match self.pipeline.poll() {
                 Ok(ended) => {
@@ -135,8 +137,13 @@ impl<'a> JobRun<'a> {
                 break;
             }
             self.time_left = self.pipeline.latest.time_left().unwrap_or(self.time_left);
-            let (share, text) = self.progress();
-            line.draw(share, &text);
+            self.note_place();
+            self.pipeline.board.note_stage(self.stage());
+            let board = &self.pipeline.board;
+            line.draw(|| Some(JobProgress::of(&board.read())));
+            let latest = &self.pipeline.latest;
+            let is_ours = Some(latest.progress.stream) == self.stream;
+            let share = if is_ours { latest.share() } else { 0.0 };
             self.pipeline.queue.tell_share(self.number, share);
             std::thread::sleep(POLL_INTERVAL);
         }

@@ -153,7 +153,7 @@ impl JobQueue {
         let mut state = self.lock();
         let Some(mut entry) = state.contents.running.take() else { return };
         let fault = summary.fault.as_ref().map(ToString::to_string);
-        let message = fault.or_else(|| summary.error.as_ref().map(|error| error.message.clone()));
+        let message = fault.or_else(|| summary.error.as_ref().map(ToString::to_string));
         note_end(&mut entry.job, summary.outcome, message);
         let number = entry.job.number;
         state.contents.remember(entry.job);

@@ -31,6 +31,8 @@ struct Job {
     /// Its run folder.
     folder: PathBuf,
     begun: Instant,
+    /// What is done before it is played, and after.
+    stage: Option<&'static str>,
 }
 
 /// The most faults in a status.
@@ -80,7 +82,10 @@ impl StatusBoard {
         let Latest { progress, drives, planner, .. } = latest;
         let state = ControllerState::from_wire(progress.state);
         let state = if held { ControllerState::Holding } else { state };
-        let begun = locked(&self.job).as_ref().map(|job| job.begun);
+        let job = locked(&self.job);
+        let stage = job.as_ref().and_then(|job| job.stage);
+        let begun = job.as_ref().map(|job| job.begun);
+        drop(job);
         status.elapsed = begun.map(|begun| begun.elapsed().as_secs_f64());
         status.state = state.name().to_owned();
         status.planner = match PlannerPhase::from_wire(planner.phase) {
@@ -93,6 +98,7 @@ impl StatusBoard {
         .to_owned();
         status.stream = progress.stream;
         status.played = progress.played;
+        status.share = latest.share();
         let is_planned = planner.stream == progress.stream;
         status.samples = if is_planned { planner.samples } else { 0 };
         let is_complete = is_planned && planner.is_complete == 1;
@@ -116,13 +122,15 @@ impl StatusBoard {
         }
         status.fault = fault.is_some().then(|| fault.code().name().to_owned());
         status.cause = match locked(&self.machine).as_ref() {
-            _ if held => Some("held before its first motion: `graver resume`".to_owned()),
-            Some((machine, _)) => cause(progress, &fault, begun.is_some(), machine),
+            _ if held => Some("feed hold before the first motion".to_owned()),
+            Some((machine, _)) => cause(progress, &fault, machine),
             None => None,
         };
-        if status.cause.is_none() && begun.is_none() {
-            status.cause = queue_held.map(|why| format!("the queue is held: {why}"));
-        }
+        let otherwise = match begun {
+            Some(_) => stage.map(str::to_owned),
+            None => queue_held.map(|why| format!("the queue is held: {why}")),
+        };
+        status.cause = status.cause.take().or(otherwise);
         self.remember(&mut status, &fault);
         if let Some((machine, directions)) = locked(&self.machine).as_ref() {
             note_operated(&mut status, progress, machine, directions);
@@ -142,7 +150,14 @@ impl StatusBoard {
         let mut status = self.lock();
         (status.job_number, status.job) = (Some(number), Some(name.to_owned()));
         status.run_folder = Some(folder.display().to_string());
-        *locked(&self.job) = Some(Job { folder: folder.to_owned(), begun });
+        *locked(&self.job) = Some(Job { folder: folder.to_owned(), begun, stage: None });
+    }
+
+    /// Says what is done for the job while it is not played.
+    pub fn note_stage(&self, stage: Option<&'static str>) {
+        if let Some(job) = locked(&self.job).as_mut() {
+            job.stage = stage;
+        }
     }
 
     /// No job runs.

@@ -68,7 +68,10 @@ impl Rows {
             self.add("fault", fault.to_string());
         }
         if let Some(error) = &summary.error {
-            self.add("error", error.message.as_str());
+            self.add("error", error.to_string());
+        }
+        if let Some(place) = &summary.place {
+            self.add("ended at", place.to_string());
         }
         if let Some(place) = summary.left.and_then(|left| left.place) {
             self.add("ended in", place.to_string());

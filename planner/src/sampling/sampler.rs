@@ -463,9 +463,13 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
             self.next_frequency += 1;
         }
         setpoint.laser.frequency = self.frequency;
-        if self.trajectory.pauses.get(self.next_pause).is_some_and(|&pause| pause <= time) {
+        if let Some(&pause) = self.trajectory.pauses.get(self.next_pause)
+            && pause <= time
+        {
             self.next_pause += 1;
             setpoint.flags |= flags::PAUSE;
+            // What follows may have begun by the end of the cycle.
+            setpoint.line = self.trajectory.piece_at(pause).map_or(0, |piece| piece.line);
         }
     }
 

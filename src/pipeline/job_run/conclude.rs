@@ -38,6 +38,7 @@ impl JobRun<'_> {
         message::tell(refusal.text.trim());
         self.run_outcome.outcome = Some(Outcome::Refused);
         self.run_outcome.error = Some(error_summary(&refusal));
+        self.note_refused_place();
     }
 
     pub(super) fn conclude(mut self) -> Summary {

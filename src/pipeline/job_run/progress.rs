@@ -1,34 +1,17 @@
-//! How far a job has come, for people.
-
-use monitor::summary::text::duration;
+//! What is done for a job while it is not played, for people.
 
 use super::{JobRun, Stage};
 
 impl JobRun<'_> {
-    pub(super) fn progress(&self) -> (f64, String) {
-        let latest = &self.pipeline.latest;
-        let what = match self.stage {
-            Stage::Starting(_) => "starting".to_owned(),
-            Stage::Homing(_) => "homing".to_owned(),
-            Stage::Planning => "planning".to_owned(),
-            Stage::Ready(_) if self.control.is_held() => "held".to_owned(),
-            Stage::Ready(_) => "starting".to_owned(),
-            Stage::Playing => {
-                let strokes = match latest.planner.is_complete {
-                    0 => String::new(),
-                    _ => format!(" of {}", latest.planner.strokes),
-                };
-                let left = match latest.time_left() {
-                    Some(left) => format!(", {} left", duration(left)),
-                    None => String::new(),
-                };
-                let rate = latest.progress.rate * 100.0;
-                format!("stroke {}{strokes}, rate {rate:.0} %{left}", latest.progress.stroke)
-            }
-            Stage::Resting(_) => "coming to rest".to_owned(),
-        };
-        let is_ours = Some(latest.progress.stream) == self.stream;
-        let share = if is_ours { latest.share() } else { 0.0 };
-        (share, format!("{}: {what}", self.name))
+    /// What is done for the job before it is played, and after; `None` while it is.
+    pub(super) fn stage(&self) -> Option<&'static str> {
+        match self.stage {
+            Stage::Starting(_) => Some("starting"),
+            Stage::Homing(_) => Some("homing"),
+            Stage::Planning => Some("planning"),
+            Stage::Ready(_) => Some("waiting for the recording"),
+            Stage::Playing => None,
+            Stage::Resting(_) => Some("coming to rest"),
+        }
     }
 }
