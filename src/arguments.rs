@@ -4,6 +4,7 @@ mod bench;
 mod examples;
 mod offset;
 mod operating;
+mod options;
 mod pipeline;
 mod planning;
 mod queue;
@@ -20,6 +21,7 @@ pub use operating::{
     HomeArguments, InputArguments, InputLevel, JogArguments, OutputArguments, ProbeArguments,
     TestPulseArguments,
 };
+pub use options::JobOptions;
 pub use pipeline::{
     DomainArguments, DrivesArguments, DrivesKind, OverrideArguments, RunArguments,
     ServiceArguments, SimulateArguments, StatusArguments, SubmitArguments,

@@ -101,10 +101,9 @@ impl Failure {
     /// The summary of a run that ended before there was a machine or a job to speak of.
     pub fn summary(&self) -> Summary {
         let (job, machine) = (JobSummary::default(), MachineSummary::default());
-        Summary {
-            error: Some(error_summary(&self.refusal)),
-            ..Summary::new(self.outcome, job, machine)
-        }
+        let error = error_summary(&self.refusal);
+        let errors = std::iter::once(error.clone()).chain(other_errors(&self.refusal)).collect();
+        Summary { error: Some(error), errors, ..Summary::new(self.outcome, job, machine) }
     }
 }
 
@@ -116,6 +115,16 @@ pub fn error_summary(refusal: &Refusal) -> ErrorSummary {
         column: refusal.column,
         message: refusal.message.clone(),
     }
+}
+
+/// What else is wrong, as a summary tells it.
+pub fn other_errors(refusal: &Refusal) -> impl Iterator<Item = ErrorSummary> + '_ {
+    refusal.others.iter().cloned().map(|problem| ErrorSummary {
+        file: problem.file,
+        line: problem.line,
+        column: problem.column,
+        message: problem.message,
+    })
 }
 
 impl From<Refusal> for Failure {

@@ -1,6 +1,8 @@
 //! Files that a command writes: never one that it reads, and no folder that somebody else fills.
 
 use crate::exit::Failure;
+use machine::offsets::Offsets;
+use messages::run_folder;
 use monitor::run_folder::RunFolder;
 use std::fs::{self, File, TryLockError};
 use std::os::unix::fs::MetadataExt;
@@ -13,18 +15,49 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// The machine file, if there is one, and the files of the job.
+    /// The machine file, if there is one, with the offsets beside it, and the files of the job.
     pub fn new(machine: Option<&Path>, job: &[PathBuf]) -> Self {
-        let machine = machine.map(|path| (path.to_owned(), "the machine file"));
-        let job = job.iter().map(|path| (path.clone(), "a file of the job"));
-        Self { files: machine.into_iter().chain(job).collect() }
+        let mut sources = Self::default();
+        if let Some(path) = machine {
+            sources = sources.and_machine(path);
+        }
+        sources.add_job(job);
+        sources
     }
 
     /// These and the machine file at `path`.
     #[must_use]
     pub fn and_machine(mut self, path: &Path) -> Self {
-        self.files.push((path.to_owned(), "a machine file"));
+        self.files.push((path.to_owned(), "the machine file"));
+        self.files.push((Offsets::path(path), "the offsets of the machine"));
         self
+    }
+
+    /// Adds the files of a job.
+    pub fn add_job(&mut self, files: &[PathBuf]) {
+        self.files.extend(files.iter().map(|path| (path.clone(), "a file of the job")));
+    }
+
+    /// Sees that no file of a run in the folder that is asked for takes the place of one of these.
+    ///
+    /// # Errors
+    /// One that does.
+    pub fn spare(&self, folder: Option<&Path>) -> Result<(), Failure> {
+        let files = folder.iter().flat_map(|folder| run_folder::ALL.map(|name| folder.join(name)));
+        files.into_iter().try_for_each(|file| self.refuse("--out", &file, "another folder"))
+    }
+
+    /// Refuses to write over one of these under whatever name.
+    fn refuse(&self, argument: &str, path: &Path, other: &str) -> Result<(), Failure> {
+        let output = identity(path);
+        let same = |(file, _): &&(PathBuf, &str)| output.is_some() && identity(file) == output;
+        match self.files.iter().find(same) {
+            Some((_, what)) => Err(Failure::bad_input(format!(
+                "{argument} {}: this is {what}, which would be lost: name {other}",
+                path.display()
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// The file that is exported.
@@ -37,14 +70,7 @@ impl Sources {
     /// # Errors
     /// A file that is read or was written before, under whatever name, or that cannot be created.
     pub fn create(&mut self, argument: &str, path: &Path) -> Result<File, Failure> {
-        let output = identity(path);
-        let same = |(file, _): &&(PathBuf, &str)| output.is_some() && identity(file) == output;
-        if let Some((_, what)) = self.files.iter().find(same) {
-            return Err(Failure::bad_input(format!(
-                "{argument} {}: this is {what}, which would be lost: name another file",
-                path.display()
-            )));
-        }
+        self.refuse(argument, path, "another file")?;
         let file = File::create(path).map_err(|error| {
             Failure::bad_input(format!("{argument}: cannot write {}: {error}", path.display()))
         })?;
@@ -121,6 +147,18 @@ mod tests {
             assert!(text.contains("--samples") && text.contains("a file of the job"), "{text}");
         }
         assert_eq!(fs::read_to_string(&job).unwrap(), "M2\n");
+    }
+
+    #[test]
+    fn a_run_folder_spares_the_files_of_its_job() {
+        let place = tempfile::tempdir().unwrap();
+        let job = place.path().join(run_folder::PICTURE);
+        fs::write(&job, "<svg/>").unwrap();
+        let sources = Sources::new(None, std::slice::from_ref(&job));
+        let text = sources.spare(Some(place.path())).unwrap_err().refusal.message;
+        assert!(text.contains("path.svg: this is a file of the job"), "{text}");
+        sources.spare(None).unwrap();
+        Sources::default().spare(Some(place.path())).unwrap();
     }
 
     #[test]

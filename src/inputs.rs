@@ -1,6 +1,6 @@
 //! Machine, job and their overrides, as the command line names them.
 
-use crate::arguments::MachineArguments;
+use crate::arguments::{JobOptions, MachineArguments};
 use crate::exit::Failure;
 use machine::Machine;
 use machine::document::{Document, Override};
@@ -115,6 +115,15 @@ pub fn machine(arguments: &MachineArguments) -> Result<MachineInput, Failure> {
         job_overrides: Overrides::sort(&arguments.set)?.job,
         source,
     })
+}
+
+impl MachineInput {
+    /// With what `options` change of the job.
+    #[must_use]
+    pub fn with(mut self, options: &JobOptions) -> Self {
+        self.job_overrides.extend(options.overrides());
+        self
+    }
 }
 
 /// The job that the command line names, or the machine's sample job, or the built-in one.

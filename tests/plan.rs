@@ -129,3 +129,117 @@ fn the_check_of_paths_is_told_and_written() {
     assert!(taken.error.contains("--path-check"), "{}", taken.error);
     assert!(std::fs::read_to_string(own).unwrap().contains("G1 X5"));
 }
+
+/// Also of a job that is refused, which shows what is wrong with it.
+#[test]
+fn a_preview_is_written_before_anything_is_planned() {
+    let place = Place::new();
+    let program = "G21 G90\nM4 S500 F3000\nG1 X10\nG0 X20\nG1 X900\n";
+    let job = place.file("job.ngc", program);
+    let job = job.to_str().unwrap();
+    let preview = place.path("preview.json");
+    let preview = preview.to_str().unwrap();
+    let read = || serde_json::from_str(&std::fs::read_to_string(preview).unwrap()).unwrap();
+    place.graver(&["plan", job, "--preview", preview, "--json"]).json(2);
+    let written: serde_json::Value = read();
+    support::assert_valid("preview", &written);
+    std::fs::remove_file(preview).unwrap();
+    place.graver(&["plan", job, "--preview", preview, "--preview-only"]).accepted();
+    assert_eq!(written, read());
+    let strokes = written["strokes"].as_array().unwrap();
+    assert_eq!(strokes.iter().map(|it| it.as_array().unwrap().len()).collect::<Vec<_>>(), [2, 2]);
+    let wide = [0, 1].map(|row| {
+        let at = |corner: &str| written["bounds"][corner][row].as_f64().unwrap();
+        at("upper") - at("lower")
+    });
+    assert!((wide[0] - 0.9).abs() < 1e-9 && wide[1] == 0.0, "{wide:?}");
+
+    let printed = place.graver(&["plan", job, "--preview", "-", "--preview-only"]);
+    printed.accepted();
+    assert!(printed.output.starts_with("<svg ") && printed.output.ends_with("</svg>\n"));
+    assert_eq!(printed.output.matches("data-power=\"50\"").count(), 2);
+    for (more, what) in [
+        (&["--preview", "-", "--json"][..], "stdout"),
+        (&["--preview", "a.png"], ".svg"),
+        (&["--preview-only"], "--preview"),
+    ] {
+        let refused = place.graver(&[&["plan", job], more].concat());
+        assert_eq!(refused.code, Some(2));
+        assert!(refused.error.contains(what), "{}", refused.error);
+    }
+}
+
+#[test]
+fn a_plan_tells_powers_and_bounds_of_what_is_marked() {
+    let place = Place::new();
+    let program = "G21 G90\nM4 S250 F3000\nG0 X5\nG1 X10 Y2\nS800\nX12\nG0 X30\n";
+    let job = place.file("job.ngc", program);
+    let report = place.graver(&["plan", job.to_str().unwrap(), "--json"]).json(0);
+    support::assert_valid("plan", &report);
+    assert_eq!(report["power"], serde_json::json!([0.25, 0.8]));
+    let bounds = &report["bounds"];
+    let wide = [0, 1].map(|row| {
+        let at = |corner: &str| bounds[corner][row].as_f64().unwrap();
+        at("upper") - at("lower")
+    });
+    assert!((wide[0] - 7e-3).abs() < 1e-9 && (wide[1] - 2e-3).abs() < 1e-9, "{bounds:#}");
+}
+
+/// A font, a list of serial numbers, a drawing: what a job file names is an input too.
+#[test]
+fn no_file_that_a_job_names_is_written_over() {
+    let place = Place::new();
+    let csv = place.file("names.csv", "name\nAnna\nBo\n");
+    let drawing =
+        place.file("path.svg", "<svg width='9mm' height='9mm'><path d='M0 0L9 9'/></svg>");
+    let job = "[drawings.a]\nfile = \"path.svg\"\n[drawings.b]\ntext.content = \"{name}\"\n\
+               serial.csv = \"names.csv\"\narray = { columns = 2, spacing = [\"9 mm\", \"9 mm\"] }\n";
+    let job = place.file("job.toml", job);
+    let (job, folder) = (job.to_str().unwrap(), place.path(""));
+    let folder = folder.to_str().unwrap();
+    // As after a run there.
+    std::fs::write(place.path("summary.json"), "{}").unwrap();
+    for arguments in [
+        ["plan", job, "--samples", csv.to_str().unwrap()],
+        ["plan", job, "--preview", drawing.to_str().unwrap()],
+        ["check", job, "--picture", drawing.to_str().unwrap()],
+        ["simulate", job, "--out", folder],
+        ["run", job, "--out", folder],
+    ] {
+        let refused = match arguments[0] {
+            "run" => place.ask(&arguments),
+            _ => place.graver(&arguments),
+        };
+        assert_eq!(refused.code, Some(2), "{arguments:?} {}", refused.error);
+        assert!(refused.error.contains("a file of the job"), "{arguments:?} {}", refused.error);
+    }
+    assert_eq!(std::fs::read_to_string(csv).unwrap(), "name\nAnna\nBo\n");
+    assert!(std::fs::read_to_string(drawing).unwrap().starts_with("<svg width='9mm'"));
+}
+
+#[test]
+fn all_that_is_wrong_is_told_in_json_the_first_apart() {
+    let place = Place::new();
+    let program = place.file("job.ngc", "G21\nG1 X1\nF600 G1 X2 Q7\nG0 X3 W1\nM2\n");
+    let file = "[points]\npoints = [[1, 2]]\ndwel = 3\n[marking]\nspeed = \"fast\"\n";
+    let file = place.file("job.toml", file);
+    for (job, lines) in [(program, [2, 3]), (file, [3, 5])] {
+        let job = job.to_str().unwrap();
+        for command in ["plan", "check", "simulate", "run"] {
+            let refused = match command {
+                "run" => place.ask(&[command, job, "--json"]),
+                _ => place.graver(&[command, job, "--json"]),
+            };
+            let refused = refused.json(2);
+            support::assert_valid("summary", &refused);
+            let errors = refused["errors"].as_array().unwrap();
+            assert_eq!(errors[0], refused["error"]);
+            let told: Vec<u64> = errors.iter().filter_map(|error| error["line"].as_u64()).collect();
+            assert!(lines.iter().all(|line| told.contains(line)), "{command} {job} {errors:#?}");
+            for error in errors {
+                assert_eq!(error["file"], job);
+                assert!(error["column"].as_u64().is_some() && error["message"].is_string());
+            }
+        }
+    }
+}

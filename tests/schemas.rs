@@ -18,6 +18,7 @@ use graver::commands::machine::NewReport;
 use graver::commands::motion::MotionReply;
 use graver::commands::offset::OffsetsReport;
 use graver::commands::plan::PlanReport;
+use graver::commands::plan::preview::PreviewReport;
 use monitor::summary::Summary;
 use operator::{Queue, Status, Submitted, VerbReply};
 use schemars::{Schema, schema_for};
@@ -42,6 +43,7 @@ fn schemas() -> Vec<(&'static str, Schema)> {
         ("motion", schema_for!(MotionReply)),
         ("offsets", schema_for!(OffsetsReport)),
         ("plan", schema_for!(PlanReport)),
+        ("preview", schema_for!(PreviewReport)),
         ("queue", schema_for!(Queue)),
         ("reply", schema_for!(VerbReply)),
         ("speed", schema_for!(SpeedReport)),

@@ -243,6 +243,8 @@ pub struct Safety {
     pub test_power: f64,
     /// The longest test pulse [s].
     pub test_time: f64,
+    /// The most power with which the frame around a job is shown, 0..=1.
+    pub frame_power: f64,
     /// How long a jog goes on without another word [s].
     pub dead_man: f64,
 }
@@ -254,6 +256,7 @@ impl Default for Safety {
             door: DoorAction::Hold,
             test_power: 0.1,
             test_time: 0.1,
+            frame_power: 0.05,
             dead_man: 0.2,
         }
     }

@@ -29,6 +29,19 @@ pub struct PlanFacts {
     pub speed_asked: f64,
     /// The largest that job and machine allow while the laser is on [m/s].
     pub speed_limit: f64,
+    /// Least and largest power of the laser [fraction of full scale]; null where nothing is lit. Where the
+    /// power follows the speed, it is that at the speed asked for.
+    #[serde(default)]
+    pub power: Option<[f64; 2]>,
+    /// The box around all that is marked; null where nothing is.
+    #[serde(default)]
+    pub bounds: Option<Bounds>,
+    /// Whether it is a dry run: the whole motion, and nothing lit.
+    #[serde(default)]
+    pub dry_run: bool,
+    /// The layers of a drawing in the order of marking; empty for other jobs.
+    #[serde(default)]
+    pub layers: Vec<LayerFacts>,
     /// What a person should know.
     pub notes: Vec<Note>,
     /// Largest share of each limit that the plan uses.
@@ -39,6 +52,48 @@ pub struct PlanFacts {
     /// go straight with it, and of a plan against the limits of the path only.
     #[serde(default)]
     pub interpolation: Option<InterpolationFacts>,
+}
+
+/// What is marked in one way.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LayerFacts {
+    /// Its name; null for what is on no layer.
+    pub name: Option<String>,
+    /// Lines and images on it, hatch lines each.
+    pub marks: u64,
+    /// The way along them in one pass, about [m].
+    pub length: f64,
+    /// Speed [m/s]; null where the planner chooses it.
+    pub speed: Option<f64>,
+    /// Power of the laser [fraction of full scale].
+    pub power: f64,
+    /// How often it is marked.
+    pub passes: u64,
+    /// Pulse repetition rate of the laser [pulses/s]; null as its source is set.
+    pub frequency: Option<f64>,
+    /// Whether the air assist is on.
+    pub air: bool,
+}
+
+/// An upright box, machine frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "BoundingBox")]
+pub struct Bounds {
+    /// The lower corner [m].
+    pub lower: [f64; 3],
+    /// The upper corner [m].
+    pub upper: [f64; 3],
+}
+
+impl Bounds {
+    /// Takes a point into `bounds`.
+    pub fn widen(bounds: &mut Option<Self>, point: &[f64; 3]) {
+        let Self { lower, upper } = bounds.get_or_insert(Self { lower: *point, upper: *point });
+        for (row, value) in point.iter().enumerate() {
+            lower[row] = lower[row].min(*value);
+            upper[row] = upper[row].max(*value);
+        }
+    }
 }
 
 /// How far the tool strays in the middle between two setpoints, which the controller joins by a cubic of

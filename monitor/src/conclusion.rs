@@ -49,6 +49,8 @@ pub struct RunOutcome {
     pub error: Option<ErrorSummary>,
     /// Where the job was when it was last heard of, without its place in the drawing.
     pub place: Option<JobPlace>,
+    /// What else is wrong.
+    pub others: Vec<ErrorSummary>,
     /// The controller's final report of this stream, if it came.
     pub controller: Option<ControllerReport>,
     /// The fault that the controller has latched at the end, if any.
@@ -85,6 +87,8 @@ pub fn summarise(
         name: if plan.name.is_empty() { run_outcome.job.clone() } else { plan.name.clone() },
         strokes: plan.strokes as u64,
         length: plan.length,
+        dry_run: plan.dry_run,
+        layers: plan.layers.clone(),
     };
     let mut summary = Summary::new(Outcome::Aborted, job, machine_summary(machine));
     let counters = run_outcome.drives.map(|report| report.link).unwrap_or_default();
@@ -94,6 +98,7 @@ pub fn summarise(
     };
     summary.drives = drives.counted(&counters);
     summary.error = run_outcome.error.clone();
+    summary.errors = run_outcome.error.iter().chain(&run_outcome.others).cloned().collect();
     summary.wall = run_outcome.wall;
     summary.plan_time = run_outcome.plan_time;
     summary.time_left = run_outcome.time_left;

@@ -13,7 +13,7 @@ pub mod text;
 use crate::latency::HopLatency;
 use crate::marks::Marks;
 use crate::recording::continuity::RecordingSummary;
-use messages::plan::Binding;
+use messages::plan::{Binding, LayerFacts};
 use messages::{ControllerReport, RealtimeFacts};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,6 +66,9 @@ pub struct Summary {
     /// Where the job was; null of one that was completed, and where it is not known.
     #[serde(default)]
     pub place: Option<JobPlace>,
+    /// All that is wrong, `error` the first of it.
+    #[serde(default)]
+    pub errors: Vec<ErrorSummary>,
     /// The job.
     pub job: JobSummary,
     /// The machine.
@@ -156,6 +159,12 @@ pub struct JobSummary {
     pub strokes: u64,
     /// Length to mark [m].
     pub length: f64,
+    /// Whether it was a dry run: the whole motion, and nothing lit.
+    #[serde(default)]
+    pub dry_run: bool,
+    /// The layers of a drawing in the order of marking.
+    #[serde(default)]
+    pub layers: Vec<LayerFacts>,
 }
 
 /// The machine of a run.
@@ -244,6 +253,7 @@ impl Summary {
             fault: None,
             error: None,
             place: None,
+            errors: Vec::new(),
             job,
             machine,
             drives: DrivesSummary::default(),

@@ -27,6 +27,16 @@ pub enum PlanError {
         /// Why.
         message: String,
     },
+    /// The stroke to begin with is beyond the last.
+    #[error(
+        "there is no stroke {asked} to begin with: the job has {strokes} (marking.from_stroke)"
+    )]
+    NoStroke {
+        /// The stroke to begin with, from 1.
+        asked: u64,
+        /// How many strokes and dots there are.
+        strokes: u64,
+    },
     /// A motion that would not end while anybody waits for it.
     #[error("this job would take {:.1} days, more than a week", duration / 86_400.0)]
     TooLong {
@@ -142,7 +152,11 @@ impl PlanError {
     /// Line of the job file that it concerns, from 1; 0 for none.
     pub fn line(&self) -> u64 {
         match self {
-            Self::IdealOnly(_) | Self::NotOnPaper | Self::Abandoned | Self::TooLong { .. } => 0,
+            Self::IdealOnly(_)
+            | Self::NotOnPaper
+            | Self::Abandoned
+            | Self::NoStroke { .. }
+            | Self::TooLong { .. } => 0,
             Self::TooShort { line, .. }
             | Self::Unreadable { line, .. }
             | Self::Unreachable { line, .. }

@@ -7,6 +7,7 @@ mod drawing_error;
 pub mod drawing_table;
 mod estimate;
 pub mod file;
+mod frame;
 mod frequency;
 pub mod gcode;
 pub mod letters;
@@ -102,6 +103,19 @@ pub struct Marking {
     pub frequency: Option<f64>,
     /// The stroke to begin with, from 1: what is marked before is left out.
     pub from_stroke: u64,
+    /// Whether nothing is lit: the same motion in the dark.
+    pub is_dry: bool,
+    /// How the box around all of it is shown instead of marking it; `None` where it is marked.
+    pub frame: Option<Frame>,
+}
+
+/// How the box around a job is shown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Power of the laser [fraction of full scale]; `None` in the dark.
+    pub power: Option<f64>,
+    /// How often it is gone round.
+    pub passes: u32,
 }
 
 impl Default for Marking {
@@ -114,6 +128,8 @@ impl Default for Marking {
             turns: Turns::default(),
             frequency: None,
             from_stroke: 1,
+            is_dry: false,
+            frame: None,
         }
     }
 }
@@ -226,14 +242,14 @@ impl Job {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or("");
         let extension = extension.to_ascii_lowercase();
         if GCODE.contains(&extension.as_str()) {
-            return program_table::program(path, overrides, machine, most);
+            return program_table::program(path, overrides, machine, most)?.framed(machine);
         }
         if DRAWINGS.contains(&extension.as_str()) {
-            return drawing_table::drawing(path, overrides, machine);
+            return drawing_table::drawing(path, overrides, machine)?.framed(machine);
         }
         if extension != JOB_FILE {
             if gcode::is_program(path) {
-                return program_table::program(path, overrides, machine, most);
+                return program_table::program(path, overrides, machine, most)?.framed(machine);
             }
             let known = || GCODE.into_iter().chain([JOB_FILE]).chain(DRAWINGS);
             let help = match nearest(&extension, known()) {
@@ -254,7 +270,7 @@ impl Job {
         let folder = path.parent().unwrap_or_else(|| Path::new(""));
         let mut job = file::job(document, folder, machine, most)?;
         job.files.push(path.to_owned());
-        Ok(job)
+        job.framed(machine)
     }
 
     /// The built-in job, letters at 20 mm, with `overrides` of its keys laid over it.
@@ -263,7 +279,7 @@ impl Job {
     /// Where an override is not sound.
     pub fn builtin(overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
         let document = Document::parse("letters.toml", BUILTIN)?.override_with(overrides, "")?;
-        file::job(document, Path::new(""), machine, u64::MAX)
+        file::job(document, Path::new(""), machine, u64::MAX)?.framed(machine)
     }
 
     /// The job file called `name` with this `text`, which may name no other file.
@@ -271,7 +287,7 @@ impl Job {
     /// # Errors
     /// Where it is not sound, with the place.
     pub fn parse(name: &str, text: &str, machine: &Machine) -> Result<Self, JobError> {
-        file::job(Document::parse(name, text)?, Path::new(""), machine, u64::MAX)
+        file::job(Document::parse(name, text)?, Path::new(""), machine, u64::MAX)?.framed(machine)
     }
 }
 

@@ -8,6 +8,7 @@
 //! - [`light`]: gate and power along a path.
 //! - `planning`: puts these together, window by window. [`trajectory`]: the result, as functions of time.
 //! - [`sampling`]: one setpoint each millisecond, with deflection and backlash. [`verify`]: their checker.
+//! - [`preview`]: what a job draws, before it is planned.
 //! - [`paper`]: a drawing by the speed profiles of the sources, for comparison.
 //! - [`service`]: the planner process. It alone waits, locks or reads a clock.
 //!
@@ -24,6 +25,7 @@ pub mod limits;
 pub mod paper;
 pub mod plan;
 pub(crate) mod planning;
+pub mod preview;
 #[cfg(test)]
 mod random;
 pub mod request;

@@ -35,9 +35,10 @@ use std::collections::VecDeque;
 
 use machine::kinematics::Joints;
 use machine::{Machine, Mechanism, PathLimits, WorkArea};
-use messages::Setpoint;
 use messages::artwork::ArtworkLine;
+use messages::plan::Bounds;
 use messages::time::SETPOINT_TIME;
+use messages::{LaserCycle, Setpoint};
 use nalgebra::Vector3;
 
 use crate::drawing::{Note, Turns};
@@ -94,6 +95,8 @@ pub(crate) struct Task<'a> {
     pub(crate) frequency: f64,
     /// How long the job takes at the speeds asked for, if starts and turns took no time [s].
     pub(crate) estimate: f64,
+    /// Whether nothing is lit.
+    pub(crate) is_dry: bool,
     /// Where the tool is before it [m].
     pub(crate) start: Vector3<f64>,
     /// Where the joints stand [m or rad].
@@ -138,12 +141,29 @@ struct Draft<'s> {
     strokes: Vec<ArtworkLine>,
     length: f64,
     asked: Asked,
+    power: Option<[f64; 2]>,
     shares: &'s Tightening,
     slowed: Vec<Slowed>,
     notes: Vec<Note>,
     bound: BindingTimes,
     speed: f64,
     is_fixed: bool,
+}
+
+impl Draft<'_> {
+    /// Leaves the motion alone: nothing is lit, and nothing to be marked.
+    fn darken(&mut self) {
+        self.trajectory.laser.clear();
+        self.strokes.clear();
+        (self.length, self.speed, self.power) = (0.0, 0.0, None);
+    }
+}
+
+/// Closes the gate of a setpoint.
+fn darken(setpoint: &mut Setpoint) {
+    let frequency = setpoint.laser.frequency;
+    setpoint.laser = LaserCycle { frequency, ..LaserCycle::default() };
+    setpoint.stroke = 0;
 }
 
 impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
@@ -273,8 +293,14 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         }
     }
 
-    fn keep(&mut self, (draft, setpoints): (Draft<'_>, Vec<Setpoint>)) -> Window {
-        let Draft { trajectory, strokes, slowed, notes, bound, speed, length, asked, .. } = draft;
+    fn keep(&mut self, (mut draft, mut setpoints): (Draft<'_>, Vec<Setpoint>)) -> Window {
+        if self.task.is_dry {
+            draft.darken();
+            setpoints.iter_mut().for_each(darken);
+        }
+        let Draft {
+            trajectory, strokes, slowed, notes, bound, speed, length, asked, power, ..
+        } = draft;
         let is_fixed = draft.is_fixed;
         let account = &mut self.account;
         account.note_slowed(&slowed);
@@ -283,6 +309,11 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         account.speed = account.speed.max(speed);
         account.asked.add(asked.speed, asked.line);
         account.length += length;
+        let points = strokes.iter().flat_map(|line| &line.stroke.points);
+        points.for_each(|point| Bounds::widen(&mut account.bounds, point));
+        for power in power.into_iter().flatten() {
+            account::widen(&mut account.power, power);
+        }
         account.strokes += strokes.iter().filter(|stroke| !stroke.goes_on).count() as u64;
         let (end, estimate) = (self.front.time, self.estimate());
         // Of a motion that goes on for many windows all samples but the last have been checked.
@@ -337,6 +368,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             strokes: Vec::new(),
             length: 0.0,
             asked: Asked::default(),
+            power: None,
             shares,
             slowed: Vec::new(),
             notes: Vec::new(),

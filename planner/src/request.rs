@@ -1,6 +1,7 @@
 //! What the domain asks of the planner and what the planner answers besides samples: small JSON
 //! files in the run folder.
 
+use crate::job::gcode::GcodeError;
 use crate::job::{Job, JobError};
 use crate::{Plan, PlanError};
 use machine::Machine;
@@ -68,6 +69,22 @@ pub struct Refusal {
     pub message: String,
     /// The same for a person, with the lines at fault.
     pub text: String,
+    /// What else is wrong.
+    #[serde(default)]
+    pub others: Vec<Problem>,
+}
+
+/// One thing that is wrong with a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Problem {
+    /// The file at fault.
+    pub file: Option<String>,
+    /// Line from 1.
+    pub line: Option<u64>,
+    /// Column from 1.
+    pub column: Option<u64>,
+    /// What is wrong, and what would be right.
+    pub message: String,
 }
 
 impl JobRequest {
@@ -136,7 +153,8 @@ impl JobRequest {
             (Some(file), None) => format!("{file}: "),
             (None, _) => String::new(),
         };
-        Refusal { file, line, column: None, text: format!("{place}{message}"), message }
+        let text = format!("{place}{message}");
+        Refusal { file, line, column: None, message, text, others: Vec::new() }
     }
 }
 
@@ -148,6 +166,11 @@ impl Refusal {
             file: Some(error.file()),
             line: position.map(|(line, _)| line),
             column: position.map(|(_, column)| column),
+            others: match error {
+                JobError::Document(error) => others_of_document(error),
+                JobError::Gcode(error) => others_of_program(error),
+                _ => Vec::new(),
+            },
             ..Self::of_diagnostic(error)
         }
     }
@@ -159,6 +182,7 @@ impl Refusal {
             line: error.line().map(|line| line as u64),
             column: error.column().map(|column| column as u64),
             message: error.message(),
+            others: others_of_document(error),
             ..Self::of_diagnostic(error)
         }
     }
@@ -171,16 +195,44 @@ impl Refusal {
         if handler.render_report(&mut text, diagnostic).is_err() {
             text = diagnostic.to_string();
         }
-        let message = match diagnostic.help() {
-            Some(help) => format!("{diagnostic}; {help}"),
-            None => diagnostic.to_string(),
-        };
-        Self { file: None, line: None, column: None, message, text }
+        let message = message_of(diagnostic);
+        Self { file: None, line: None, column: None, message, text, others: Vec::new() }
     }
 
     /// A refusal that no line of a file is to blame for.
     pub fn internal(error: impl std::fmt::Display) -> Self {
         let message = error.to_string();
-        Self { file: None, line: None, column: None, text: message.clone(), message }
+        let others = Vec::new();
+        Self { file: None, line: None, column: None, text: message.clone(), message, others }
     }
+}
+
+/// What is wrong, and what would be right.
+fn message_of(diagnostic: &dyn Diagnostic) -> String {
+    match diagnostic.help() {
+        Some(help) => format!("{diagnostic}; {help}"),
+        None => diagnostic.to_string(),
+    }
+}
+
+/// All that is wrong with a document but the first.
+fn others_of_document(error: &DocumentError) -> Vec<Problem> {
+    let others = error.problems().skip(1).map(|problem| Problem {
+        file: Some(error.file().to_owned()),
+        line: problem.line().map(|line| line as u64),
+        column: problem.column().map(|column| column as u64),
+        message: problem.message(),
+    });
+    others.collect()
+}
+
+/// All that is wrong with a program but the first.
+fn others_of_program(error: &GcodeError) -> Vec<Problem> {
+    let others = error.others.iter().map(|other| Problem {
+        file: Some(other.file.clone()),
+        line: Some(other.line),
+        column: Some(other.column),
+        message: message_of(other),
+    });
+    others.collect()
 }

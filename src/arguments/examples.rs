@@ -6,6 +6,9 @@ Examples:
   graver run jobs/square_arcs.ngc --machine machines/cartesian.toml
   graver run --set letters.text=S --set letters.height=\"10 mm\" --out runs/s
   graver run --set plant.axis.a.friction.coulomb=\"7 mN m\"   a plant that differs from the plan
+  graver run logo.svg --frame                       round the box of the job, in the dark
+  graver run plate.ngc --dry-run                    the same motion, never lit
+  graver run plate.ngc --from-line 120              as if the lines before had been read
   graver run --json > summary.json                  for scripts
 
 While it runs, from another terminal: graver hold, resume, override, stop, status.";
@@ -19,6 +22,7 @@ Examples:
 pub(super) const PLAN_EXAMPLES: &str = "\
 Examples:
   graver plan jobs/square_arcs.ngc                  time, length, limits, notes
+  graver plan logo.svg --preview logo-preview.svg   what is marked, as a drawing
   graver plan --samples setpoints.csv               every setpoint, one row a millisecond
   graver plan --machine twin.toml --pulses p.csv    every step pulse with its time and count
   graver plan --ideal --set letters.style=h2        within the limits of the path only

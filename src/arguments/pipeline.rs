@@ -1,6 +1,6 @@
 //! Arguments of what runs a job: as processes, in one process, and by services.
 
-use super::{AccessArguments, InstanceArguments, MachineArguments};
+use super::{AccessArguments, InstanceArguments, JobOptions, MachineArguments};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -42,6 +42,9 @@ pub struct RunArguments {
     pub machine: MachineArguments,
     #[command(flatten)]
     #[allow(missing_docs)]
+    pub options: JobOptions,
+    #[command(flatten)]
+    #[allow(missing_docs)]
     pub drives: DrivesArguments,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -66,6 +69,9 @@ pub struct SimulateArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub machine: MachineArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub options: JobOptions,
     /// Run folder; without it nothing is written.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -85,6 +91,9 @@ pub struct SubmitArguments {
     /// Change a value of the job. Can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub options: JobOptions,
     /// Run folder; without it `runs/DATE-TIME-JOB`.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

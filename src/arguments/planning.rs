@@ -1,6 +1,6 @@
 //! Arguments of what plans, checks and reads.
 
-use super::MachineArguments;
+use super::{JobOptions, MachineArguments};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -13,6 +13,9 @@ pub struct PlanArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub machine: MachineArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub options: JobOptions,
     /// Write the 1 kHz setpoints to a CSV file.
     #[arg(long, value_name = "FILE")]
     pub samples: Option<PathBuf>,
@@ -26,6 +29,14 @@ pub struct PlanArguments {
     /// between knots, to a CSV file.
     #[arg(long, value_name = "FILE")]
     pub path_check: Option<PathBuf>,
+    /// Write what is marked, by power, and the ways in the dark to an SVG drawing in mm, or what is
+    /// marked to a JSON file; the name's end says which. "-" prints the drawing on stdout. It is written
+    /// before anything is planned, also of a job that is refused then.
+    #[arg(long, value_name = "FILE.svg|FILE.json")]
+    pub preview: Option<PathBuf>,
+    /// Plan nothing: read the job and write the preview alone.
+    #[arg(long, requires = "preview")]
+    pub preview_only: bool,
     /// Plan within the limits of the path only, as if the motors had no limits.
     #[arg(long)]
     pub ideal: bool,
@@ -64,6 +75,9 @@ pub struct CheckArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub machine: MachineArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub options: JobOptions,
     /// Draw what the machine reaches, and the job's strokes over it, as an SVG.
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,

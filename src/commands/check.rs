@@ -61,7 +61,7 @@ pub struct CheckWarning {
 /// # Errors
 /// A machine or job that does not hold, or a picture that cannot be written.
 pub fn run(arguments: &CheckArguments) -> Result<Exit, Failure> {
-    let input = inputs::machine(&arguments.machine)?;
+    let input = inputs::machine(&arguments.machine)?.with(&arguments.options);
     let machine = &input.machine;
     let planned = match &arguments.job {
         None => None,

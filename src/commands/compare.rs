@@ -2,11 +2,13 @@
 
 use crate::arguments::{CompareArguments, MachineArguments};
 use crate::exit::{Exit, Failure};
+use crate::files::Sources;
 use crate::inputs;
 use crate::output::{self, say};
 use machine::Machine;
 use planner::request::JobRequest;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use workbench::compare::{Comparison, Contender, Settings, Weights, compare};
 use workbench::thesis::machines::{Manner, ThesisMachine, series};
@@ -22,7 +24,8 @@ pub fn run(arguments: &CompareArguments) -> Result<Exit, Failure> {
         weights.set(text).map_err(|error| Failure::bad_input(format!("--weight: {error}")))?;
     }
     let is_thesis = arguments.machine.is_empty() && arguments.job.is_none();
-    let contenders = if is_thesis { thesis(arguments)? } else { named(arguments)? };
+    let mut sources = Sources::default();
+    let contenders = if is_thesis { thesis(arguments)? } else { named(arguments, &mut sources)? };
     let settings = Settings { seeds: arguments.seeds, weights };
     let mut comparison = compare(&contenders, &settings).map_err(Failure::bad_input)?;
     if is_thesis {
@@ -34,7 +37,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Exit, Failure> {
         comparison.errata = report.errata;
     }
     if let Some(folder) = &arguments.out {
-        write(folder, &comparison)?;
+        write(folder, &comparison, &mut sources)?;
     }
     if arguments.json {
         output::json(&comparison)?;
@@ -49,7 +52,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Exit, Failure> {
 }
 
 /// The machines that the command line names, on its job or the sample job of the first.
-fn named(arguments: &CompareArguments) -> Result<Vec<Contender>, Failure> {
+fn named(arguments: &CompareArguments, sources: &mut Sources) -> Result<Vec<Contender>, Failure> {
     let files: Vec<Option<PathBuf>> = if arguments.machine.is_empty() {
         vec![None]
     } else {
@@ -65,6 +68,13 @@ fn named(arguments: &CompareArguments) -> Result<Vec<Contender>, Failure> {
             let named = arguments.job.as_deref();
             inputs::job_request(named, &input.machine, folder, &input.job_overrides)
         });
+        if let Some(path) = &file {
+            *sources = std::mem::take(sources).and_machine(path);
+        }
+        // A job that cannot be read is refused for each machine.
+        if let Ok(read) = job.open(&input.machine) {
+            sources.add_job(&read.files);
+        }
         contenders.push(Contender {
             file: file.map(|path| path.display().to_string()),
             machine: input.machine,
@@ -93,7 +103,7 @@ fn thesis(arguments: &CompareArguments) -> Result<Vec<Contender>, Failure> {
 }
 
 /// Writes the page, the figures and the pictures into `folder`.
-fn write(folder: &Path, comparison: &Comparison) -> Result<(), Failure> {
+fn write(folder: &Path, comparison: &Comparison, sources: &mut Sources) -> Result<(), Failure> {
     let failed = |path: &Path, error: &dyn std::fmt::Display| {
         Failure::bad_input(format!("--out: cannot write {}: {error}", path.display()))
     };
@@ -108,7 +118,8 @@ fn write(folder: &Path, comparison: &Comparison) -> Result<(), Failure> {
     }
     for (name, content) in files {
         let path = folder.join(name);
-        fs::write(&path, content).map_err(|error| failed(&path, &error))?;
+        let mut file = sources.create("--out", &path)?;
+        file.write_all(content.as_bytes()).map_err(|error| failed(&path, &error))?;
     }
     Ok(())
 }

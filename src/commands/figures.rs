@@ -141,7 +141,7 @@ fn subjects(
                     set: arguments.set.clone(),
                     offsets: None,
                 };
-                subject.jobs = vec![subject_job(&request, &subject.machine)?];
+                subject.jobs = vec![subject_job(&request, &subject.machine, sources)?];
             }
         }
     }
@@ -151,7 +151,7 @@ fn subjects(
         *sources = std::mem::take(sources).and_machine(path);
         let request = inputs::job_request(job, &machine, folder.as_deref(), &job_overrides);
         let jobs = match request.job {
-            Some(_) => vec![subject_job(&request, &machine)?],
+            Some(_) => vec![subject_job(&request, &machine, sources)?],
             None => Vec::new(),
         };
         let stem = stem(path, &subjects);
@@ -163,8 +163,10 @@ fn subjects(
 fn subject_job(
     request: &planner::request::JobRequest,
     machine: &machine::Machine,
+    sources: &mut Sources,
 ) -> Result<SubjectJob, Failure> {
     let job = request.read(machine)?;
+    sources.add_job(&job.files);
     let path = request.job.clone().unwrap_or_default();
     let title = path.display().to_string();
     Ok(SubjectJob { stem: file_stem(&path), title, source: String::new(), job })

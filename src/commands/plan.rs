@@ -1,5 +1,7 @@
 //! `graver plan`: plans a job without running it.
 
+pub mod preview;
+
 use crate::arguments::PlanArguments;
 use crate::commands::path_check::{self, PathCheckFacts};
 use crate::commands::pulses::{self, Motion, PulseFacts, PulseFiles};
@@ -9,7 +11,7 @@ use crate::output::say;
 use crate::{inputs, output};
 use machine::Machine;
 use messages::Setpoint;
-use messages::plan::InterpolationFacts;
+use messages::plan::{InterpolationFacts, LayerFacts};
 use messages::time::SETPOINT_TIME;
 use planner::paper::{PaperFacts, Profile, SpeedTime};
 use planner::{Job, Plan, PlanError, PlanFacts};
@@ -53,7 +55,7 @@ enum Planned {
 /// # Errors
 /// A machine or job that does not hold, or a file that cannot be written.
 pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
-    let input = inputs::machine(&arguments.machine)?;
+    let input = inputs::machine(&arguments.machine)?.with(&arguments.options);
     let mut request = inputs::job_request(
         arguments.job.as_deref(),
         &input.machine,
@@ -66,6 +68,13 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
     let started = Instant::now();
     let job = request.open(&input.machine)?;
     let refuse = |error: PlanError| request.refuse(&error);
+    let mut sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
+    if let Some(path) = &arguments.preview {
+        preview::write(path, &input.machine, &job, &mut sources, refuse)?;
+        if arguments.preview_only {
+            return Ok(Exit::Done);
+        }
+    }
     let is_listed = arguments.samples.is_some() || arguments.path_check.is_some() || counts;
     let planned = if arguments.ideal {
         Planned::Whole(Box::new(planner::plan_ideal(&input.machine, &job).map_err(refuse)?))
@@ -80,7 +89,6 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
     });
     let paper = paper.transpose()?;
     let plan_time = started.elapsed().as_secs_f64();
-    let mut sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
     let checked = match (&arguments.path_check, &planned) {
         (Some(path), Planned::Whole(plan)) => {
             Some(check_paths(path, plan, &job, &input.machine, &mut sources)?)
@@ -148,6 +156,11 @@ fn refuse_contradictions(arguments: &PlanArguments, machine: &Machine) -> Result
                        --ideal with it";
         return Err(Failure::bad_input(message));
     }
+    let is_printed = arguments.preview.as_deref().is_some_and(preview::is_stdout);
+    if is_printed && arguments.json {
+        let message = "--preview - and --json both print on stdout: give the preview a file";
+        return Err(Failure::bad_input(message));
+    }
     let option = match (&arguments.pulses, &arguments.pulse_path) {
         (Some(_), _) => "--pulses",
         (None, Some(_)) => "--pulse-path",
@@ -197,7 +210,8 @@ fn print_text(report: &PlanReport, machine: &Machine) {
     if draws {
         say!("speed     {:.4} m/s at most while the laser is on", facts.speed);
     }
-    if let Some([least, most]) = report.program.and_then(|program| program.power) {
+    facts.layers.iter().for_each(print_layer);
+    if let Some([least, most]) = facts.power {
         let from = if least < most { format!("{} % to ", percent(least)) } else { String::new() };
         say!("power     {from}{} % of full power", percent(most));
     }
@@ -225,6 +239,15 @@ fn print_text(report: &PlanReport, machine: &Machine) {
             line => say!("note      line {line}: {}", note.text),
         }
     }
+}
+
+fn print_layer(layer: &LayerFacts) {
+    let name = layer.name.as_deref().unwrap_or("(none)");
+    let speed = layer.speed.map_or_else(String::new, |speed| format!(" at {speed:.4} m/s"));
+    let passes =
+        if layer.passes == 1 { String::new() } else { format!(", {} passes", layer.passes) };
+    let power = percent(layer.power);
+    say!("layer     {name}: {:.3} mm{speed}, {power} %{passes}", layer.length * 1e3);
 }
 
 /// A fraction as a person reads it, in per cent.

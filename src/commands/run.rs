@@ -2,7 +2,7 @@
 
 use crate::arguments::{DomainArguments, RunArguments};
 use crate::exit::{Exit, Failure};
-use crate::files::Claim;
+use crate::files::{Claim, Sources};
 use crate::inputs::MachineSource;
 use crate::pipeline::configuration::Configuration;
 use crate::pipeline::job_run::{JobRun, job_name};
@@ -11,7 +11,7 @@ use crate::pipeline::{JobSource, POLL_INTERVAL, Pipeline, ServiceOwner};
 use crate::{inputs, output};
 use monitor::run_folder::RunFolder;
 use runtime::{Instance, message, signal};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Runs one job in a pipeline of its own.
@@ -21,7 +21,7 @@ use std::time::Instant;
 pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let started = Instant::now();
     let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
-    let input = inputs::machine(&arguments.machine)?;
+    let input = inputs::machine(&arguments.machine)?.with(&arguments.options);
     let mut request = inputs::job_request(
         arguments.job.as_deref(),
         &input.machine,
@@ -31,6 +31,8 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     request.offsets = input.source.offsets()?;
     // Read here only to refuse early; the planner reads it again.
     let job = request.read(&input.machine)?;
+    let sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
+    sources.spare(arguments.out.as_deref())?;
     let configuration = Configuration::new(input.source, &arguments.drives)?;
     // From here on a signal brings the machine to rest before it ends anything, and a terminal that closes does not end
     // the job.
@@ -111,6 +113,8 @@ fn run_submission(pipeline: &mut Pipeline, source: &MachineSource, entry: &Entry
     let folder = run_folder(entry.job.out.as_deref().map(Path::new), below, &job_name(&job));
     let ran = folder.and_then(|folder| {
         pipeline.queue.note_folder(folder.path());
+        let files: Vec<PathBuf> = job.job.iter().cloned().collect();
+        Sources::new(source.path().as_deref(), &files).spare(Some(folder.path()))?;
         job.offsets = source.offsets()?;
         let _claim = Claim::of(&folder)?;
         let run = JobRun::prepare(pipeline, &job, folder, started, entry.job.number)?;

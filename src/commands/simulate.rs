@@ -2,7 +2,7 @@
 
 use crate::arguments::SimulateArguments;
 use crate::exit::{Exit, Failure};
-use crate::files::Claim;
+use crate::files::{Claim, Sources};
 use crate::{inputs, output};
 use drives::PlantOptions;
 use messages::run_folder;
@@ -25,7 +25,7 @@ use workbench::simulation::{SimulationError, simulate};
 /// A machine or job that does not hold, or a run folder that cannot be written.
 pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     let started = Instant::now();
-    let input = inputs::machine(&arguments.machine)?;
+    let input = inputs::machine(&arguments.machine)?.with(&arguments.options);
     let mut request = inputs::job_request(
         arguments.job.as_deref(),
         &input.machine,
@@ -33,7 +33,11 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
         &input.job_overrides,
     );
     request.offsets = input.source.offsets()?;
-    let plan = request.plan(&input.machine)?;
+    let job = request.read(&input.machine)?;
+    let sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
+    sources.spare(arguments.out.as_deref())?;
+    let refuse = |error| request.refuse(&error);
+    let plan = planner::plan(&input.machine, &job).map_err(refuse)?;
     let plan_time = started.elapsed().as_secs_f64();
 
     let folder = arguments.out.as_deref().map(RunFolder::create_at).transpose();

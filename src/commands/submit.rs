@@ -28,7 +28,9 @@ pub fn run(arguments: &SubmitArguments) -> Result<Exit, Failure> {
     signal::install().map_err(Failure::service)?;
     let whole = |path: &Path| absolute(path).unwrap_or_else(|_| path.to_owned());
     // The offsets are those of the pipeline's machine, when the job's turn comes.
-    let set = arguments.set.clone();
+    let changes = arguments.options.overrides();
+    let changes = changes.iter().map(|change| format!("{}={}", change.key, change.value));
+    let set = arguments.set.iter().cloned().chain(changes).collect();
     let job = JobRequest { job: Some(whole(&arguments.job)), set, offsets: None };
     let out = Some(run_folder(arguments)?);
     if arguments.detach {

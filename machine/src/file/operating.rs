@@ -102,6 +102,8 @@ table! {
         pub test_power: Fraction<Positive> = 0.1,
         /// The longest test pulse.
         pub test_time: Quantity<unit::Duration, Positive> = "100 ms",
+        /// The most power with which the frame around a job is shown.
+        pub frame_power: Fraction<Positive> = 0.05,
         /// How long a jog goes on without another word from whoever asked for it.
         pub dead_man: Quantity<unit::Duration, Positive> = "200 ms",
     }
@@ -317,6 +319,7 @@ fn safety(table: &SafetyTable, diagnostics: &mut Diagnostics) -> Safety {
         door: table.door.value,
         test_power: table.test_power.value,
         test_time: table.test_time.value,
+        frame_power: table.frame_power.value,
         dead_man: table.dead_man.value,
     }
 }

@@ -115,7 +115,12 @@ fn the_page_shows_the_run_and_needs_no_network() {
         axes: vec!["a".into(), "b".into()],
         actuators: vec!["a".into(), "b".into()],
     };
-    let job = JobSummary { name: "circle & cross".into(), strokes: 2, length: artwork.length() };
+    let job = JobSummary {
+        name: "circle & cross".into(),
+        strokes: 2,
+        length: artwork.length(),
+        ..JobSummary::default()
+    };
     let mut summary = Summary::new(Outcome::Completed, job, machine);
     summary.marks = Some(results.marks.unwrap().marks);
     summary.latency = results.histograms.summary();

@@ -19,10 +19,10 @@ const REST_PATIENCE: Duration = Duration::from_secs(5);
 /// What `refused.json` says of a job that was refused.
 #[derive(Debug, Deserialize)]
 struct Refused {
-    file: Option<String>,
-    line: Option<u64>,
-    column: Option<u64>,
-    message: String,
+    #[serde(flatten)]
+    first: ErrorSummary,
+    #[serde(default)]
+    others: Vec<ErrorSummary>,
 }
 
 impl Service {
@@ -82,7 +82,7 @@ impl Service {
         };
         if let Some(refusal) = refusal(&job.folder) {
             run_outcome.outcome = Some(Outcome::Refused);
-            run_outcome.error = Some(refusal);
+            (run_outcome.error, run_outcome.others) = (Some(refusal.first), refusal.others);
             run_outcome.warnings.push("the supervisor died after the job was refused".to_owned());
         } else if controller.is_some_and(|report| !report.fault.is_some()) {
             run_outcome.warnings.push("the supervisor died after the job had ended".to_owned());
@@ -97,8 +97,7 @@ impl Service {
 }
 
 /// Why the planner refused the job, if it did.
-fn refusal(folder: &RunFolder) -> Option<ErrorSummary> {
+fn refusal(folder: &RunFolder) -> Option<Refused> {
     let text = std::fs::read(folder.file(run_folder::REFUSAL)).ok()?;
-    let Refused { file, line, column, message } = serde_json::from_slice(&text).ok()?;
-    Some(ErrorSummary { file, line, column, message })
+    serde_json::from_slice(&text).ok()
 }

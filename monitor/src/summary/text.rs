@@ -70,18 +70,22 @@ impl Rows {
         if let Some(error) = &summary.error {
             self.add("error", error.to_string());
         }
-        if let Some(place) = &summary.place {
-            self.add("ended at", place.to_string());
-        }
-        if let Some(place) = summary.left.and_then(|left| left.place) {
-            self.add("ended in", place.to_string());
+        // The marks tell it more exactly than what was last heard of the job.
+        match (summary.left.and_then(|left| left.place), &summary.place) {
+            (Some(place), _) => self.add("ended in", place.to_string()),
+            (None, Some(place)) => self.add("ended at", place.to_string()),
+            (None, None) => {}
         }
     }
 
     fn job(&mut self, summary: &Summary) {
         let Summary { job, machine, .. } = summary;
-        let marked = length(job.length);
-        self.add("job", format!("{}, {} strokes, {marked}", job.name, job.strokes));
+        let what = if job.dry_run {
+            "dry run, nothing lit".to_owned()
+        } else {
+            format!("{} strokes, {}", job.strokes, length(job.length))
+        };
+        self.add("job", format!("{}, {what}", job.name));
         let axes = machine.axes.join(", ");
         let actuators = match &machine.actuators {
             alone if *alone == machine.axes || alone.is_empty() => String::new(),
@@ -249,7 +253,12 @@ mod tests {
 
     #[test]
     fn lines_are_aligned() {
-        let job = JobSummary { name: "letters NASO".into(), strokes: 5, length: 0.2345 };
+        let job = JobSummary {
+            name: "letters NASO".into(),
+            strokes: 5,
+            length: 0.2345,
+            ..JobSummary::default()
+        };
         let mut summary = Summary::new(Outcome::Stopped, job, MachineSummary::default());
         summary.warnings.push("no SCHED_FIFO".into());
         let text = summary.text();

@@ -209,15 +209,19 @@ impl Contour {
         self.is_lit
     }
 
-    /// How many stretches of light it has; of the next part of another contour, those that begin in it.
-    pub(crate) fn strokes(&self) -> u64 {
-        let mut was_lit = self.goes_on_from_before();
-        let begins = |demand: &Demand| {
+    /// What is asked for where each stretch of light begins in it; the first goes on from the contour before
+    /// if that `was_lit` at its end.
+    pub(crate) fn strokes(&self, mut was_lit: bool) -> impl Iterator<Item = &Demand> {
+        self.demands.iter().filter(move |demand| {
             let is_lit = demand.power > 0.0;
             let was_lit = core::mem::replace(&mut was_lit, is_lit);
             is_lit && !was_lit
-        };
-        self.demands.iter().map(begins).filter(|begins| *begins).count() as u64
+        })
+    }
+
+    /// Whether it is lit at its end.
+    pub(crate) fn ends_lit(&self) -> bool {
+        self.demands.last().is_some_and(|demand| demand.power > 0.0)
     }
 
     /// Length that is marked [m].

@@ -16,6 +16,7 @@ use std::sync::Arc as Shared;
 
 use graphics::{Contour, Segment};
 use kurbo::{Point, Rect};
+use messages::plan::LayerFacts;
 use nalgebra::Vector3;
 
 pub(super) use compose::{Composed, Part, Parts, compose};
@@ -40,6 +41,8 @@ pub struct Composition {
 /// What is marked in one way, in order.
 #[derive(Debug, Clone, PartialEq)]
 struct Section {
+    /// The name of its layer; `None` for what is on none.
+    layer: Option<String>,
     recipe: Recipe,
     marks: Vec<Mark>,
 }
@@ -97,6 +100,24 @@ impl Composition {
     /// Whether the speed of some layer is for the planner to choose.
     pub(crate) fn leaves_speeds_open(&self) -> bool {
         self.sections.iter().any(|section| section.recipe.speed.is_none())
+    }
+
+    /// What its layers are, in the order of marking.
+    pub(crate) fn layers(&self) -> Vec<LayerFacts> {
+        let layer = |section: &Section| {
+            let Recipe { speed, power, passes, frequency, air, .. } = section.recipe;
+            LayerFacts {
+                name: section.layer.clone(),
+                marks: section.marks.len() as u64,
+                length: section.marks.iter().map(|mark| mark.shape.length()).sum(),
+                speed,
+                power: power.level,
+                passes: passes.into(),
+                frequency: Some(frequency).filter(|frequency| *frequency > 0.0),
+                air,
+            }
+        };
+        self.sections.iter().map(layer).collect()
     }
 
     /// The smallest upright rectangle around all of it, machine frame [m]; `None` where there is nothing.

@@ -74,7 +74,8 @@ pub(super) fn drawing(
     let empty = Document::parse(&path.display().to_string(), "")?;
     let (table, mut diagnostics) =
         empty.override_with(overrides, "")?.decode::<DrawingFileTable>()?;
-    table.marking.check(&machine.laser, &mut diagnostics);
+    table.marking.check(machine, &mut diagnostics);
+    table.marking.refuse_line(&mut diagnostics);
     let home = Vector3::from(machine.home);
     let surface =
         table.surface.and_then(|table| workpiece_table::surface(&table, &mut diagnostics));
@@ -116,6 +117,10 @@ fn of_drawings(
     folder: &Path,
     machine: &Machine,
 ) -> Result<Job, JobError> {
+    if let (Some(frame), true) = (parts.frame, marking.frame.value) {
+        let text = "[frame] and `marking.frame` both show where the drawing lies".to_owned();
+        diagnostics.contradict(frame.span, text, "keep one of them");
+    }
     let Composed { composition, notes, files } = compose(parts, folder, machine, &mut diagnostics)?;
     let start = Vector3::from(machine.home);
     let drawing = Drawing { name: name.to_owned(), start, steps: Vec::new(), notes };

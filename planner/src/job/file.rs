@@ -153,7 +153,10 @@ pub(super) fn job(
 
 /// What is wrong with the tables beside the kind.
 fn check(table: &JobTable, machine: &Machine, diagnostics: &mut Diagnostics) {
-    table.marking.check(&machine.laser, diagnostics);
+    table.marking.check(machine, diagnostics);
+    if table.gcode.is_none() {
+        table.marking.refuse_line(diagnostics);
+    }
     if table.drawing.is_some() || table.drawings.is_some() {
         return;
     }

@@ -1,11 +1,13 @@
 //! The job file's table of how to mark, whatever is marked.
 
-use machine::document::{Diagnostics, Either, Fraction, Number, Positive, Quantity, Spanned};
+use machine::document::{
+    Diagnostics, Either, Fraction, Number, Positive, ProblemKind, Quantity, Spanned,
+};
 use machine::quantity::{Length, PulseRate, Speed};
-use machine::{LaserSource, table};
+use machine::{Machine, table};
 
 use super::whole::whole;
-use super::{Marking, MarkingSpeed, frequency};
+use super::{Frame, Marking, MarkingSpeed, frequency};
 use crate::drawing::Turns;
 use crate::light::Policy;
 
@@ -28,9 +30,19 @@ table! {
         /// in the dark, `proportional` lights from rest to rest with power in proportion to the speed.
         /// When left out, a G-code program's M3 and M4 say it, and other jobs are `constant`.
         pub policy: Option<Spanned<Policy>>,
-        /// The stroke to begin with, from 1, as after a job that was stopped; a path is not cut, so
-        /// those of its path that come before it are marked again.
+        /// The stroke to begin with, from 1, as after a job that was stopped.
         pub from_stroke: Number<Positive> = 1.0,
+        /// The line of a G-code program to begin with, from 1: with all that the lines before it leave in
+        /// force, and by a free move to the place where it begins.
+        pub from_line: Option<Number<Positive>>,
+        /// The same motion, never lit.
+        pub dry_run: Spanned<bool> = false,
+        /// Goes round the box around all that would be marked instead of marking it, in the dark.
+        pub frame: Spanned<bool> = false,
+        /// Lights the frame, within `safety.frame_power` of the machine.
+        pub frame_power: Option<Fraction<Positive>>,
+        /// How often the frame is gone round.
+        pub frame_passes: Number<Positive> = 3.0,
     }
 }
 
@@ -46,14 +58,71 @@ machine::keyword! {
     "optimum" => Self::Optimum,
 }
 
-/// The most strokes of a job.
-const MOST_STROKES: u64 = 1 << 53;
+/// The most strokes of a job, and the most lines.
+const MOST: u64 = 1 << 53;
+
+/// The most rounds of a frame.
+const MOST_PASSES: u64 = 1000;
 
 impl MarkingTable {
-    /// Notes what is wrong with it on a machine with this laser `source`.
-    pub(super) fn check(&self, source: &LaserSource, diagnostics: &mut Diagnostics) {
-        frequency::asked(self.frequency.as_ref(), source, diagnostics);
-        whole(&self.from_stroke, 1..=MOST_STROKES, "from_stroke", diagnostics);
+    /// Notes what is wrong with it on `machine`.
+    pub(super) fn check(&self, machine: &Machine, diagnostics: &mut Diagnostics) {
+        frequency::asked(self.frequency.as_ref(), &machine.laser, diagnostics);
+        whole(&self.from_stroke, 1..=MOST, "from_stroke", diagnostics);
+        whole(&self.frame_passes, 1..=MOST_PASSES, "frame_passes", diagnostics);
+        self.check_frame(machine, diagnostics);
+        let Some(line) = &self.from_line else { return };
+        whole(line, 1..=MOST, "from_line", diagnostics);
+        if self.from_stroke.value > 1.0 {
+            let text = "`from_line` and `from_stroke` both say where to begin".to_owned();
+            diagnostics.contradict(line.span, text, "keep one of them");
+        }
+    }
+
+    fn check_frame(&self, machine: &Machine, diagnostics: &mut Diagnostics) {
+        let Some(power) = &self.frame_power else { return };
+        if !self.frame.value {
+            let text = "`frame_power` is for the frame, and none is shown".to_owned();
+            diagnostics.contradict(power.span, text, "write `frame = true`, or leave it out");
+        }
+        let percent = |share: f64| format!("{} %", (share * 1e5).round() / 1e3);
+        let (most, least) = (machine.operating.safety.frame_power, machine.laser.min_power);
+        let found = percent(power.value);
+        let (text, help) = if power.value > most {
+            let most = percent(most);
+            let help = format!(
+                "write at most {most}, or allow more by `safety.frame_power` of the machine file"
+            );
+            (format!("a frame is shown with {most} of full power at most, not {found}"), help)
+        } else if power.value < least {
+            let least = percent(least);
+            let help = format!("write at least {least}, or leave it out: the frame is dark then");
+            (format!("the laser gives no less than {least} (`laser.min_power`), not {found}"), help)
+        } else {
+            return;
+        };
+        diagnostics.refuse(ProblemKind::OutOfRange, power.span, text, Some(help));
+    }
+
+    /// The frame that is shown instead of marking, if one is.
+    pub(super) fn frame(&self) -> Option<Frame> {
+        let power = self.frame_power.as_ref().map(|power| power.value);
+        let passes = self.frame_passes.value as u32;
+        self.frame.value.then_some(Frame { power, passes })
+    }
+
+    /// Notes that a job without a program has no lines to begin with.
+    pub(super) fn refuse_line(&self, diagnostics: &mut Diagnostics) {
+        if let Some(line) = &self.from_line {
+            let text = "`from_line` is for G-code programs, and this job has none".to_owned();
+            diagnostics.contradict(line.span, text, "write `from_stroke` to begin with a stroke");
+        }
+    }
+
+    /// The line of a program to begin with, if not the first.
+    pub(super) fn from_line(&self) -> Option<u64> {
+        let line = self.from_line.as_ref().map(|line| line.value as u64);
+        line.filter(|line| *line > 1)
     }
 
     /// How a job is marked that has no say of its own.
@@ -69,6 +138,8 @@ impl MarkingTable {
             turns: Turns::default(),
             frequency: self.frequency.as_ref().map(frequency::of),
             from_stroke: self.from_stroke.value as u64,
+            is_dry: self.dry_run.value,
+            frame: self.frame(),
         }
     }
 

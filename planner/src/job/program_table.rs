@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use super::file::Reading;
 use super::marking_table::MarkingTable;
 use super::{Job, JobError, gcode};
-use crate::drawing::Drawing;
+use crate::drawing::{Drawing, Note};
 
 machine::dialect_table! {
     /// A G-code program.
@@ -54,7 +54,7 @@ pub(super) fn program(
 ) -> Result<Job, JobError> {
     let empty = Document::parse(&path.display().to_string(), "")?;
     let (table, mut diagnostics) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
-    table.marking.check(&machine.laser, &mut diagnostics);
+    table.marking.check(machine, &mut diagnostics);
     let words = table.gcode.over(machine.gcode.words);
     of_program(path, words, &table.marking, diagnostics, machine, most)
 }
@@ -75,14 +75,20 @@ fn of_program(
         );
     }
     diagnostics.finish(())?;
-    let (program, steps) = gcode::ProgramFile::open(path, words, machine, most)?;
+    let from_line = marking.from_line();
+    let (program, steps) = gcode::ProgramFile::open(path, words, from_line, machine, most)?;
     let survey = program.survey.clone();
+    let begins = from_line.map(|line| Note {
+        line,
+        text: "begins with this line, as the job says, with all that the lines before it leave in force"
+            .to_owned(),
+    });
     let rest = if steps.is_none() { Some(program) } else { None };
     let drawing = Drawing {
         name: gcode::name(&path.display().to_string()),
         start: Vector3::from(machine.home),
         steps: steps.unwrap_or_default(),
-        notes: survey.notes.clone(),
+        notes: begins.into_iter().chain(survey.notes.iter().cloned()).collect(),
     };
     Ok(Job {
         program: Some(survey.facts),

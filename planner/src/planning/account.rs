@@ -1,6 +1,7 @@
 //! What is told of the windows so far.
 
 use machine::Mechanism;
+use messages::plan::Bounds;
 use nalgebra::Vector3;
 
 use super::path_run::PathRun;
@@ -57,6 +58,16 @@ pub(crate) struct Account {
     /// Length that is marked [m], and the number of lines and dots.
     pub(crate) length: f64,
     pub(crate) strokes: u64,
+    /// The box around all that is marked.
+    pub(crate) bounds: Option<Bounds>,
+    /// Least and largest power of the laser [fraction of full scale].
+    pub(crate) power: Option<[f64; 2]>,
+}
+
+/// Takes a power into a range of them.
+pub(super) fn widen(range: &mut Option<[f64; 2]>, power: f64) {
+    let [least, most] = range.unwrap_or([power; 2]);
+    *range = Some([least.min(power), most.max(power)]);
 }
 
 impl Account {

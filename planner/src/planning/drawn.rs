@@ -4,6 +4,7 @@ use machine::Mechanism;
 use messages::artwork::{Artwork, ArtworkLine, Stroke};
 use nalgebra::Vector3;
 
+use super::account::widen;
 use super::{Draft, Planning};
 use crate::geometry::contour::Contour;
 
@@ -19,6 +20,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         draft.length += contour.lit_length();
         for demand in contour.demands().iter().filter(|demand| demand.power > 0.0) {
             draft.asked.add(self.task.speeds.asked(demand.speed), demand.line);
+            widen(&mut draft.power, demand.power);
         }
     }
 }

@@ -4,9 +4,11 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use machine::PathLimits;
+
 use crate::drawing::{Note, Step};
 use crate::error::{Place, PlanError};
-use crate::geometry::contour::Contour;
+use crate::geometry::contour::{Contour, GAP};
 use crate::geometry::operation::{OffSurface, Operation, OperationKind};
 use crate::geometry::operations::Operations;
 use crate::job::JobError;
@@ -22,21 +24,31 @@ pub(crate) struct OperationQueue<'a> {
     /// The number of the first operation that is still here.
     first: usize,
     is_read: bool,
+    /// What is passed over, until the stroke to begin with comes.
+    passes: Option<Passing>,
+}
+
+/// Passes over what comes before a stroke.
+struct Passing {
     /// The stroke to begin with, from 1, and how many have been passed over.
     begins: u64,
     passed: u64,
+    /// Whether the last path was lit at its end.
+    was_lit: bool,
+    limits: PathLimits,
 }
 
 impl<'a> OperationQueue<'a> {
     /// Of `steps`, which `operations` takes.
     pub(crate) fn new(steps: Steps<'a>, operations: Operations<'a>) -> Self {
         let made = VecDeque::new();
-        Self { steps, operations, made, first: 0, is_read: false, begins: 1, passed: 0 }
+        Self { steps, operations, made, first: 0, is_read: false, passes: None }
     }
 
-    /// Begins with the path that has this stroke, from 1, in it; what is marked before is left out.
-    pub(crate) fn beginning_with(self, begins: u64) -> Self {
-        Self { begins, ..self }
+    /// Begins with this stroke, from 1; what is marked before is left out. `limits` are those of paths.
+    pub(crate) fn beginning_with(self, begins: u64, limits: &PathLimits) -> Self {
+        let passes = Passing { begins, passed: 0, was_lit: false, limits: *limits };
+        Self { passes: (begins > 1).then_some(passes), ..self }
     }
 
     /// The operation with this number, from 0; `None` behind the last.
@@ -85,13 +97,25 @@ impl<'a> OperationQueue<'a> {
     fn make(&mut self) -> Result<Option<Operation>, PlanError> {
         loop {
             if let Some(operation) = self.operations.next() {
-                if self.is_passed_over(&operation) {
-                    continue;
+                match &mut self.passes {
+                    None => return Ok(Some(operation)),
+                    Some(passing) => match passing.pass(operation) {
+                        Passed::Over => continue,
+                        Passed::On(operation) => return Ok(Some(operation)),
+                        Passed::Begun(operation) => {
+                            self.passes = None;
+                            return Ok(Some(operation));
+                        }
+                    },
                 }
-                return Ok(Some(operation));
             }
             if self.is_read {
-                return Ok(None);
+                return match &self.passes {
+                    None => Ok(None),
+                    Some(Passing { begins, passed, .. }) => {
+                        Err(PlanError::NoStroke { asked: *begins, strokes: *passed })
+                    }
+                };
             }
             match self.steps.next() {
                 Some(step) => {
@@ -107,26 +131,48 @@ impl<'a> OperationQueue<'a> {
     }
 }
 
-impl OperationQueue<'_> {
-    /// Whether an operation comes before the stroke to begin with; outputs and frequencies are set all the
-    /// same.
-    fn is_passed_over(&mut self, operation: &Operation) -> bool {
-        if self.passed + 1 >= self.begins {
-            return false;
+/// What comes of an operation before the stroke to begin with.
+enum Passed {
+    /// It is left out.
+    Over,
+    /// It is done all the same.
+    On(Operation),
+    /// It begins with the stroke.
+    Begun(Operation),
+}
+
+impl Passing {
+    fn pass(&mut self, operation: Operation) -> Passed {
+        let line = operation.line;
+        match &operation.kind {
+            OperationKind::Output { .. } | OperationKind::Frequency(_) => Passed::On(operation),
+            OperationKind::Rapid(_) | OperationKind::Rest(_) | OperationKind::Pause => Passed::Over,
+            OperationKind::Dot(_) => {
+                self.passed += 1;
+                if self.passed == self.begins { Passed::Begun(operation) } else { Passed::Over }
+            }
+            OperationKind::Path(contour) => {
+                let was_lit = self.was_lit && contour.goes_on_from_before();
+                self.was_lit = contour.ends_lit();
+                let before = (self.begins - self.passed - 1) as usize;
+                let Some(demand) = contour.strokes(was_lit).nth(before) else {
+                    self.passed += contour.strokes(was_lit).count() as u64;
+                    return Passed::Over;
+                };
+                if demand.from <= GAP && !contour.goes_on_from_before() {
+                    return Passed::Begun(operation);
+                }
+                let line = if demand.line == 0 { line } else { demand.line };
+                match contour.rest_from(demand.from, &self.limits) {
+                    Some(rest) => {
+                        let kind = OperationKind::Path(Arc::new(rest));
+                        Passed::Begun(Operation { kind, line })
+                    }
+                    // Shorter than anything that is marked.
+                    None => Passed::Over,
+                }
+            }
         }
-        let strokes = match &operation.kind {
-            OperationKind::Output { .. } | OperationKind::Frequency(_) => return false,
-            OperationKind::Path(contour) => contour.strokes(),
-            OperationKind::Dot(_) => 1,
-            OperationKind::Rapid(_) | OperationKind::Rest(_) | OperationKind::Pause => 0,
-        };
-        if strokes > 0 && self.passed + strokes >= self.begins {
-            // The next ones are all marked.
-            self.begins = 0;
-            return false;
-        }
-        self.passed += strokes;
-        true
     }
 }
 

@@ -2,7 +2,7 @@
 //! not taken again when the override rises.
 
 use machine::{Machine, Mechanism, MechanismVisitor, PathLimits};
-use messages::plan::PlanFacts;
+use messages::plan::{LayerFacts, PlanFacts};
 
 use super::ahead::Ahead;
 use super::open_speeds::{all, held, leaves_speeds_open};
@@ -15,7 +15,8 @@ use crate::drawing::Note;
 use crate::error::PlanError;
 use crate::geometry::attitude::AttitudeLaw;
 use crate::geometry::operations::Operations;
-use crate::job::Job;
+use crate::job::composition::Composition;
+use crate::job::{Job, JobError};
 use crate::joint_space::directions::directions_near;
 use crate::law::optimum::Speeds;
 use crate::limits::motion_limits::Scope;
@@ -36,21 +37,10 @@ pub(crate) fn plan_windows(
         return Err(PlanError::IdealOnly(reason));
     }
     let drawing = &job.drawing;
-    let limits = PathLimits {
-        rapid: job.rapid.unwrap_or(machine.path.rapid),
-        tolerance: job.marking.tolerance.unwrap_or(machine.path.tolerance),
-        ..machine.path
-    };
-    let operations = || {
-        Operations::new(drawing.start, &limits, machine.corners, job.surface.as_ref()).lit_by(
-            machine.laser,
-            machine.realtime.period,
-            job.marking,
-        )
-    };
+    let limits = path_limits(machine, job);
     let mut notes = drawing.notes.clone();
     let open = if leaves_speeds_open(job) {
-        all(OperationQueue::new(held(job), operations()))?
+        all(OperationQueue::new(held(job), of_steps(machine, job, &limits)))?
     } else {
         Vec::new()
     };
@@ -75,39 +65,77 @@ pub(crate) fn plan_windows(
         standing,
         frequency: job.marking.frequency.unwrap_or(0.0),
         estimate,
+        is_dry: job.marking.is_dry,
         start: drawing.start,
     };
-    let steps: Steps<'_> = Box::new(
-        job.steps()
-            .map_err(|error| PlanError::Unreadable { line: 0, message: error.to_string() })?,
-    );
-    let source = OperationQueue::new(steps, operations()).beginning_with(job.marking.from_stroke);
+    let source = operations(machine, job, &limits)?;
     if job.marking.from_stroke > 1 {
         let text = format!("begins with stroke {}, as the job says", job.marking.from_stroke);
         notes.push(Note { line: 0, text });
+    }
+    if job.marking.is_dry {
+        notes.push(Note { line: 0, text: "dry run: the whole motion, and nothing lit".to_owned() });
     }
     let nothing = match job.program {
         Some(_) => "nothing is marked: no G1, G2 or G3 is made with M3 or M4 on and S above 0",
         None => "nothing is marked",
     };
-    let facts = Facts { name: &drawing.name, notes, nothing };
+    let is_dark = job.marking.is_dry || job.marking.frame.is_some();
+    let layers = job.composition.as_ref().map(Composition::layers).unwrap_or_default();
+    let facts = Facts { name: &drawing.name, notes, is_dark, nothing, layers };
     let done = machine.mechanism.visit(Run { task: &task, source, stream, outlet, facts });
     done.map_err(|error| at_its_step(error, job))
+}
+
+/// The limits of `machine` along paths, as `job` has them.
+pub(crate) fn path_limits(machine: &Machine, job: &Job) -> PathLimits {
+    PathLimits {
+        rapid: job.rapid.unwrap_or(machine.path.rapid),
+        tolerance: job.marking.tolerance.unwrap_or(machine.path.tolerance),
+        ..machine.path
+    }
+}
+
+/// What `job` does on `machine`, from the stroke on that it begins with.
+///
+/// # Errors
+/// A job whose file cannot be opened.
+pub(crate) fn operations<'a>(
+    machine: &Machine,
+    job: &'a Job,
+    limits: &PathLimits,
+) -> Result<OperationQueue<'a>, PlanError> {
+    let unreadable =
+        |error: JobError| PlanError::Unreadable { line: 0, message: error.to_string() };
+    let steps: Steps<'a> = Box::new(job.steps().map_err(unreadable)?);
+    let queue = OperationQueue::new(steps, of_steps(machine, job, limits));
+    Ok(queue.beginning_with(job.marking.from_stroke, limits))
+}
+
+/// What makes operations of the steps of `job`.
+fn of_steps<'a>(machine: &Machine, job: &'a Job, limits: &PathLimits) -> Operations<'a> {
+    let (start, surface) = (job.drawing.start, job.surface.as_ref());
+    let operations = Operations::new(start, limits, machine.corners, surface);
+    operations.lit_by(machine.laser, machine.realtime.period, job.marking)
 }
 
 /// What of the facts is known beforehand.
 struct Facts<'a> {
     name: &'a str,
     notes: Vec<Note>,
+    /// Whether it is meant to mark nothing.
+    is_dark: bool,
     /// The note of a job that marks nothing.
     nothing: &'static str,
+    layers: Vec<LayerFacts>,
 }
 
 impl Facts<'_> {
     fn of<const N: usize, M: Mechanism<N>>(&self, planning: &Planning<'_, N, M>) -> PlanFacts {
         let account = &planning.account;
         let mut notes = [self.notes.clone(), planning.notes()].concat();
-        if account.strokes == 0 && planning.is_complete() {
+        let is_dry = planning.task.is_dry;
+        if account.strokes == 0 && !self.is_dark && planning.is_complete() {
             notes.push(Note { line: 0, text: self.nothing.to_owned() });
         }
         PlanFacts {
@@ -121,6 +149,10 @@ impl Facts<'_> {
             speed: account.speed,
             speed_asked: account.asked.speed,
             speed_limit: planning.task.speeds.most,
+            power: account.power,
+            bounds: account.bounds,
+            dry_run: is_dry,
+            layers: self.layers.clone(),
             notes,
             uses: planning.utilization().clone(),
             interpolation: planning.interpolation(),

@@ -4,6 +4,7 @@ use machine::Mechanism;
 use messages::time::SETPOINT_TIME;
 use nalgebra::Vector3;
 
+use super::account::widen;
 use super::refusals::too_short;
 use super::{Draft, Planning, drawn};
 use crate::error::PlanError;
@@ -71,6 +72,8 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
                 let light = &mut self.front.light;
                 light.dot(start, &dot.exposures, operation.line).map_err(too_short)?;
                 draft.strokes.push(drawn::dot(&dot.at, operation.line));
+                let powers = dot.exposures.iter().map(|(_, power)| *power);
+                powers.for_each(|power| widen(&mut draft.power, power));
                 let time = dot.exposures.iter().map(|(time, _)| time).sum();
                 self.front.estimated += time;
                 self.stand(time, draft);

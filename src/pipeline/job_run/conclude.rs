@@ -11,7 +11,7 @@ use runtime::domain::Role;
 use runtime::{message, signal};
 
 use super::JobRun;
-use crate::exit::error_summary;
+use crate::exit::{error_summary, other_errors};
 use crate::pipeline::POLL_INTERVAL;
 
 /// How long the monitor may take to complete its recording, on a loaded computer or a slow disk.
@@ -39,6 +39,7 @@ impl JobRun<'_> {
         self.run_outcome.outcome = Some(Outcome::Refused);
         self.run_outcome.error = Some(error_summary(&refusal));
         self.note_refused_place();
+        self.run_outcome.others = other_errors(&refusal).collect();
     }
 
     pub(super) fn conclude(mut self) -> Summary {

@@ -42,6 +42,12 @@ impl Contour {
         part.map(|part| Self { joint, turning, ..part })
     }
 
+    /// What is left of it from a place on [m], as a path that goes on from no other.
+    pub(crate) fn rest_from(&self, place: f64, limits: &PathLimits) -> Option<Self> {
+        let rest = self.part(place, self.length, limits)?;
+        Some(Self { joint: None, ..rest })
+    }
+
     fn turning_from(&self, place: f64) -> Option<(Arc<Turning>, f64)> {
         self.turning.as_ref().map(|(turning, from)| (turning.clone(), from + place))
     }

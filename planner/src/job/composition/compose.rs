@@ -68,6 +68,8 @@ pub(in crate::job) fn compose(
         let layer = layer_of(table, &layers, diagnostics);
         let count = placement::count(table, diagnostics);
         let Some(serial) = serial(table, folder, count, diagnostics) else { continue };
+        let csv = table.serial.as_ref().and_then(|serial| serial.csv.as_ref());
+        files.extend(csv.map(|file| folder.join(&file.value)));
         let Some(source) = Source::of(part, folder, diagnostics) else { continue };
         files.extend(source.file().map(Path::to_owned));
         let first = source.graphic(&serial, 0, diagnostics)?;
@@ -126,7 +128,8 @@ pub(in crate::job) fn compose(
         for (layer, content) in contents {
             let of_file = match layer {
                 Layer::Declared(index) => {
-                    sections.extend(maker.section(content, &declared[index]));
+                    let name = layers.names().nth(index).map(str::to_owned);
+                    sections.extend(maker.section(name, content, &declared[index]));
                     continue;
                 }
                 Layer::OfFile(drawing, index) => {
@@ -137,7 +140,8 @@ pub(in crate::job) fn compose(
             };
             let way =
                 recipe(None, of_file, &parts.defaults, machine, diagnostics, &mut maker.notes);
-            sections.extend(maker.section(content, &way));
+            let name = of_file.map(|(file, _)| file.name.clone());
+            sections.extend(maker.section(name, content, &way));
         }
     }
     maker.note_saved();
@@ -193,7 +197,7 @@ pub(super) struct Maker {
 
 impl Maker {
     /// What is on a layer: images, then fills, then lines.
-    fn section(&mut self, content: Content, way: &Way) -> Option<Section> {
+    fn section(&mut self, layer: Option<String>, content: Content, way: &Way) -> Option<Section> {
         let mut marks = Vec::new();
         for Drawn { shape, height, line } in content.images {
             match Rows::new(shape, &way.image) {
@@ -212,7 +216,7 @@ impl Maker {
         if let Some(last) = marks.last() {
             self.at = last.shape.ends()[1];
         }
-        (!marks.is_empty()).then_some(Section { recipe: way.recipe, marks })
+        (!marks.is_empty()).then_some(Section { layer, recipe: way.recipe, marks })
     }
 
     /// Contours in the order of marking.
@@ -285,7 +289,7 @@ impl Maker {
             line: 0,
             text: "only the frame is shown, nothing else marked".to_owned(),
         });
-        Some(Section { recipe, marks: vec![Mark { shape, height, line: 0 }] })
+        Some(Section { layer: None, recipe, marks: vec![Mark { shape, height, line: 0 }] })
     }
 
     /// Tells how much way in the dark the order saves.

@@ -213,6 +213,24 @@ impl Interpreter {
         &mut self.modal
     }
 
+    /// Begins the drawing here, where the lines before have led to, with all that they have left in force: in
+    /// the dark, by a free move to this place.
+    pub(super) fn begin_here(&mut self) {
+        let Self { modal, tracer, .. } = self;
+        self.zeros = Zeros::None;
+        tracer.begin_here(|tracer| {
+            if modal.corners != Corners::AsMachine {
+                tracer.push(Action::Corners(modal.corners));
+            }
+            if let Corners::Blend(Some(tolerance)) = modal.corners {
+                tracer.tolerance = tolerance;
+            }
+            for bit in (0..u64::BITS).filter(|bit| modal.outputs >> bit & 1 == 1) {
+                tracer.push(Action::Output { bit, on: true });
+            }
+        });
+    }
+
     /// Whether coordinates are absolute.
     pub(super) fn is_absolute(&self) -> bool {
         self.modal.distance == Reference::Absolute

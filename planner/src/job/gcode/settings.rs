@@ -20,6 +20,8 @@ pub(super) struct ReaderSettings {
     pub(super) rapid: f64,
     /// Lines that a program with loops may go through: one that goes through more has no end.
     pub(super) most_lines: u64,
+    /// The line to begin with, if it is not the first.
+    pub(super) from_line: Option<u64>,
 }
 
 /// [`ReaderSettings::most_lines`].
@@ -34,6 +36,7 @@ impl ReaderSettings {
             mark_speed: machine.path.speed,
             rapid: machine.path.rapid,
             most_lines: MOST_LINES,
+            from_line: None,
         };
         settings.with_words(machine.gcode.words)
     }

@@ -41,6 +41,8 @@ pub struct Steps<R> {
     tape: bool,
     /// A tape mark inside a program that none has begun, before any words after it.
     stray_mark: Option<u64>,
+    /// The line to begin with, as long as it has not come.
+    awaited: Option<u64>,
 }
 
 /// What a line turned out to be.
@@ -85,6 +87,7 @@ impl<R: Read> Steps<R> {
             error: None,
             tape: false,
             stray_mark: None,
+            awaited: settings.from_line,
         }
     }
 
@@ -99,6 +102,7 @@ impl<R: Read> Steps<R> {
             if let Err(stop) = self.read_line() {
                 return Err(Errors::find(self, stop));
             }
+            self.pass_over_before()?;
             let tracer = &mut self.interpreter.tracer;
             if self.read > most {
                 dropped += tracer.steps.len();
@@ -137,6 +141,10 @@ impl<R: Read> Steps<R> {
         }
         if self.flow.is_holding() {
             self.flow.pass()?;
+        }
+        if self.awaited == Some(self.lines.number()) {
+            self.awaited = None;
+            self.interpreter.begin_here();
         }
         match self.gather()? {
             Gathered::Block if self.block.begun => self.execute(),
@@ -217,6 +225,26 @@ impl<R: Read> Steps<R> {
     fn end(&mut self) {
         self.ended = true;
         self.interpreter.finish();
+    }
+
+    /// Lets go of what is drawn before the line to begin with.
+    fn pass_over_before(&mut self) -> Result<(), Box<GcodeError>> {
+        let Some(awaited) = self.awaited else { return Ok(()) };
+        self.interpreter.tracer.steps.clear();
+        if !self.ended {
+            return Ok(());
+        }
+        let last = self.lines.number();
+        let message = if awaited > last {
+            format!("there is no line {awaited} to begin with: the program ends at line {last}")
+        } else {
+            format!(
+                "line {awaited} to begin with is not run: the program passes over it and ends at line \
+                 {last}"
+            )
+        };
+        let help = format!("give `from_line` as a whole number from 1 to {last}");
+        Err(self.refuse(*Refusal::new(0..0, message, "the last line", help)))
     }
 
     /// The error of a stop.
@@ -327,7 +355,8 @@ impl<R: Read> Iterator for Steps<R> {
             self.taken = 0;
             self.interpreter.tracer.steps.clear();
             while !self.ended && self.interpreter.tracer.steps.len() < BATCH {
-                self.error = self.read_line().err().map(|stop| self.error(stop));
+                let read = self.read_line().map_err(|stop| self.error(stop));
+                self.error = read.and_then(|()| self.pass_over_before()).err();
             }
         }
         match self.interpreter.tracer.steps.get(self.taken) {

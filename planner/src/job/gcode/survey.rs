@@ -8,6 +8,7 @@ use std::time::SystemTime;
 
 use machine::Machine;
 use machine::gcode_settings::WordMeanings;
+use nalgebra::Vector3;
 
 use super::settings::ReaderSettings;
 use super::steps::Steps;
@@ -34,6 +35,22 @@ pub struct ProgramFacts {
     pub lower: [f64; 3],
     /// Upper corner of that box [m].
     pub upper: [f64; 3],
+}
+
+impl ProgramFacts {
+    /// Of a program that has not moved from `place` yet.
+    pub(super) fn at(place: Vector3<f64>) -> Self {
+        Self {
+            blocks: 0,
+            feed_length: 0.0,
+            rapid_length: 0.0,
+            mark_length: 0.0,
+            power: None,
+            end: [0.0; 3],
+            lower: place.into(),
+            upper: place.into(),
+        }
+    }
 }
 
 /// What the first reading of a program finds.
@@ -63,7 +80,7 @@ pub struct Survey {
 /// Where it cannot be read; the first thing that is not G-code, not supported here, or contradicts
 /// itself, and with it what else is wrong further down.
 pub fn survey(path: &Path, machine: &Machine) -> Result<Survey, JobError> {
-    let (program, _) = ProgramFile::open(path, machine.gcode.words, machine, 0)?;
+    let (program, _) = ProgramFile::open(path, machine.gcode.words, None, machine, 0)?;
     Ok(program.survey)
 }
 
@@ -81,18 +98,21 @@ pub struct ProgramFile {
 pub type FileSteps = Steps<Watched>;
 
 impl ProgramFile {
-    /// Reads the program at `path` through, whose words mean what `words` say. Gives back its steps too if
-    /// it has no more than `most` lines, and always if it is no regular file, which can be read only once.
+    /// Reads the program at `path` through, whose words mean what `words` say and of which no line is done
+    /// before `from_line`. Gives back its steps too if it has no more than `most` lines, and always if it is
+    /// no regular file, which can be read only once.
     ///
     /// # Errors
     /// As of [`survey`].
     pub(in crate::job) fn open(
         path: &Path,
         words: WordMeanings,
+        from_line: Option<u64>,
         machine: &Machine,
         most: u64,
     ) -> Result<(Self, Option<Vec<Step>>), JobError> {
-        let settings = ReaderSettings::of(machine).with_words(words);
+        let settings =
+            ReaderSettings { from_line, ..ReaderSettings::of(machine).with_words(words) };
         let watched = Watched::open(path)?;
         let stamp = watched.stamp;
         let most = if stamp.is_some() { most } else { u64::MAX };

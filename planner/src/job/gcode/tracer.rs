@@ -31,6 +31,8 @@ pub(super) struct Feed {
 /// Where a program is, what it has drawn, and its extent so far.
 #[derive(Debug)]
 pub(super) struct Tracer {
+    /// Where programs start [m].
+    home: Vector3<f64>,
     /// The height of everything drawn when Z is ignored [m].
     height: Option<f64>,
     /// Line of the file that asks for what comes, from 1.
@@ -53,27 +55,29 @@ pub(super) struct Tracer {
 impl Tracer {
     pub(super) fn new(settings: &ReaderSettings) -> Self {
         let home = settings.home;
-        let start = home.into();
         Self {
+            home,
             height: (settings.gcode.z == ZMeaning::Ignored).then_some(home.z),
             line: 0,
             position: home,
             tool: home,
             steps: Vec::new(),
-            facts: ProgramFacts {
-                blocks: 0,
-                feed_length: 0.0,
-                rapid_length: 0.0,
-                mark_length: 0.0,
-                power: None,
-                end: [0.0; 3],
-                lower: start,
-                upper: start,
-            },
+            facts: ProgramFacts::at(home),
             time: 0.0,
             tolerance: 0.0,
             fastest: [settings.mark_speed, settings.rapid],
         }
+    }
+
+    /// Forgets what has been drawn, and goes from home to the present place instead, after what `set_up`
+    /// adds.
+    pub(super) fn begin_here(&mut self, set_up: impl FnOnce(&mut Self)) {
+        let to = self.position;
+        self.steps.clear();
+        (self.facts, self.time, self.tolerance) = (ProgramFacts::at(self.home), 0.0, 0.0);
+        self.jump(self.home);
+        set_up(self);
+        self.rapid(to);
     }
 
     /// Adds a step that belongs to the line being read.
