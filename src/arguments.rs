@@ -1,6 +1,7 @@
 //! The command line.
 
 mod bench;
+mod doctor;
 mod examples;
 mod offset;
 mod operating;
@@ -9,13 +10,17 @@ mod pipeline;
 mod planning;
 mod queue;
 mod serve;
+#[cfg(feature = "watch")]
+mod watch;
 mod workbench;
 
 pub use self::workbench::{
     CalibrateArguments, CalibratePart, CompareArguments, FiguresArguments, MachineCommand,
-    NewArguments, SizeArguments, SizeGears, SizeOrder, TableFormat, TablesArguments,
+    NewArguments, ProfileArguments, SizeArguments, SizeGears, SizeOrder, TableFormat,
+    TablesArguments,
 };
 pub use bench::{BenchArguments, BenchCommand, LatencyArguments, PlanBenchArguments};
+pub use doctor::DoctorArguments;
 pub use offset::{OffsetArguments, OffsetClearArguments, OffsetCommand, OffsetPlace};
 pub use operating::{
     HomeArguments, InputArguments, InputLevel, JogArguments, OutputArguments, ProbeArguments,
@@ -33,13 +38,15 @@ pub use planning::{
 
 pub use queue::{QueueCommand, QueueJobArguments, QueueMoveArguments};
 pub use serve::{AccessArguments, ServeArguments};
+#[cfg(feature = "watch")]
+pub use watch::WatchArguments;
 
 use crate::exit;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use examples::{
-    CALIBRATE_EXAMPLES, CHECK_EXAMPLES, COMPARE_EXAMPLES, EXPORT_EXAMPLES, FIGURES_EXAMPLES,
-    KINEMATICS_EXAMPLES, PLAN_EXAMPLES, QUEUE_EXAMPLES, RUN_EXAMPLES, SERVE_EXAMPLES, SERVICES,
-    SIMULATE_EXAMPLES, SIZE_EXAMPLES, SUBMIT_EXAMPLES, TABLES_EXAMPLES,
+    CALIBRATE_EXAMPLES, CHECK_EXAMPLES, COMPARE_EXAMPLES, DOCTOR_EXAMPLES, EXPORT_EXAMPLES,
+    FIGURES_EXAMPLES, KINEMATICS_EXAMPLES, PLAN_EXAMPLES, QUEUE_EXAMPLES, RUN_EXAMPLES,
+    SERVE_EXAMPLES, SERVICES, SIMULATE_EXAMPLES, SIZE_EXAMPLES, SUBMIT_EXAMPLES, TABLES_EXAMPLES,
 };
 use std::path::PathBuf;
 
@@ -88,6 +95,9 @@ pub enum Command {
     /// Measure this PC: latencies, planning speed, simulation speed.
     #[command(subcommand)]
     Bench(BenchCommand),
+    /// Say whether this PC is fit for real time, and what to change.
+    #[command(after_help = DOCTOR_EXAMPLES)]
+    Doctor(DoctorArguments),
     /// Hand a job to a pipeline that `graver domain` holds, and follow it to its end.
     #[command(after_help = SUBMIT_EXAMPLES)]
     Submit(SubmitArguments),
@@ -125,6 +135,10 @@ pub enum Command {
     Offset(OffsetCommand),
     /// Say what a running pipeline is doing, with the process ids of its services.
     Status(StatusArguments),
+    /// Show a running pipeline in the terminal, live, and operate it by keys.
+    #[cfg(feature = "watch")]
+    #[command(after_help = examples::WATCH_EXAMPLES)]
+    Watch(WatchArguments),
     /// Say what faults an instance had, also before its start, whether or not it runs.
     Faults(InstanceArguments),
     /// Compare machines on the same job: time, error, what their motors must give, stiffness, and who

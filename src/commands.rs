@@ -4,6 +4,7 @@ pub mod bench;
 pub mod calibrate;
 pub mod check;
 pub mod compare;
+pub mod doctor;
 pub mod export;
 pub mod faults;
 pub mod figures;
@@ -27,3 +28,5 @@ pub mod status;
 pub mod submit;
 pub mod tables;
 pub mod verify;
+#[cfg(feature = "watch")]
+pub mod watch;

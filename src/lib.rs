@@ -9,6 +9,7 @@ pub mod commands;
 pub mod exit;
 pub mod files;
 pub mod inputs;
+pub mod notify;
 pub mod output;
 pub mod pipeline;
 
@@ -16,8 +17,8 @@ use ::operator::Verb;
 use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
-    bench, calibrate, check, compare, export, faults, figures, kinematics, machine, manual, offset,
-    operating, operator, plan, queue, run, serve, service, simulate, size, status, submit, tables,
+    bench, calibrate, check, compare, doctor, export, faults, figures, kinematics, machine, manual,
+    offset, operating, operator, plan, queue, run, serve, service, simulate, size, status, submit, tables,
     verify,
 };
 use exit::{Exit, Failure};
@@ -49,9 +50,11 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Calibrate(arguments) => calibrate::run(arguments),
         Command::Figures(arguments) => figures::run(arguments),
         Command::Machine(MachineCommand::New(arguments)) => machine::new(arguments),
+        Command::Machine(MachineCommand::Export(arguments)) => machine::export::export(arguments),
         Command::Bench(BenchCommand::Latency(arguments)) => bench::latency::run(arguments),
         Command::Bench(BenchCommand::Plan(arguments)) => bench::planning::run(arguments),
         Command::Bench(BenchCommand::Simulate(arguments)) => bench::simulate(arguments),
+        Command::Doctor(arguments) => doctor::run(arguments),
         Command::Submit(arguments) => submit::run(arguments),
         Command::Queue(command) => queue::run(command),
         Command::Hold(arguments) => operator::verb(Verb::Hold, arguments),
@@ -69,6 +72,8 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Output(arguments) => operating::output(arguments),
         Command::Offset(command) => offset::run(command),
         Command::Status(arguments) => status::run(arguments),
+        #[cfg(feature = "watch")]
+        Command::Watch(arguments) => commands::watch::run(arguments),
         Command::Faults(arguments) => faults::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Tables(arguments) => tables::run(arguments),
@@ -96,6 +101,8 @@ fn wants_json(command: &Command) -> bool {
         Command::Calibrate(arguments) => arguments.json,
         Command::Figures(arguments) => arguments.json,
         Command::Machine(MachineCommand::New(arguments)) => arguments.json,
+        Command::Machine(MachineCommand::Export(arguments)) => arguments.json,
+        Command::Doctor(arguments) => arguments.json,
         Command::Submit(arguments) => arguments.instance.json,
         Command::Compare(arguments) => arguments.json,
         Command::Tables(arguments) => arguments.json,

@@ -34,7 +34,7 @@ use queue::JobQueue;
 use runtime::domain::Role;
 use runtime::operator::{OperatorError, OperatorLink};
 use runtime::peer::Peer;
-use runtime::{Domain, DomainError, Instance, Publisher, Samples, Subscriber, message};
+use runtime::{Domain, DomainError, Instance, Publisher, Samples, Subscriber, heartbeat, message};
 use services::{Ended, Recovery, Services};
 use serving::Serving;
 use status::StatusBoard;
@@ -232,6 +232,7 @@ impl Pipeline {
     /// # Errors
     /// A channel that fails.
     pub fn poll(&mut self) -> Result<Vec<Ended>, Failure> {
+        heartbeat::beat();
         // An offer is published once: a service that was started again has not heard it.
         self.offers.greet().map_err(Failure::service)?;
         let inputs = SimulatedInputs { inputs: self.inputs.load(Ordering::Relaxed) };

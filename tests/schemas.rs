@@ -11,10 +11,12 @@ use graver::commands::bench::SpeedReport;
 use graver::commands::bench::latency::{LatencyReport, RatesReport};
 use graver::commands::bench::planning::PlanBenchReport;
 use graver::commands::check::CheckReport;
+use graver::commands::doctor::DoctorReport;
 use graver::commands::faults::FaultsReport;
 use graver::commands::figures::FiguresReport;
 use graver::commands::kinematics::lines::Reply;
 use graver::commands::machine::NewReport;
+use graver::commands::machine::export::ProfileReport;
 use graver::commands::motion::MotionReply;
 use graver::commands::offset::OffsetsReport;
 use graver::commands::plan::PlanReport;
@@ -34,11 +36,13 @@ fn schemas() -> Vec<(&'static str, Schema)> {
         ("calibrate", schema_for!(CalibrationReport)),
         ("check", schema_for!(CheckReport)),
         ("compare", schema_for!(Comparison)),
+        ("doctor", schema_for!(DoctorReport)),
         ("faults", schema_for!(FaultsReport)),
         ("figures", schema_for!(FiguresReport)),
         ("kinematics", schema_for!(Reply)),
         ("latency", schema_for!(LatencyReport)),
         ("latency_rates", schema_for!(RatesReport)),
+        ("machine_export", schema_for!(ProfileReport)),
         ("machine_new", schema_for!(NewReport)),
         ("motion", schema_for!(MotionReply)),
         ("offsets", schema_for!(OffsetsReport)),

@@ -14,7 +14,7 @@ use machine::Machine;
 use messages::time::Period;
 use recorder::JobRecorder;
 use runtime::peer::{PeerState, Peers};
-use runtime::{Domain, Role, ServiceError, signal};
+use runtime::{Domain, Role, ServiceError, heartbeat, signal};
 use std::time::Duration;
 
 /// How often the service polls its channels.
@@ -32,8 +32,11 @@ pub fn run(domain: &Domain, machine: &Machine) -> Result<(), ServiceError> {
     let mut service = Service::open(domain, machine.realtime.period)?;
     while signal::termination().is_none() && service.has_supervisor() {
         service.poll()?;
+        heartbeat::beat();
         std::thread::sleep(POLL_INTERVAL);
     }
+    // A summary takes its time.
+    let _busy = heartbeat::busy();
     let polled = service.poll();
     let ended =
         if service.has_supervisor() { service.end() } else { service.conclude_alone(machine) };

@@ -20,7 +20,9 @@ use messages::{
 };
 use planning_thread::{Known, Planned, PlanningThread};
 use runtime::peer::{PeerState, Peers};
-use runtime::{Domain, Publisher, Role, Samples, ServiceError, Subscriber, clock, signal};
+use runtime::{
+    Domain, Publisher, Role, Samples, ServiceError, Subscriber, clock, heartbeat, signal,
+};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -38,6 +40,7 @@ pub fn run(domain: &Domain, machine: &Machine) -> Result<(), ServiceError> {
     let mut service = Service::open(domain, machine)?;
     while signal::termination().is_none() && service.peers.state(Role::Domain) != PeerState::Dead {
         service.turn()?;
+        heartbeat::beat();
         std::thread::sleep(POLL_INTERVAL);
     }
     Ok(())

@@ -20,6 +20,9 @@ pub mod core_lock;
 pub mod domain;
 #[cfg(feature = "embassy")]
 mod embassy_clock;
+pub mod ethtool;
+pub mod fitness;
+pub mod heartbeat;
 pub mod instance;
 mod lock;
 mod membership;

@@ -156,7 +156,7 @@ fn number_of(error: &io::Error) -> u32 {
 }
 
 /// SCHED_FIFO for the calling thread; threads and processes that it starts are ordinary again.
-fn set_fifo(priority: i32) -> io::Result<()> {
+pub(crate) fn set_fifo(priority: i32) -> io::Result<()> {
     let parameters = libc::sched_param { sched_priority: priority };
     let policy = libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK;
     // SAFETY: pid 0 is the calling thread; `parameters` is valid and only read.

@@ -78,6 +78,13 @@ Examples:
 The file is written only if `graver check` has nothing to say of it and its sample is marked in
 simulation. Where no motor is enough, speed or acceleration is lowered, and the file says so.";
 
+pub(super) const PROFILE_EXAMPLES: &str = "\
+Examples:
+  graver machine export --lbdev --machine mine.toml
+  graver machine export --rayforge --machine mine.toml --host laser.local --out my-laser
+
+Size, speeds, homing and the S word of full power are the machine file's.";
+
 pub(super) const CALIBRATE_EXAMPLES: &str = "\
 Examples:
   graver calibrate poses.csv --machine mine.toml --out calibrated.toml
@@ -130,6 +137,22 @@ Examples:
   graver domain --services --machine mine.toml --grbl 7123   the same in one command
 
 docs/grbl.md says how to connect each program, and what is supported.";
+
+pub(super) const DOCTOR_EXAMPLES: &str = "\
+Examples:
+  graver doctor                                     this PC, as this user
+  graver doctor --machine mine.toml --core 3        with its network card, for that CPU
+  sudo -u graver graver doctor --json               as the user of the services, for scripts
+
+It changes nothing. Exit code 1 where there is a problem; advice alone is 0.";
+
+#[cfg(feature = "watch")]
+pub(super) const WATCH_EXAMPLES: &str = "\
+Examples:
+  graver watch                                      the pipeline `default`
+  ssh -t laser sudo -u graver graver watch --instance cell1
+
+NO_COLOR=1 leaves colours away. Leaving the view changes nothing on the machine.";
 
 pub(super) const SERVICES: &str = "\
 Examples:

@@ -1,7 +1,7 @@
 //! Arguments of the workbench: machines, motors, figures and tables.
 
 use super::MachineArguments;
-use super::examples::NEW_EXAMPLES;
+use super::examples::{NEW_EXAMPLES, PROFILE_EXAMPLES};
 use ::workbench::new::Kind;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
@@ -147,6 +147,35 @@ pub enum MachineCommand {
     /// Write a commented machine file to start from, with motors from catalogues, and a sample job.
     #[command(after_help = NEW_EXAMPLES)]
     New(NewArguments),
+    /// Write a profile of a machine for LightBurn or Rayforge, which then send it jobs as to a grbl controller.
+    #[command(after_help = PROFILE_EXAMPLES)]
+    Export(ProfileArguments),
+}
+
+/// Arguments of `machine export`.
+#[derive(Debug, Clone, Args)]
+pub struct ProfileArguments {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub machine: MachineArguments,
+    /// For LightBurn: a file .lbdev.
+    #[arg(long, required_unless_present = "rayforge", conflicts_with = "rayforge")]
+    pub lbdev: bool,
+    /// For Rayforge: a folder with device.yaml and dialect.yaml.
+    #[arg(long)]
+    pub rayforge: bool,
+    /// The file, or the folder; without it named for the machine.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Where graver serve --grbl listens: the host, as that program reaches it.
+    #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
+    pub host: String,
+    /// And the port.
+    #[arg(long, value_name = "PORT", default_value_t = 7123)]
+    pub port: u16,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `machine new`. What is left out is asked for on a terminal.

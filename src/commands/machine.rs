@@ -1,5 +1,7 @@
 //! `graver machine new`: a commented machine file to start from, and a sample job.
 
+pub mod export;
+pub mod profile;
 mod questions;
 
 use self::questions::Questions;

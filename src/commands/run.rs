@@ -8,7 +8,7 @@ use crate::pipeline::configuration::Configuration;
 use crate::pipeline::job_run::{JobRun, job_name};
 use crate::pipeline::queue::Entry;
 use crate::pipeline::{JobSource, POLL_INTERVAL, Pipeline, ServiceOwner};
-use crate::{inputs, output};
+use crate::{inputs, notify, output};
 use monitor::run_folder::RunFolder;
 use runtime::{Instance, message, signal};
 use std::path::{Path, PathBuf};
@@ -82,7 +82,10 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
     let mut pipeline = Pipeline::start(&instance, &configuration, owner, JobSource::Submitted)?;
     pipeline.serve(&arguments.access)?;
     let awaited = if arguments.services { "jobs" } else { "its services and jobs" };
-    message::tell(&format!("instance {} waits for {awaited}", instance.name()));
+    let waits = format!("instance {} waits for {awaited}", instance.name());
+    message::tell(&waits);
+    notify::watch().map_err(Failure::service)?;
+    notify::ready(&waits);
     if let Some(why) = pipeline.queue.held() {
         let waiting = pipeline.queue.list().waiting.len();
         message::tell(&format!(
@@ -97,10 +100,13 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
             return Err(Failure::service(format!("{ended}; the pipeline ends")));
         }
         if let Some(entry) = pipeline.queue.begin_next(&pipeline.control) {
+            notify::status(&format!("job {}", entry.job.number));
             run_submission(&mut pipeline, &source, &entry);
+            notify::status(&waits);
         }
         std::thread::sleep(POLL_INTERVAL);
     }
+    notify::stopping();
     pipeline.shut_down();
     Ok(Exit::Done)
 }

@@ -3,6 +3,7 @@
 
 use crate::arguments::ServiceArguments;
 use crate::exit::{Exit, Failure};
+use crate::notify;
 use crate::pipeline::configuration::Configuration;
 use machine::Machine;
 use runtime::domain::Role;
@@ -18,6 +19,11 @@ pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
     let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
     let domain = Domain::join(&instance, role).map_err(Failure::service)?;
     let configuration = Configuration::read(&instance)?;
+    notify::ready(&format!("joined instance {}", instance.name()));
+    // Controller and drives are watched by each other, cycle by cycle, and start no thread for it.
+    if matches!(role, Role::Planner | Role::Monitor) {
+        notify::watch().map_err(Failure::service)?;
+    }
     match role {
         Role::Planner => planner::service::run(&domain, &configuration.machine()?),
         Role::Monitor => monitor::service::run(&domain, &configuration.machine()?),
@@ -39,5 +45,6 @@ pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
         Role::Domain | Role::Observer => Ok(()),
     }
     .map_err(Failure::service)?;
+    notify::stopping();
     Ok(Exit::Done)
 }

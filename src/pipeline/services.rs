@@ -223,6 +223,8 @@ pub(super) fn program() -> Result<Command, String> {
 fn spawn(domain: &Domain, role: Role) -> Result<ChildProcess, String> {
     let mut command = program()?;
     command.arg(role.name()).arg("--instance").arg(domain.instance().name());
+    // They are watched over here, not by systemd.
+    command.env_remove("NOTIFY_SOCKET").env_remove("WATCHDOG_USEC");
     command.stdin(std::process::Stdio::null()).stdout(std::process::Stdio::null());
     ChildProcess::spawn(domain, command).map_err(|error| format!("the {role}: {error}"))
 }

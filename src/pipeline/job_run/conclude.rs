@@ -8,7 +8,7 @@ use monitor::conclusion::RecordingState;
 use monitor::summary::{Outcome, Summary};
 use planner::request::Refusal;
 use runtime::domain::Role;
-use runtime::{message, signal};
+use runtime::{heartbeat, message, signal};
 
 use super::JobRun;
 use crate::exit::{error_summary, other_errors};
@@ -61,7 +61,10 @@ impl JobRun<'_> {
         }
         let machine = &self.pipeline.machine;
         self.run_outcome.warnings.splice(0..0, machine.job_warnings());
+        // Its report takes its time.
+        let busy = heartbeat::busy();
         let summary = conclusion::conclude(&self.folder, machine, &self.run_outcome, self.started);
+        drop(busy);
         self.pipeline.board.end_job();
         self.control.end();
         self.pipeline.queue.end(&summary);

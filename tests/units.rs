@@ -1,0 +1,156 @@
+//! The systemd units hold to what is wanted of them: the rights of each service, and what it may not do.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use std::collections::BTreeMap;
+
+/// The settings of a section of a unit, each with its values in order.
+type Section = BTreeMap<String, Vec<String>>;
+
+/// What no service may do.
+const HARDENED: &[(&str, &str)] = &[
+    ("NoNewPrivileges", "yes"),
+    ("CapabilityBoundingSet", ""),
+    ("ProtectSystem", "strict"),
+    ("ProtectHome", "yes"),
+    ("PrivateTmp", "yes"),
+    ("ProtectProc", "invisible"),
+    ("ProtectKernelTunables", "yes"),
+    ("ProtectKernelModules", "yes"),
+    ("ProtectKernelLogs", "yes"),
+    ("ProtectControlGroups", "yes"),
+    ("ProtectClock", "yes"),
+    ("ProtectHostname", "yes"),
+    ("RestrictNamespaces", "yes"),
+    ("RestrictSUIDSGID", "yes"),
+    ("LockPersonality", "yes"),
+    ("MemoryDenyWriteExecute", "yes"),
+    ("SystemCallArchitectures", "native"),
+    ("SystemCallFilter", "@system-service @resources"),
+    ("UMask", "0027"),
+    ("User", "graver"),
+    // The folder of shared memory must be the same for all, and for operators.
+    ("UnsetEnvironment", "XDG_RUNTIME_DIR"),
+    ("RemoveIPC", "no"),
+    ("StateDirectory", "graver"),
+];
+
+/// The sections of a unit file of `deploy`.
+fn sections(name: &str) -> BTreeMap<String, Section> {
+    let text = std::fs::read_to_string(support::source("deploy").join(name)).unwrap();
+    let mut sections = BTreeMap::<String, Section>::new();
+    let mut current = String::new();
+    for line in text.lines().map(str::trim) {
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        if let Some(section) = line.strip_prefix('[') {
+            current = section.strip_suffix(']').unwrap().to_owned();
+            continue;
+        }
+        let (key, value) = line.split_once('=').unwrap_or_else(|| panic!("{name}: {line}"));
+        let section = sections.entry(current.clone()).or_default();
+        section.entry(key.to_owned()).or_default().push(value.to_owned());
+    }
+    sections
+}
+
+/// The section `Service` of a service's unit.
+fn service(name: &str) -> Section {
+    sections(&format!("graver-{name}@.service"))["Service"].clone()
+}
+
+fn value<'a>(section: &'a Section, key: &str) -> &'a str {
+    section.get(key).map_or("", |values| values.last().unwrap())
+}
+
+#[test]
+fn every_service_is_hardened() {
+    for name in ["domain", "planner", "controller", "drives", "monitor", "serve"] {
+        let unit = service(name);
+        for (key, wanted) in HARDENED {
+            assert!(unit.contains_key(*key), "{name} lacks {key}");
+            assert_eq!(value(&unit, key), *wanted, "{name}: {key}");
+        }
+        let command = value(&unit, "ExecStart");
+        assert!(command.starts_with(&format!("graver {name} --instance %i")), "{name}: {command}");
+    }
+}
+
+#[test]
+fn only_the_page_reaches_a_network_and_only_the_cycle_a_priority() {
+    for name in ["domain", "planner", "monitor"] {
+        let unit = service(name);
+        for key in ["PrivateNetwork", "PrivateDevices", "RestrictRealtime"] {
+            assert_eq!(value(&unit, key), "yes", "{name}: {key}");
+        }
+        assert_eq!(value(&unit, "RestrictAddressFamilies"), "AF_UNIX");
+    }
+    for name in ["controller", "drives"] {
+        let unit = service(name);
+        assert_eq!((value(&unit, "LimitRTPRIO"), value(&unit, "LimitMEMLOCK")), ("90", "infinity"));
+        // Pipelines that share a CPU find each other by names of the network namespace.
+        assert!(!unit.contains_key("PrivateNetwork") && !unit.contains_key("RestrictRealtime"));
+        assert_eq!(value(&unit, "IPAddressDeny"), "any");
+        assert_eq!(value(&unit, "RestrictAddressFamilies"), "AF_UNIX");
+        assert_eq!(value(&unit, "DevicePolicy"), "closed");
+        assert_eq!(value(&unit, "DeviceAllow"), "/dev/cpu_dma_latency rw");
+    }
+    let page = service("serve");
+    assert_eq!(value(&page, "RestrictAddressFamilies"), "AF_UNIX AF_INET AF_INET6");
+    assert_eq!(
+        (value(&page, "IPAddressDeny"), value(&page, "IPAddressAllow")),
+        ("any", "localhost")
+    );
+    assert_eq!(value(&page, "RestrictRealtime"), "yes");
+}
+
+#[test]
+fn services_say_when_they_are_ready_and_that_they_live_but_for_the_cycle() {
+    for name in ["domain", "planner", "monitor"] {
+        let unit = service(name);
+        assert_eq!((value(&unit, "Type"), value(&unit, "WatchdogSec")), ("notify", "30"), "{name}");
+    }
+    for name in ["controller", "drives"] {
+        let unit = service(name);
+        assert_eq!((value(&unit, "Type"), value(&unit, "WatchdogSec")), ("notify", ""), "{name}");
+    }
+    for name in ["domain", "planner", "controller", "drives"] {
+        assert_eq!(value(&service(name), "Restart"), "no", "{name}");
+    }
+    assert_eq!(value(&service("monitor"), "Restart"), "on-failure");
+}
+
+#[test]
+fn services_end_with_their_domain_and_the_page_does_not_end_them() {
+    for name in ["planner", "controller", "drives", "monitor"] {
+        let unit = &sections(&format!("graver-{name}@.service"))["Unit"];
+        assert_eq!(value(unit, "BindsTo"), "graver-domain@%i.service", "{name}");
+        assert_eq!(value(unit, "PartOf"), "graver@%i.target", "{name}");
+    }
+    let page = &sections("graver-serve@.service")["Unit"];
+    assert!(!page.contains_key("BindsTo") && !page.contains_key("Requires"));
+    // Whoever wants the page says so: it listens on the network.
+    let target = &sections("graver@.target")["Unit"];
+    let wanted = value(target, "Wants");
+    assert_eq!(wanted.split_whitespace().count(), 5);
+    assert!(!wanted.contains("serve"));
+    assert_eq!(
+        value(&sections("graver-serve@.service")["Install"], "WantedBy"),
+        "graver@%i.target"
+    );
+}
+
+#[test]
+fn what_drives_on_a_network_may_is_in_drop_ins_of_their_own() {
+    let board = &sections("network/hostmot2.conf")["Service"];
+    assert_eq!(value(board, "RestrictAddressFamilies"), "AF_UNIX AF_INET");
+    assert!(!board.contains_key("AmbientCapabilities"));
+    let bus = &sections("network/ethercat.conf")["Service"];
+    assert_eq!(value(bus, "RestrictAddressFamilies"), "AF_UNIX AF_PACKET");
+    for key in ["AmbientCapabilities", "CapabilityBoundingSet"] {
+        assert_eq!(value(bus, key), "CAP_NET_RAW");
+    }
+}
