@@ -28,12 +28,13 @@ pub use operating::{
 };
 pub use options::JobOptions;
 pub use pipeline::{
-    DomainArguments, DrivesArguments, DrivesKind, OverrideArguments, RunArguments,
-    ServiceArguments, SimulateArguments, StatusArguments, SubmitArguments,
+    DomainArguments, DrivesArguments, DrivesKind, OverrideArguments, QuotaArguments,
+    RecordArguments, RecordLevel, RunArguments, ServiceArguments, SimulateArguments,
+    StatusArguments, SubmitArguments,
 };
 pub use planning::{
-    CheckArguments, ExportArguments, KinematicsArguments, KinematicsVerb, PlanArguments,
-    ProfileName,
+    CheckArguments, ExportArguments, ExportFormat, KinematicsArguments, KinematicsVerb,
+    PlanArguments, ProfileName, ReplayArguments,
 };
 
 pub use queue::{QueueCommand, QueueJobArguments, QueueMoveArguments};
@@ -45,7 +46,7 @@ use crate::exit;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use examples::{
     CALIBRATE_EXAMPLES, CHECK_EXAMPLES, COMPARE_EXAMPLES, DOCTOR_EXAMPLES, EXPORT_EXAMPLES,
-    FIGURES_EXAMPLES, KINEMATICS_EXAMPLES, PLAN_EXAMPLES, QUEUE_EXAMPLES, RUN_EXAMPLES,
+    FIGURES_EXAMPLES, KINEMATICS_EXAMPLES, PLAN_EXAMPLES, QUEUE_EXAMPLES, REPLAY_EXAMPLES, RUN_EXAMPLES,
     SERVE_EXAMPLES, SERVICES, SIMULATE_EXAMPLES, SIZE_EXAMPLES, SUBMIT_EXAMPLES, TABLES_EXAMPLES,
 };
 use std::path::PathBuf;
@@ -80,6 +81,9 @@ pub enum Command {
     /// Write the recording of a run as comma-separated values.
     #[command(after_help = EXPORT_EXAMPLES)]
     Export(ExportArguments),
+    /// Feed the stages with a recorded simulation, and compare their outputs bit for bit.
+    #[command(after_help = REPLAY_EXAMPLES)]
+    Replay(ReplayArguments),
     /// Say what motor and gear each axis needs for a job, and choose them from catalogues.
     #[command(after_help = SIZE_EXAMPLES)]
     Size(SizeArguments),
@@ -152,7 +156,7 @@ pub enum Command {
     /// starts, and run the jobs that are submitted.
     #[command(after_help = SERVICES)]
     Domain(DomainArguments),
-    /// Let people and programs in beside the command line: grbl 1.1 for a running pipeline.
+    /// Let people and programs in beside the command line: live page, HTTP, metrics, and grbl 1.1.
     #[command(after_help = SERVE_EXAMPLES)]
     Serve(ServeArguments),
     /// The planner service: reads, plans and checks a job, and streams its setpoints.

@@ -19,6 +19,7 @@ pub mod path_check;
 pub mod plan;
 pub mod pulses;
 pub mod queue;
+pub mod replay;
 pub mod run;
 pub mod serve;
 pub mod service;

@@ -7,6 +7,7 @@ use machine::document::{Document, Override};
 use machine::machine::{BUILTIN, BUILTIN_NAME};
 use planner::request::{JobRequest, OffsetsFile};
 use serde::{Deserialize, Serialize};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// What machine and plant are built from: read once, and the same for every process.
@@ -67,6 +68,26 @@ impl MachineSource {
     pub fn path(&self) -> Option<PathBuf> {
         let path = &self.file.as_ref()?.path;
         Some(std::path::absolute(path).unwrap_or_else(|_| path.clone()))
+    }
+
+    /// Arguments with which another `graver` has the same machine.
+    ///
+    /// # Errors
+    /// A machine file that is not what it was when it was read.
+    pub fn arguments(&self) -> Result<Vec<OsString>, Failure> {
+        let mut arguments = Vec::new();
+        if let (Some(file), Some(path)) = (&self.file, self.path()) {
+            if Document::text(&path)? != file.text {
+                return Err(Failure::bad_input(format!(
+                    "{} was changed after the pipeline had been started: start it again",
+                    path.display()
+                )));
+            }
+            arguments.extend(["--machine".into(), path.into_os_string()]);
+        }
+        let own = self.set.iter().filter(|change| change.starts_with("machine."));
+        arguments.extend(own.map(|change| format!("--set={change}").into()));
+        Ok(arguments)
     }
 
     /// The offsets that people have set beside the machine file, as they are now.
@@ -196,7 +217,11 @@ mod tests {
         std::fs::copy(original, &path).unwrap();
         let source = source(Some(path.clone()), &[]);
         let before = source.machine().unwrap();
+        let arguments = source.arguments().unwrap();
+        assert_eq!(arguments, ["--machine".into(), path.clone().into_os_string()]);
         std::fs::write(&path, "no machine any more").unwrap();
+        let text = source.arguments().unwrap_err().refusal.text;
+        assert!(text.contains("was changed"), "{text}");
         assert_eq!(source.machine().unwrap(), before);
         // As the services read it from the domain's holder.
         let sent: MachineSource =

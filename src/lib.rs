@@ -18,7 +18,7 @@ use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
     bench, calibrate, check, compare, doctor, export, faults, figures, kinematics, machine, manual,
-    offset, operating, operator, plan, queue, run, serve, service, simulate, size, status, submit, tables,
+    offset, operating, operator, plan, queue, replay, run, serve, service, simulate, size, status, submit, tables,
     verify,
 };
 use exit::{Exit, Failure};
@@ -46,6 +46,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Check(arguments) => check::run(arguments),
         Command::Kinematics(arguments) => kinematics::run(arguments),
         Command::Export(arguments) => export::run(arguments),
+        Command::Replay(arguments) => replay::run(arguments),
         Command::Size(arguments) => size::run(arguments),
         Command::Calibrate(arguments) => calibrate::run(arguments),
         Command::Figures(arguments) => figures::run(arguments),
@@ -97,6 +98,7 @@ fn wants_json(command: &Command) -> bool {
         Command::Simulate(arguments) => arguments.json,
         Command::Plan(arguments) => arguments.json,
         Command::Check(arguments) => arguments.json,
+        Command::Replay(arguments) => arguments.json,
         Command::Size(arguments) => arguments.json,
         Command::Calibrate(arguments) => arguments.json,
         Command::Figures(arguments) => arguments.json,

@@ -28,6 +28,7 @@ use messages::{
     ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorReply, OperatorVerb,
     PlannerReport, Progress, SimulatedInputs,
 };
+use monitor::recording::level::Level;
 use operators::Operators;
 use power_up::PowerUp;
 use queue::JobQueue;
@@ -143,6 +144,7 @@ pub struct Pipeline {
     serving: Serving,
     owner: ServiceOwner,
     jobs: JobSource,
+    level: Level,
     streams: u64,
     domain: Domain,
 }
@@ -213,6 +215,7 @@ impl Pipeline {
             serving: Serving::default(),
             owner,
             jobs,
+            level: configuration.record.level,
             streams: 0,
             domain,
         })
@@ -315,6 +318,11 @@ impl Pipeline {
         patience: Duration,
     ) -> Result<OperatorReply, OperatorError> {
         self.link.request_within(verb, value, patience)
+    }
+
+    /// What stays of a recording when its run has been judged, and where it goes on that its folder cannot take.
+    pub fn recording(&self) -> (Level, PathBuf) {
+        (self.level, monitor::service::spare(self.domain.instance()))
     }
 
     /// Who starts the services.

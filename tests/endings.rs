@@ -10,6 +10,7 @@ use graver::inputs::MachineSource;
 use graver::pipeline::configuration::Configuration;
 use graver::pipeline::{JobSource, Pipeline, ServiceOwner};
 use messages::DrivesReport;
+use monitor::recording::file::parts::Extent;
 use runtime::{Domain, Role, Samples, Subscriber};
 use serde_json::Value;
 use std::fs::File;
@@ -490,7 +491,7 @@ fn a_panic_of_the_supervisor_unpowers_the_motors() {
     let drives =
         DrivesArguments { drives: DrivesKind::Sim, strict: false, core: None, no_realtime: true };
     let source = MachineSource::read(&machine).unwrap();
-    let configuration = Configuration::new(source, &drives).unwrap();
+    let configuration = Configuration::new(source, &drives, Extent::default()).unwrap();
     let mut services = Vec::new();
     let mut observer = None;
     let panicked = catch_unwind(AssertUnwindSafe(|| {

@@ -4,6 +4,7 @@
 
 mod support;
 
+use messages::ControllerState;
 use support::Place;
 
 /// Counts of both actuators at the end of each cycle of the list, up to its last pulse.
@@ -41,7 +42,9 @@ fn the_list_of_pulses_is_what_the_drives_send() {
     place.graver(&simulated).json(0);
 
     let listed = counts_of_list(&std::fs::read_to_string(&list).unwrap(), ["la", "lb"]);
-    let recorded = place.recording("out");
+    let mut recorded = place.recording("out");
+    let ready = recorded.iter().position(|it| it.command.state() == ControllerState::Idle);
+    recorded.drain(..ready.unwrap());
     let home = recorded[0].feedback.counts;
     let sent: Vec<[i64; 2]> = recorded
         .iter()

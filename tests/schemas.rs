@@ -21,6 +21,7 @@ use graver::commands::motion::MotionReply;
 use graver::commands::offset::OffsetsReport;
 use graver::commands::plan::PlanReport;
 use graver::commands::plan::preview::PreviewReport;
+use graver::commands::replay::ReplayReport;
 use monitor::summary::Summary;
 use operator::{Queue, Status, Submitted, VerbReply};
 use schemars::{Schema, schema_for};
@@ -49,6 +50,7 @@ fn schemas() -> Vec<(&'static str, Schema)> {
         ("plan", schema_for!(PlanReport)),
         ("preview", schema_for!(PreviewReport)),
         ("queue", schema_for!(Queue)),
+        ("replay", schema_for!(ReplayReport)),
         ("reply", schema_for!(VerbReply)),
         ("speed", schema_for!(SpeedReport)),
         ("planning", schema_for!(PlanBenchReport)),

@@ -107,7 +107,7 @@ fn drives_stopped_for_a_moment_goes_on_in_the_dark_or_says_why_not() {
         let summary: Value = serde_json::from_str(&ended.output).unwrap();
         assert_eq!(place.summary("run"), summary);
         assert_told(&summary, ended.code);
-        if place.path("run").join("samples.bin").exists() {
+        if place.path("run").join("samples.mcap").exists() {
             assert_no_light_uncommanded(&place.recording("run"));
         }
         place.assert_nothing_left(&[]);

@@ -9,8 +9,11 @@ pub const REFUSAL: &str = "refused.json";
 pub const ARTWORK: &str = "artwork.jsonl";
 /// What the plan comes to, [`PlanFacts`](crate::plan::PlanFacts); the planner's.
 pub const PLAN: &str = "plan.json";
-/// The recording: every cycle's feedback and command; the monitor's.
-pub const SAMPLES: &str = "samples.bin";
+/// The recording: every cycle's feedback and command; the monitor's. A long one has further parts, `samples.1.mcap` and
+/// so on.
+pub const SAMPLES: &str = "samples.mcap";
+/// The recording as earlier versions wrote it.
+pub const OLD_SAMPLES: &str = "samples.bin";
 /// Latencies as HdrHistogram interval log; the monitor's.
 pub const LATENCY: &str = "latency.hlog";
 /// What the monitor recorded and lost, written when the recording is complete; the monitor's.
@@ -23,5 +26,16 @@ pub const REPORT: &str = "report.html";
 pub const PICTURE: &str = "path.svg";
 
 /// All of them: whoever begins a run in a folder removes what an earlier one left.
-pub const ALL: [&str; 10] =
-    [REQUEST, REFUSAL, ARTWORK, PLAN, SAMPLES, LATENCY, WATCH, SUMMARY, REPORT, PICTURE];
+pub const ALL: [&str; 11] = [
+    REQUEST,
+    REFUSAL,
+    ARTWORK,
+    PLAN,
+    SAMPLES,
+    OLD_SAMPLES,
+    LATENCY,
+    WATCH,
+    SUMMARY,
+    REPORT,
+    PICTURE,
+];

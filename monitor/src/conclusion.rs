@@ -10,8 +10,11 @@ pub mod verdict;
 pub use crate::recording::info::{RecordingInfo, RecordingState};
 
 use crate::marks::{MarkEvaluation, Marks, StreamEnd};
-use crate::recording::file::{RecordingError, RecordingReader};
+use crate::recording::file::RecordingError;
+use crate::recording::file::parts::PartsReader;
+use crate::recording::file::reduce::reduce;
 use crate::recording::info::Progress;
+use crate::recording::level::Level;
 use crate::report::Report;
 use crate::run_analysis::{Clock, RunAnalysis, RunResults};
 use crate::run_folder::RunFolder;
@@ -27,8 +30,9 @@ use messages::time::Period;
 use messages::{ControllerReport, DrivesReport, Fault, FaultCode, RealtimeFacts, run_folder};
 use runtime::thread;
 use serde::Deserialize;
-use std::fs::{self, File};
-use std::io::{self, BufReader};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Cycles after the stream's last during which its light is still reported: the command acts one
@@ -71,6 +75,10 @@ pub struct RunOutcome {
     pub realtime_factor: Option<f64>,
     /// What a person should know.
     pub warnings: Vec<String>,
+    /// Where the recording may go on that its folder could not take; the artwork does so beside it.
+    pub spare: Option<PathBuf>,
+    /// What stays of the recording when the run has been judged.
+    pub level: Level,
 }
 
 /// The summary of a run from its outcome, its plan, and what its recording tells; `results` is
@@ -245,7 +253,9 @@ pub fn conclude(
             warnings.push(format!("the recording was broken off: {}", info.message));
         }
         // Nor was anything marked before there was an artwork.
-        if let Some(planned) = artwork::read(folder, warnings) {
+        let spared =
+            run_outcome.spare.as_ref().map(|spare| spare.with_file_name(run_folder::ARTWORK));
+        if let Some(planned) = artwork::read(folder, spared.as_deref(), warnings) {
             // Of a plan that was broken off the artwork is newer than the facts.
             if planned.strokes.len() != plan.strokes {
                 (plan.strokes, plan.length) = (planned.strokes.len(), planned.length());
@@ -259,7 +269,8 @@ pub fn conclude(
                 None if silenced && info.progress == Progress::Complete => StreamEnd::Silenced,
                 None => StreamEnd::Unknown,
             };
-            results = examine(folder, machine, (&drawn, plan.speed), end)
+            let spare = run_outcome.spare.as_deref();
+            results = examine((folder, spare), machine, (&drawn, plan.speed), end)
                 .map_err(|reason| warnings.push(format!("there is no recording: {reason}")))
                 .ok();
         }
@@ -270,7 +281,16 @@ pub fn conclude(
     }
     summary.report_time = began.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
+    if let Err(error) = reduce(folder, run_outcome.level) {
+        let path = folder.file(run_folder::SAMPLES);
+        summary.warnings.push(format!("all of the recording is kept: {}: {error}", path.display()));
+    }
     write(folder, machine, &drawn, &mut summary, results.as_ref());
+    if let Some(spare) = &run_outcome.spare {
+        // It was needed to judge the run. Where nothing went on there is none.
+        let _ = fs::remove_dir_all(spare);
+        let _ = fs::remove_file(spare.with_file_name(run_folder::ARTWORK));
+    }
     summary
 }
 
@@ -309,18 +329,17 @@ pub fn write(
     }
 }
 
-/// Examines the recording of `machine` in a folder, against marks that the plan makes at most with `speed`
+/// Examines the recording of `machine` in a folder, and where it went on that this could not take, against marks that the plan makes at most with `speed`
 /// [m/s].
 fn examine(
-    folder: &RunFolder,
+    (folder, spare): (&RunFolder, Option<&Path>),
     machine: &Machine,
     (artwork, speed): (&Artwork, f64),
     end: StreamEnd<'_>,
 ) -> Result<RunResults, String> {
     let path = folder.file(run_folder::SAMPLES);
     let at = |error: RecordingError| format!("{}: {error}", path.display());
-    let file = File::open(&path).map_err(|error| at(error.into()))?;
-    let reader = RecordingReader::new(BufReader::new(file)).map_err(at)?;
+    let reader = PartsReader::open_both(folder.path(), spare).map_err(at)?;
     let analysis = RunAnalysis::new(artwork, Clock::Real, reader.period());
     let mut analysis = analysis.with_fastest(speed).with_machine(machine);
     for record in reader {

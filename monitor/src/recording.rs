@@ -5,9 +5,15 @@
 //! skipped, and counts it.
 
 pub mod continuity;
+mod cycle;
+pub mod events;
 pub mod file;
 pub mod info;
+pub mod level;
+pub mod message;
+pub mod old_file;
 pub mod table;
+pub mod wire;
 
 use continuity::{Continuity, Stamp, Succession};
 use messages::{Command, Feedback, Sample};

@@ -14,7 +14,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const LONGEST_NAME: usize = 40;
 
 /// Files of which every run leaves one at least, however it ends.
-const OF_EVERY_RUN: [&str; 3] = [run_folder::REQUEST, run_folder::SAMPLES, run_folder::SUMMARY];
+const OF_EVERY_RUN: [&str; 4] =
+    [run_folder::REQUEST, run_folder::SAMPLES, run_folder::OLD_SAMPLES, run_folder::SUMMARY];
 
 /// How the name of a file ends that is being written.
 const UNFINISHED: &str = ".part";
@@ -131,8 +132,9 @@ impl RunFolder {
             let source = io::Error::new(io::ErrorKind::AlreadyExists, message);
             return Err(FileError { path: self.path.clone(), source });
         }
-        for path in run_folder::ALL.map(|name| self.file(name)).into_iter().chain(self.unfinished())
-        {
+        let files = run_folder::ALL.map(|name| self.file(name)).into_iter();
+        let parts = crate::recording::file::parts::of(&self.path);
+        for path in files.chain(parts).chain(self.unfinished()) {
             match fs::remove_file(&path) {
                 Err(source) if source.kind() != io::ErrorKind::NotFound => {
                     return Err(FileError { path, source });

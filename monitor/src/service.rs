@@ -8,14 +8,18 @@
 mod alone;
 mod recorder;
 mod recording;
+mod store;
 
 use crate::hub::{Hub, Sink as _};
+use crate::recording::file::Description;
+use crate::recording::level::Level;
 use machine::Machine;
-use messages::time::Period;
 use recorder::JobRecorder;
 use runtime::peer::{PeerState, Peers};
-use runtime::{Domain, Role, ServiceError, heartbeat, signal};
+use runtime::{Domain, Instance, Role, ServiceError, heartbeat, signal};
+use std::path::PathBuf;
 use std::time::Duration;
+use store::Setup;
 
 /// How often the service polls its channels.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
@@ -24,12 +28,35 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// the clock of simulated drives may slip.
 const SILENCE: Duration = Duration::from_millis(300);
 
+/// Where recordings of an instance go on when their folders take no more: in this directory of the instance.
+const SPARE: &str = "recording";
+
+/// How an instance records.
+#[derive(Debug, Clone, Default)]
+pub struct RecordingOptions {
+    /// What the machine is built from, as JSON: recordings carry it.
+    pub machine: String,
+    /// What stays of a recording when its run has been judged.
+    pub level: Level,
+    /// How large a recording may grow [bytes].
+    pub quota: Option<u64>,
+}
+
+/// The directory in which recordings of an instance go on when their folders take no more.
+pub fn spare(instance: &Instance) -> PathBuf {
+    instance.root().join(SPARE)
+}
+
 /// Runs until it is told to end (SIGTERM) or the supervisor dies.
 ///
 /// # Errors
 /// When a channel fails, or when a recording fails and not even that can be written down.
-pub fn run(domain: &Domain, machine: &Machine) -> Result<(), ServiceError> {
-    let mut service = Service::open(domain, machine.realtime.period)?;
+pub fn run(
+    domain: &Domain,
+    machine: &Machine,
+    options: &RecordingOptions,
+) -> Result<(), ServiceError> {
+    let mut service = Service::open(domain, machine, options)?;
     while signal::termination().is_none() && service.has_supervisor() {
         service.poll()?;
         heartbeat::beat();
@@ -47,14 +74,31 @@ struct Service {
     peers: Peers,
     hub: Hub,
     recorder: JobRecorder,
+    /// What stays of a recording that is concluded here.
+    level: Level,
 }
 
 impl Service {
-    fn open(domain: &Domain, period: Period) -> Result<Self, ServiceError> {
+    fn open(
+        domain: &Domain,
+        machine: &Machine,
+        options: &RecordingOptions,
+    ) -> Result<Self, ServiceError> {
+        let actuators = machine.actuators.iter().map(|actuator| actuator.name.clone());
+        let setup = Setup {
+            description: Description {
+                actuators: actuators.collect(),
+                machine: options.machine.clone(),
+                ..Description::of(machine.realtime.period)
+            },
+            quota: options.quota,
+            spare: spare(domain.instance()),
+        };
         Ok(Self {
             hub: Hub::open(domain)?,
             peers: Peers::watch(domain, &[Role::Domain, Role::Controller, Role::Drives])?,
-            recorder: JobRecorder::new(period),
+            recorder: JobRecorder::new(setup),
+            level: options.level,
         })
     }
 

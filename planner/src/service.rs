@@ -161,7 +161,8 @@ impl Service {
         }
         let folder = folder.clone();
         let stream = self.report.stream;
-        let thread = PlanningThread::start(&folder, &self.machine, &progress.position, stream)?;
+        let places = (folder.as_path(), self.spare.as_path());
+        let thread = PlanningThread::start(places, &self.machine, &progress.position, stream)?;
         self.work = Work::Streaming(Streaming {
             folder,
             started: Instant::now(),

@@ -1,6 +1,7 @@
 //! Strokes for a screen: as many points as it can show, however many there are.
 
 use crate::machine_facts::Box3;
+use messages::artwork::distance;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -119,10 +120,7 @@ impl Outline {
 
 /// Adds `point` unless it is nearer than `spacing` to the one before.
 fn thin(stroke: &mut Vec<[f64; 3]>, point: [f64; 3], spacing: f64) {
-    let is_near = stroke.last().is_some_and(|last| {
-        let squares: f64 = last.iter().zip(&point).map(|(from, to)| (to - from).powi(2)).sum();
-        squares.sqrt() <= spacing
-    });
+    let is_near = stroke.last().is_some_and(|last| distance(last, &point) <= spacing);
     if !is_near {
         stroke.push(point);
     }

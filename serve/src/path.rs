@@ -1,5 +1,6 @@
 //! The way of the tool as it is marked, thinned as it comes: what a page draws.
 
+use messages::artwork::distance;
 use messages::{Command, Feedback, feedback::status};
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -65,9 +66,7 @@ impl ToolPath {
             return;
         };
         (self.lit, self.cycles) = (self.lit + lit, self.cycles + 1);
-        let way =
-            ((tool[0] - last.0).powi(2) + (tool[1] - last.1).powi(2) + (tool[2] - last.2).powi(2))
-                .sqrt();
+        let way = distance(&[last.0, last.1, last.2], &tool);
         if way < STANDS && lit == 0.0 && !self.is_lit {
             // Time in which it stood in the dark is no part of the way to the next place.
             (self.lit, self.cycles) = (0.0, 0);

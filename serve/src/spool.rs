@@ -128,7 +128,7 @@ impl Spool {
             return Err(self.failed(&path, source));
         }
         let file = found(&folder).map(|(_, file)| file);
-        file.ok_or_else(|| SpoolError::Unknown(id))
+        file.ok_or(SpoolError::Unknown(id))
     }
 
     /// Where the file with this id is.

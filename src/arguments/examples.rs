@@ -54,9 +54,18 @@ Examples:
 pub(super) const EXPORT_EXAMPLES: &str = "\
 Examples:
   graver export runs/20261127-134500-NASO > samples.csv
-  graver export runs/a/samples.bin --out samples.csv
+  graver export runs/a/samples.mcap --out samples.csv
+  graver export runs/old --format mcap --out old.mcap   a recording of an earlier version
 
-SI units and radians, one line a millisecond; a field that was not known is empty.";
+SI units and radians, one line a cycle; a field that was not known is empty.";
+
+pub(super) const REPLAY_EXAMPLES: &str = "\
+Examples:
+  graver simulate jobs/letters.toml --out runs/a
+  graver replay runs/a                              controller and drives, bit for bit as recorded
+  graver replay runs/a/samples.mcap --json
+
+Exit code 1 when an output differs: the first difference is told by its cycle, field and values.";
 
 pub(super) const SIZE_EXAMPLES: &str = "\
 Examples:
@@ -131,12 +140,14 @@ person starts the queue.";
 
 pub(super) const SERVE_EXAMPLES: &str = "\
 Examples:
+  graver serve                                      the live page at http://127.0.0.1:7180
+  graver serve --listen 0.0.0.0:7180 --host laser.local   for other computers, by a token
   graver serve --grbl 7123                          LightBurn, UGS, Rayforge … on this computer
   graver serve --grbl 192.168.1.5:7123 --grbl-from 192.168.1.0/24
   graver serve --grbl-tty /tmp/graver               for software that speaks to a serial port only
   graver domain --services --machine mine.toml --grbl 7123   the same in one command
 
-docs/grbl.md says how to connect each program, and what is supported.";
+docs/grbl.md says how to connect each program, docs/http.md what the page and the HTTP interface are.";
 
 pub(super) const DOCTOR_EXAMPLES: &str = "\
 Examples:

@@ -2,6 +2,7 @@
 
 use super::{AccessArguments, InstanceArguments, JobOptions, MachineArguments};
 use clap::{Args, ValueEnum};
+use monitor::recording::level::Level;
 use std::path::PathBuf;
 
 /// What the drives are.
@@ -31,6 +32,61 @@ pub struct DrivesArguments {
     pub no_realtime: bool,
 }
 
+/// How much is recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RecordLevel {
+    /// Nothing.
+    Off,
+    /// What happens: states, faults, strokes, inputs, outputs, gaps.
+    Events,
+    /// That, and a hundred cycles a second.
+    Decimated,
+    /// Every cycle.
+    Full,
+}
+
+/// What stays of the recording.
+#[derive(Debug, Clone, Args)]
+pub struct RecordArguments {
+    /// What stays of the recording once the run has been judged, by all of its cycles.
+    #[arg(long, value_enum, value_name = "LEVEL", default_value = "full")]
+    pub record: RecordLevel,
+}
+
+impl RecordArguments {
+    /// The level.
+    pub fn level(&self) -> Level {
+        match self.record {
+            RecordLevel::Off => Level::Off,
+            RecordLevel::Events => Level::Events,
+            RecordLevel::Decimated => Level::Decimated,
+            RecordLevel::Full => Level::Full,
+        }
+    }
+}
+
+/// How large a recording may grow.
+#[derive(Debug, Clone, Args)]
+pub struct QuotaArguments {
+    /// How large a recording may grow, such as "2 GB"; its oldest part makes room, and what was marked in that is not judged.
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub record_quota: Option<u64>,
+}
+
+/// Bytes, such as "500 MB" or "2 GB".
+fn size(text: &str) -> Result<u64, String> {
+    let wrong = || format!("{text:?} is no size: such as \"500 MB\" or \"2 GB\"");
+    let split = text.find(|character: char| character.is_alphabetic()).ok_or_else(wrong)?;
+    let (number, unit) = text.split_at(split);
+    let unit = match unit.trim() {
+        "MB" => 1_000_000,
+        "GB" => 1_000_000_000,
+        _ => return Err(wrong()),
+    };
+    let bytes = number.trim().parse::<u64>().ok().and_then(|number| number.checked_mul(unit));
+    bytes.filter(|bytes| *bytes > 0).ok_or_else(wrong)
+}
+
 /// Arguments of `run`.
 #[derive(Debug, Clone, Args)]
 pub struct RunArguments {
@@ -46,6 +102,12 @@ pub struct RunArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub drives: DrivesArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub record: RecordArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub quota: QuotaArguments,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub instance: InstanceArguments,
@@ -78,6 +140,9 @@ pub struct SimulateArguments {
     /// Where the encoders' counts lie: 0 puts the start on a count, other seeds between two.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub record: RecordArguments,
     /// Print one JSON object on stdout.
     #[arg(long)]
     pub json: bool,
@@ -143,6 +208,12 @@ pub struct DomainArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub access: AccessArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub record: RecordArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub quota: QuotaArguments,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub instance: InstanceArguments,

@@ -117,12 +117,35 @@ pub enum KinematicsVerb {
     Ellipse,
 }
 
+/// What `export` writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExportFormat {
+    /// Comma-separated values, a line a cycle.
+    Csv,
+    /// One MCAP file, all parts of the recording in it.
+    Mcap,
+}
+
+/// Arguments of `replay`.
+#[derive(Debug, Clone, Args)]
+pub struct ReplayArguments {
+    /// Run folder of `graver simulate`, or its `samples.mcap`.
+    #[arg(value_name = "RECORDING")]
+    pub recording: PathBuf,
+    /// Print one JSON object on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Arguments of `export`.
 #[derive(Debug, Clone, Args)]
 pub struct ExportArguments {
-    /// Run folder, or a `samples.bin`; the axes' names are those of the summary beside it.
+    /// Run folder, or a recording: `samples.mcap`, or `samples.bin` of an earlier version.
     #[arg(value_name = "RUN_FOLDER")]
     pub recording: PathBuf,
+    /// What to write.
+    #[arg(long, value_enum, default_value = "csv")]
+    pub format: ExportFormat,
     /// Write to this file; without it to stdout.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,

@@ -1,40 +1,61 @@
-//! `graver export`: the recording of a run as comma-separated values.
+//! `graver export`: the recording of a run as comma-separated values, or as one MCAP file.
 
-use crate::arguments::ExportArguments;
+use crate::arguments::{ExportArguments, ExportFormat};
 use crate::exit::{Exit, Failure};
 use crate::files::Sources;
 use messages::{MAX_ACTUATORS, run_folder};
-use monitor::recording::file::{RecordingError, RecordingReader};
+use monitor::recording::CycleRecord;
+use monitor::recording::file::parts::{self, PartsReader};
+use monitor::recording::file::writer::RecordingWriter;
+use monitor::recording::file::{Description, RecordingError};
+use monitor::recording::level::Level;
+use monitor::recording::old_file::OldReader;
 use monitor::recording::table::TableWriter;
 use monitor::summary::Summary;
 use runtime::message;
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+type Records = Box<dyn Iterator<Item = Result<CycleRecord, RecordingError>>>;
+
+/// A recording of this version or an earlier one.
+struct Recording {
+    /// Its file, the first one where it has several.
+    path: PathBuf,
+    description: Description,
+    records: Records,
+}
 
 /// Writes the recording to a file, or to standard output.
 ///
 /// # Errors
 /// A recording that is not there or is none, or a file that cannot be written.
 pub fn run(arguments: &ExportArguments) -> Result<Exit, Failure> {
-    let recording = match &arguments.recording {
-        folder if folder.is_dir() => folder.join(run_folder::SAMPLES),
-        file => file.clone(),
-    };
-    let file = File::open(&recording).map_err(|error| at(&recording, error))?;
-    let reader =
-        RecordingReader::new(BufReader::new(file)).map_err(|error| at(&recording, error))?;
-    let actuators = actuators(&recording.with_file_name(run_folder::SUMMARY));
-    match &arguments.out {
-        Some(path) => {
-            let file = Sources::recording(&recording).create("--out", path)?;
-            export(&recording, reader, &actuators, BufWriter::new(file), |error| {
+    let recording = open(&arguments.recording)?;
+    let sources = || Sources::recording(&recording.path);
+    match (arguments.format, &arguments.out) {
+        (ExportFormat::Mcap, None) => Err(Failure::bad_input(
+            "--format mcap: the file is completed at its beginning: name it with --out",
+        )),
+        (ExportFormat::Mcap, Some(path)) => {
+            drop(sources().create("--out", path)?);
+            let written = |error| Failure::output(format!("{}: {error}", path.display()));
+            let mut writer = RecordingWriter::create(path, &recording.description, Level::Full)
+                .map_err(written)?;
+            copy(recording, |record| writer.write(&[*record]).map_err(written))?;
+            writer.finish().map_err(written)?;
+            Ok(Exit::Done)
+        }
+        (ExportFormat::Csv, Some(path)) => {
+            let file = sources().create("--out", path)?;
+            table(recording, BufWriter::new(file), |error| {
                 Err(Failure::output(format!("{}: {error}", path.display())))
             })
         }
-        None => {
+        (ExportFormat::Csv, None) => {
             let output = BufWriter::new(io::stdout().lock());
-            export(&recording, reader, &actuators, output, |error| match error.kind() {
+            table(recording, output, |error| match error.kind() {
                 // Whoever read has read enough, as `head` does.
                 ErrorKind::BrokenPipe => Ok(Exit::Done),
                 _ => Err(Failure::output(format!("standard output: {error}"))),
@@ -43,33 +64,78 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, Failure> {
     }
 }
 
-/// Copies record by record; `written` judges what the writer reports.
-fn export(
-    recording: &Path,
-    reader: RecordingReader<impl io::Read>,
-    actuators: &[String],
+/// Opens what is in a run folder, or a file by itself.
+fn open(place: &Path) -> Result<Recording, Failure> {
+    let old = place.join(run_folder::OLD_SAMPLES);
+    if place.is_dir() && (!parts::of(place).is_empty() || !old.exists()) {
+        let path = place.join(run_folder::SAMPLES);
+        let reader = PartsReader::open(place).map_err(|error| at(&path, error))?;
+        let description = reader.description().clone();
+        return Ok(Recording { path, description, records: Box::new(reader) });
+    }
+    let path = if place.is_dir() { old } else { place.to_owned() };
+    match PartsReader::of_file(&path) {
+        Ok(reader) => {
+            let description = reader.description().clone();
+            Ok(Recording { path, description, records: Box::new(reader) })
+        }
+        Err(RecordingError::NotARecording) => {
+            let file = File::open(&path).map_err(|error| at(&path, error))?;
+            let reader = OldReader::new(BufReader::new(file)).map_err(|error| at(&path, error))?;
+            let description = Description::of(reader.period());
+            Ok(Recording { path, description, records: Box::new(reader) })
+        }
+        Err(error) => Err(at(&path, error)),
+    }
+}
+
+/// Writes the records as a table; `written` judges what the writer reports.
+fn table(
+    recording: Recording,
     writer: impl Write,
     written: impl Fn(io::Error) -> Result<Exit, Failure>,
 ) -> Result<Exit, Failure> {
-    let mut table = match TableWriter::new(writer, actuators, reader.period()) {
+    let named = &recording.description.actuators;
+    let actuators = if named.is_empty() {
+        actuators(&recording.path.with_file_name(run_folder::SUMMARY))
+    } else {
+        named.clone()
+    };
+    let mut table = match TableWriter::new(writer, &actuators, recording.description.period) {
         Ok(table) => table,
         Err(error) => return written(error),
     };
-    for record in reader {
+    let mut refused = None;
+    copy(recording, |record| {
+        table.write(record).map_err(|error| {
+            refused = Some(error);
+            Failure::output("")
+        })
+    })
+    .or_else(|failure| if refused.is_some() { Ok(()) } else { Err(failure) })?;
+    match refused {
+        Some(error) => written(error),
+        None => table.finish().map_or_else(written, |()| Ok(Exit::Done)),
+    }
+}
+
+/// Hands on record by record.
+fn copy(
+    recording: Recording,
+    mut write: impl FnMut(&CycleRecord) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let Recording { path, records, .. } = recording;
+    for record in records {
         match record {
-            Ok(record) => {
-                if let Err(error) = table.write(&record) {
-                    return written(error);
-                }
-            }
+            Ok(record) => write(&record)?,
             // All records before the torn one are whole.
             Err(error @ RecordingError::Truncated { .. }) => {
-                message::tell(&format!("warning: {}: {error}", recording.display()));
+                message::tell(&format!("warning: {}: {error}", path.display()));
             }
-            Err(error) => return Err(at(recording, error)),
+            Err(error) => return Err(at(&path, error)),
         }
     }
-    table.finish().map_or_else(written, |()| Ok(Exit::Done))
+    Ok(())
 }
 
 /// The actuators' names by the summary beside the recording; numbers where it tells none.

@@ -9,6 +9,7 @@ use crate::pipeline::job_run::{JobRun, job_name};
 use crate::pipeline::queue::Entry;
 use crate::pipeline::{JobSource, POLL_INTERVAL, Pipeline, ServiceOwner};
 use crate::{inputs, notify, output};
+use monitor::recording::file::parts::Extent;
 use monitor::run_folder::RunFolder;
 use runtime::{Instance, message, signal};
 use std::path::{Path, PathBuf};
@@ -33,7 +34,8 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let job = request.read(&input.machine)?;
     let sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
     sources.spare(arguments.out.as_deref())?;
-    let configuration = Configuration::new(input.source, &arguments.drives)?;
+    let extent = Extent { level: arguments.record.level(), quota: arguments.quota.record_quota };
+    let configuration = Configuration::new(input.source, &arguments.drives, extent)?;
     // From here on a signal brings the machine to rest before it ends anything, and a terminal that closes does not end
     // the job.
     signal::outlive_terminal().map_err(Failure::service)?;
@@ -75,7 +77,8 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
     if let Some(file) = source.offsets()? {
         file.offsets()?;
     }
-    let configuration = Configuration::new(source.clone(), &arguments.drives)?;
+    let extent = Extent { level: arguments.record.level(), quota: arguments.quota.record_quota };
+    let configuration = Configuration::new(source.clone(), &arguments.drives, extent)?;
     signal::outlive_terminal().map_err(Failure::service)?;
     signal::install().map_err(Failure::service)?;
     let owner = if arguments.services { ServiceOwner::Own } else { ServiceOwner::Others };

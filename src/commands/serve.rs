@@ -3,8 +3,11 @@
 //! Killed, it takes nothing with it but the connections.
 
 mod machine;
+#[cfg_attr(not(feature = "serve"), path = "serve/no_page.rs")]
+mod page;
 
 use self::machine::Operated;
+use self::page::Page;
 use crate::arguments::ServeArguments;
 use crate::exit::{Exit, Failure};
 use crate::pipeline::configuration::Configuration;
@@ -29,13 +32,16 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// No pipeline, an address in use.
 pub fn run(arguments: &ServeArguments) -> Result<Exit, Failure> {
     signal::install().map_err(Failure::service)?;
-    let access = &arguments.access;
-    if access.is_empty() {
-        return Err(Failure::bad_input(
-            "nothing to serve: name an address with --grbl, or --grbl-tty",
-        ));
-    }
+    let access = &arguments.access.or_page();
     let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
+    let page = Page::start(access, &instance)?;
+    if access.grbl.is_none() && access.grbl_tty.is_none() {
+        // The page stays up between pipelines, and says that there is none.
+        while signal::termination().is_none() {
+            std::thread::sleep(LOOK_PERIOD);
+        }
+        return page.map_or(Ok(Exit::Done), Page::end);
+    }
     let client = Client::new(instance.clone());
     // It says better than a file that is not there that no pipeline runs.
     client.status().map_err(Failure::service)?;
@@ -58,7 +64,7 @@ pub fn run(arguments: &ServeArguments) -> Result<Exit, Failure> {
         }
     }
     drop(server);
-    Ok(Exit::Done)
+    page.map_or(Ok(Exit::Done), Page::end)
 }
 
 /// Listens at the address for grbl, if there is one, and says where.

@@ -26,7 +26,9 @@ pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
     }
     match role {
         Role::Planner => planner::service::run(&domain, &configuration.machine()?),
-        Role::Monitor => monitor::service::run(&domain, &configuration.machine()?),
+        Role::Monitor => {
+            monitor::service::run(&domain, &configuration.machine()?, &configuration.recording())
+        }
         Role::Controller => {
             let realtime = configuration.realtime_options(CONTROLLER_PRIORITY);
             controller::service::run(&domain, &configuration.machine()?, &realtime)

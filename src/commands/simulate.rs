@@ -6,18 +6,18 @@ use crate::files::{Claim, Sources};
 use crate::{inputs, output};
 use drives::PlantOptions;
 use messages::run_folder;
-use messages::time::Period;
 use monitor::conclusion::{self, RunOutcome};
 use monitor::marks::StreamEnd;
-use monitor::recording::CycleRecord;
-use monitor::recording::file::RecordingWriter;
+use monitor::recording::file::Description;
+use monitor::recording::file::writer::RecordingWriter;
+use monitor::recording::level::Level;
+use monitor::recording::message::Origin;
 use monitor::run_analysis::{Clock, RunAnalysis};
 use monitor::run_folder::RunFolder;
-use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io;
 use std::path::PathBuf;
 use std::time::Instant;
-use workbench::simulation::{SimulationError, simulate};
+use workbench::simulation::{SimulationError, Stretch, simulate_all};
 
 /// Runs the command.
 ///
@@ -45,14 +45,27 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     let _claim = folder.as_ref().map(Claim::of).transpose()?;
     folder.as_ref().map_or(Ok(()), RunFolder::clear).map_err(Failure::bad_input)?;
     let period = input.machine.realtime.period;
-    let mut recording = folder.as_ref().map(|folder| Recording::begin(folder, period));
+    let actuators = input.machine.actuators.iter().map(|actuator| actuator.name.clone());
+    let description = Description {
+        stream: 1,
+        simulated: true,
+        seed: arguments.seed,
+        actuators: actuators.collect(),
+        machine: serde_json::to_string(&input.source).map_err(Failure::service)?,
+        ..Description::of(period)
+    };
+    let recorded = folder.as_ref().filter(|_| arguments.record.level() > Level::Off);
+    let begin = |folder| Recording::begin(folder, &description, arguments.record.level());
+    let mut recording = recorded.map(begin);
     let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, period)
         .with_actuators(input.machine.actuators.len());
     let options = PlantOptions { seed: arguments.seed, ..PlantOptions::default() };
-    let simulated = simulate(&input.machine, &input.plant, &plan, options, |records| {
-        records.iter().for_each(|record| analysis.push(record));
+    let simulated = simulate_all(&input.machine, &input.plant, &plan, options, |stretch| {
+        if !stretch.is_power_up {
+            stretch.records.iter().for_each(|record| analysis.push(record));
+        }
         if let Some(recording) = &mut recording {
-            recording.write(records);
+            recording.write(stretch);
         }
     });
     let simulated = match simulated {
@@ -100,18 +113,18 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
 /// The recording of a simulation, as far as it can be written: the simulation goes on without.
 struct Recording {
     path: PathBuf,
-    writer: io::Result<RecordingWriter<BufWriter<File>>>,
+    writer: io::Result<RecordingWriter>,
 }
 
 impl Recording {
-    fn begin(folder: &RunFolder, period: Period) -> Self {
+    fn begin(folder: &RunFolder, description: &Description, level: Level) -> Self {
         let path = folder.file(run_folder::SAMPLES);
-        Self { writer: RecordingWriter::create(&path, period), path }
+        Self { writer: RecordingWriter::create(&path, description, level), path }
     }
 
-    fn write(&mut self, records: &[CycleRecord]) {
+    fn write(&mut self, stretch: &Stretch<'_>) {
         if let Ok(writer) = &mut self.writer
-            && let Err(error) = writer.write(records)
+            && let Err(error) = write(writer, stretch)
         {
             self.writer = Err(error);
         }
@@ -122,4 +135,17 @@ impl Recording {
         let finished = self.writer.and_then(RecordingWriter::finish);
         finished.err().map(|error| format!("cannot write {}: {error}", self.path.display()))
     }
+}
+
+fn write(writer: &mut RecordingWriter, stretch: &Stretch<'_>) -> io::Result<()> {
+    let Stretch { records, setpoints, requests, .. } = stretch;
+    for (deadline, setpoint) in *setpoints {
+        let origin = Origin { deadline: deadline.0, ..Origin::default() };
+        writer.write_inputs(&origin, &[*setpoint], None)?;
+    }
+    for (deadline, request) in *requests {
+        let origin = Origin { deadline: deadline.0, ..Origin::default() };
+        writer.write_inputs(&origin, &[], Some(request))?;
+    }
+    writer.write(records)
 }

@@ -6,6 +6,8 @@ use crate::exit::Failure;
 use crate::inputs::MachineSource;
 use drives::Deadlines;
 use machine::{DrivesKind as MachineDrives, Machine};
+use monitor::recording::file::parts::Extent;
+use monitor::service::RecordingOptions;
 use runtime::thread::{Placement, RealtimeOptions, last_core};
 use runtime::{Instance, ServiceError};
 use serde::{Deserialize, Serialize};
@@ -29,6 +31,8 @@ pub struct Configuration {
     pub core: Option<usize>,
     /// Whether to ask for real-time scheduling.
     pub realtime: bool,
+    /// What stays of a recording.
+    pub record: Extent,
 }
 
 /// What is driven.
@@ -45,7 +49,11 @@ impl Configuration {
     ///
     /// # Errors
     /// A CPU that is not there.
-    pub fn new(source: MachineSource, drives: &DrivesArguments) -> Result<Self, Failure> {
+    pub fn new(
+        source: MachineSource,
+        drives: &DrivesArguments,
+        record: Extent,
+    ) -> Result<Self, Failure> {
         if let Some(core) = drives.core
             && core > last_core()
         {
@@ -63,6 +71,7 @@ impl Configuration {
             strict: drives.strict,
             core: drives.core,
             realtime: !drives.no_realtime,
+            record,
         })
     }
 
@@ -107,6 +116,14 @@ impl Configuration {
     pub fn deadlines(&self, machine: &Machine) -> Deadlines {
         let simulated = machine.drives.kind == MachineDrives::Simulated;
         if self.strict || !simulated { Deadlines::Strict } else { Deadlines::Slipping }
+    }
+
+    /// How the monitor records.
+    pub fn recording(&self) -> RecordingOptions {
+        let Extent { level, quota } = self.record;
+        // A machine that was read can be written: at worst a recording does not carry it.
+        let machine = serde_json::to_string(&self.source).unwrap_or_default();
+        RecordingOptions { machine, level, quota }
     }
 
     /// The real-time set-up of a cyclic thread.

@@ -14,7 +14,7 @@ use super::{POLL_INTERVAL, Pipeline};
 use crate::exit::Failure;
 use crate::output::progress::{JobProgress, ProgressLine};
 use messages::{Cycle, Fault, OperatorVerb, PlannerPhase, run_folder};
-use monitor::conclusion::RunOutcome;
+use monitor::conclusion::{RecordingState, RunOutcome};
 use monitor::run_folder::RunFolder;
 use monitor::summary::{ErrorSummary, Outcome, Summary};
 use planner::request::JobRequest;
@@ -226,12 +226,12 @@ impl<'a> JobRun<'a> {
     /// Hands the job to the controller as soon as it is recorded, or nobody is there to record it,
     /// and nobody holds it.
     fn play(&mut self, since: Instant) {
-        let recorded = self.folder.file(run_folder::SAMPLES).exists();
+        let stream = self.stream.unwrap_or_default();
+        let recorded = RecordingState::of(&self.folder, stream) == RecordingState::Open;
         let awaited = self.pipeline.has(Role::Monitor) || self.pipeline.starts(Role::Monitor);
         if !recorded && awaited && since.elapsed() < OPENING_PATIENCE {
             return;
         }
-        let stream = self.stream.unwrap_or_default();
         if !self.control.play() {
             return;
         }

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use monitor::recording::CycleRecord;
-use monitor::recording::file::RecordingReader;
+use monitor::recording::file::parts::PartsReader;
 use runtime::Instance;
 use runtime::peer::Peer;
 use runtime::socket::OperatorClient;
@@ -166,9 +166,7 @@ impl Place {
 
     /// The recording in the run folder of this name: all records that are whole.
     pub(crate) fn recording(&self, out: &str) -> Vec<CycleRecord> {
-        let file = File::open(self.path(out).join("samples.bin")).unwrap();
-        let reader = RecordingReader::new(std::io::BufReader::new(file)).unwrap();
-        reader.map_while(Result::ok).collect()
+        PartsReader::open(&self.path(out)).unwrap().map_while(Result::ok).collect()
     }
 
     /// The summary in the run folder of this name.

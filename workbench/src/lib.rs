@@ -11,6 +11,7 @@ pub mod mechanics;
 pub mod new;
 pub mod operating;
 pub mod reach;
+pub mod replay;
 pub mod simulation;
 pub mod size;
 pub mod spread;

@@ -68,12 +68,19 @@ pub enum SimulationError {
     },
 }
 
+/// Who is told of each stretch.
+type Examine<'a> = dyn FnMut(&Stretch<'_>) + 'a;
+
 struct Pipeline {
     controller: Controller,
     bridge: Bridge,
     period: Nanoseconds,
     now: Nanoseconds,
     outputs: Outputs,
+    /// Records of the cycles before the job.
+    powering: Vec<CycleRecord>,
+    /// What was asked for since this was emptied, by the deadline of the cycle.
+    requests: Vec<(Nanoseconds, OperatorRequest)>,
 }
 
 impl Pipeline {
@@ -93,12 +100,15 @@ impl Pipeline {
             period: machine.realtime.period.time(),
             now: Nanoseconds(0),
             outputs: Outputs::default(),
+            powering: Vec::new(),
+            requests: Vec::new(),
         })
     }
 
     /// One cycle, in the order of the real one; no time passes in it.
     fn cycle(&mut self, setpoints: &[Setpoint], request: Option<OperatorRequest>) {
         self.now = self.now + self.period;
+        self.requests.extend(request.map(|request| (self.now, request)));
         self.bridge.begin(self.now, self.now);
         let feedback = self.bridge.feedback();
         let peers = Peers::default();
@@ -112,10 +122,30 @@ impl Pipeline {
         CycleRecord { feedback: *self.bridge.feedback(), command: self.outputs.command }
     }
 
-    fn enable(&mut self, machine: &Machine) -> Result<(), SimulationError> {
+    /// A cycle before the job.
+    fn power_up(&mut self, request: Option<OperatorRequest>, examine: &mut Examine<'_>) {
+        self.cycle(&[], request);
+        self.powering.push(self.record());
+        if self.powering.len() >= CHUNK {
+            self.tell_powering(examine);
+        }
+    }
+
+    fn tell_powering(&mut self, examine: &mut Examine<'_>) {
+        let (records, requests) = (&self.powering[..], &self.requests[..]);
+        examine(&Stretch { is_power_up: true, records, setpoints: &[], requests });
+        self.powering.clear();
+        self.requests.clear();
+    }
+
+    fn enable(
+        &mut self,
+        machine: &Machine,
+        examine: &mut Examine<'_>,
+    ) -> Result<(), SimulationError> {
         // Drives powers nothing before it has been greeted by an unpowered command.
-        self.cycle(&[], None);
-        self.cycle(&[], Some(request(OperatorVerb::Enable, 0.0)));
+        self.power_up(None, examine);
+        self.power_up(Some(request(OperatorVerb::Enable, 0.0)), examine);
         let period = machine.realtime.period;
         let mut is_homed = machine.operating.homing.iter().all(Option::is_none);
         let mut left = period.cycles_for(ENABLE_PATIENCE);
@@ -125,10 +155,10 @@ impl Pipeline {
                 ControllerState::Idle if is_homed => return Ok(()),
                 ControllerState::Idle => {
                     (is_homed, left) = (true, period.cycles_for(HOMING_PATIENCE));
-                    self.cycle(&[], Some(request(OperatorVerb::Home, 0.0)));
+                    self.power_up(Some(request(OperatorVerb::Home, 0.0)), examine);
                 }
                 ControllerState::Faulted => break,
-                _ => self.cycle(&[], None),
+                _ => self.power_up(None, examine),
             }
         }
         let command = &self.outputs.command;
@@ -144,8 +174,22 @@ fn request(verb: OperatorVerb, value: f64) -> OperatorRequest {
     OperatorRequest { verb: verb as u32, ticket: 1, value, ..OperatorRequest::default() }
 }
 
+/// What a simulation did since the stretch before: records in order, and what the controller got in their cycles, by the
+/// deadline of the cycle.
+#[derive(Debug, Clone, Copy)]
+pub struct Stretch<'a> {
+    /// Whether the motors are being powered and homed: nothing of the job is in it.
+    pub is_power_up: bool,
+    /// The records.
+    pub records: &'a [CycleRecord],
+    /// Setpoints.
+    pub setpoints: &'a [(Nanoseconds, Setpoint)],
+    /// Requests of people, or in their stead.
+    pub requests: &'a [(Nanoseconds, OperatorRequest)],
+}
+
 /// Plays `plan` on a controller for `machine` and a simulated `plant`; `examine` gets every record
-/// in order.
+/// of the job in order.
 ///
 /// # Errors
 /// A machine that cannot be simulated, or a controller that does not get ready.
@@ -156,18 +200,41 @@ pub fn simulate(
     plant_options: PlantOptions,
     mut examine: impl FnMut(&[CycleRecord]),
 ) -> Result<Simulated, SimulationError> {
+    simulate_all(machine, plant, plan, plant_options, |stretch| {
+        if !stretch.is_power_up {
+            examine(stretch.records);
+        }
+    })
+}
+
+/// The same, from the first cycle on; `examine` gets all that went in and came out.
+///
+/// # Errors
+/// A machine that cannot be simulated, or a controller that does not get ready.
+pub fn simulate_all(
+    machine: &Machine,
+    plant: &Machine,
+    plan: &Plan,
+    plant_options: PlantOptions,
+    mut examine: impl FnMut(&Stretch<'_>),
+) -> Result<Simulated, SimulationError> {
     let mut pipeline = Pipeline::new(machine, plant, plant_options)?;
-    pipeline.enable(machine)?;
+    let enabled = pipeline.enable(machine, &mut examine);
+    pipeline.tell_powering(&mut examine);
+    enabled?;
     let mut setpoints = plan.setpoints(STREAM);
     let mut waiting: Vec<Setpoint> = Vec::with_capacity(DRAIN);
     // Written once, so that its pages are there before the clock runs.
     let mut records = vec![pipeline.record(); CHUNK];
+    let mut given: Vec<(Nanoseconds, Setpoint)> = Vec::with_capacity(CHUNK * DRAIN);
     let mut stepping = Duration::ZERO;
     let mut start = Some(request(OperatorVerb::Start, STREAM as f64));
     let mut report = ControllerReport::default();
     let mut remaining = usize::MAX;
     while remaining > 0 {
         records.clear();
+        given.clear();
+        pipeline.requests.clear();
         let began = Instant::now();
         while records.len() < CHUNK && remaining > 0 {
             waiting.clear();
@@ -180,6 +247,7 @@ pub fn simulate(
             let resume = paused.then(|| request(OperatorVerb::Resume, 0.0));
             pipeline.cycle(&waiting, start.take().or(resume));
             records.push(pipeline.record());
+            given.extend(waiting.iter().map(|setpoint| (pipeline.now, *setpoint)));
             remaining = remaining.saturating_sub(1);
             if let Some(new) = pipeline.outputs.report {
                 report = new;
@@ -189,7 +257,9 @@ pub fn simulate(
             }
         }
         stepping += began.elapsed();
-        examine(&records);
+        let requests = &pipeline.requests[..];
+        let (records, setpoints) = (&records[..], &given[..]);
+        examine(&Stretch { is_power_up: false, records, setpoints, requests });
     }
     let drives = pipeline.bridge.report(RealtimeFacts::default());
     Ok(Simulated { controller: report, drives, stepping })

@@ -5,29 +5,43 @@ use messages::artwork::{Artwork, ArtworkLine};
 use messages::run_folder;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
+use std::path::Path;
 
-/// Reads what has been written of it; `None` when it was never begun, or cannot be read: then with a
-/// warning. A last line that was torn when its writer was killed is left out.
-pub(super) fn read(folder: &RunFolder, warnings: &mut Vec<String>) -> Option<Artwork> {
+/// Reads what has been written of it, in the run folder and then in the file `spare`, if there is one; `None` when
+/// it was never begun, or cannot be read: then with a warning. A last line that was torn when its
+/// writer was killed is left out.
+pub(super) fn read(
+    folder: &RunFolder,
+    spare: Option<&Path>,
+    warnings: &mut Vec<String>,
+) -> Option<Artwork> {
     let path = folder.file(run_folder::ARTWORK);
-    let read = || -> io::Result<Artwork> {
-        let mut file = BufReader::new(File::open(&path)?);
-        let mut artwork = Artwork::default();
-        let mut text = String::new();
-        while file.read_line(&mut text)? > 0 && text.ends_with('\n') {
-            artwork.add(serde_json::from_str::<ArtworkLine>(&text)?);
-            text.clear();
+    let mut artwork = Artwork::default();
+    let mut read = || {
+        add(&path, &mut artwork)?;
+        match spare.map(|spare| add(spare, &mut artwork)) {
+            Some(Err(error)) if error.kind() != io::ErrorKind::NotFound => Err(error),
+            _ => Ok(()),
         }
-        Ok(artwork)
     };
     match read() {
-        Ok(artwork) => Some(artwork),
+        Ok(()) => Some(artwork),
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
         Err(error) => {
             warnings.push(format!("cannot read {}: {error}", path.display()));
             None
         }
     }
+}
+
+fn add(path: &Path, artwork: &mut Artwork) -> io::Result<()> {
+    let mut file = BufReader::new(File::open(path)?);
+    let mut text = String::new();
+    while file.read_line(&mut text)? > 0 && text.ends_with('\n') {
+        artwork.add(serde_json::from_str::<ArtworkLine>(&text)?);
+        text.clear();
+    }
+    Ok(())
 }
 
 /// Writes all of it.

@@ -3,7 +3,8 @@
 
 use super::*;
 use crate::recording::CycleRecord;
-use crate::recording::file::RecordingWriter;
+use crate::recording::file::Description;
+use crate::recording::file::writer::RecordingWriter;
 use messages::artwork::Stroke;
 use messages::feedback::status;
 use messages::plan::Note;
@@ -328,9 +329,13 @@ fn folder(below: &tempfile::TempDir, records: &[CycleRecord]) -> RunFolder {
     let notes = vec![Note { line: 7, text: "here".into() }];
     let plan = serde_json::to_vec(&PlanFacts { notes, ..plan() }).unwrap();
     folder.write(run_folder::PLAN, plan).unwrap();
-    let mut writer = RecordingWriter::new(Vec::new(), Period::OF_SETPOINTS).unwrap();
+    let path = folder.file(run_folder::SAMPLES);
+    let description = Description::of(Period::OF_SETPOINTS);
+    let mut writer = RecordingWriter::create(&path, &description, Level::Full).unwrap();
     writer.write(records).unwrap();
-    folder.write(run_folder::SAMPLES, writer.finish().unwrap()).unwrap();
+    // As it is when it is not closed in order: cut anywhere it lacks the record that was cut.
+    writer.flush().unwrap();
+    std::mem::forget(writer);
     folder
 }
 
@@ -396,7 +401,7 @@ fn a_summary_that_cannot_be_written_is_given_back_and_says_so() {
 fn a_recording_that_was_broken_off_is_said_to_be() {
     let below = tempfile::tempdir().unwrap();
     let folder = folder(&below, &records()[..50]);
-    let message = "samples.bin: No space left on device".to_owned();
+    let message = "samples.mcap: No space left on device".to_owned();
     let info = RecordingInfo { message: message.clone(), ..RecordingInfo::default() };
     info.write(&folder).unwrap();
     let summary = concluded(&folder, &ended(report()));
@@ -418,7 +423,7 @@ fn what_cannot_be_read_is_a_warning_and_not_a_figure() {
         summary
     };
     assert_eq!(check(run_folder::ARTWORK, "{\n", "artwork.jsonl: EOF").marks, None);
-    let summary = check(run_folder::SAMPLES, "GRAVE", "samples.bin: not a recording");
+    let summary = check(run_folder::SAMPLES, "GRAVEREC", "samples.mcap: not a recording");
     assert_eq!(summary.marks, None);
     // The marks need no plan.
     assert!(check(run_folder::PLAN, "[]", "plan.json: ").marks.is_some());

@@ -78,6 +78,8 @@ impl Service {
             controller,
             latched: self.recorder.newest_command.fault,
             drives: self.recorder.drives,
+            spare: Some(self.recorder.spare().to_owned()),
+            level: self.level,
             ..RunOutcome::default()
         };
         if let Some(refusal) = refusal(&job.folder) {

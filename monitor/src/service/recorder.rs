@@ -1,11 +1,11 @@
 //! The sink that records jobs: a recording for each job that is offered, in its run folder.
 
 use super::recording::{self, Recording};
+use super::store::Setup;
 use crate::conclusion::RecordingState;
 use crate::hub::{Batch, Sink};
 use crate::run_folder::{FileError, RunFolder};
 use crate::stage::Inputs;
-use messages::time::Period;
 use messages::{Command, ControllerReport, DrivesReport, Feedback, JobOffer, run_folder};
 use runtime::ServiceError;
 use runtime::channel::DEEP;
@@ -15,8 +15,7 @@ use std::time::Instant;
 
 /// Records the job that is under way.
 pub(super) struct JobRecorder {
-    /// The period of the cycle.
-    period: Period,
+    setup: Setup,
     pub(super) controller: ControllerReport,
     pub(super) drives: Option<DrivesReport>,
     pub(super) newest_command: Command,
@@ -53,10 +52,10 @@ impl Early {
 }
 
 impl JobRecorder {
-    /// Before the first job, in cycles of this `period`.
-    pub(super) fn new(period: Period) -> Self {
+    /// Before the first job.
+    pub(super) fn new(setup: Setup) -> Self {
         Self {
-            period,
+            setup,
             controller: ControllerReport::default(),
             drives: None,
             newest_command: Command::default(),
@@ -64,6 +63,11 @@ impl JobRecorder {
             job: None,
             recording: None,
         }
+    }
+
+    /// Where recordings go on when their folders take no more.
+    pub(super) fn spare(&self) -> &Path {
+        &self.setup.spare
     }
 
     /// Ends the recording when all of its job has been told, or nothing more comes.
@@ -109,7 +113,7 @@ impl JobRecorder {
         let goes_on = RecordingState::of(&folder, stream) == RecordingState::Open;
         let mut overruns_before = self.drives.map_or(0, |report| report.overruns);
         if self.shall_record(stream, &folder) {
-            match Recording::begin(stream, folder.clone(), overruns_before, self.period) {
+            match Recording::begin(stream, folder.clone(), overruns_before, &self.setup) {
                 Ok(recording) => {
                     overruns_before = recording.overruns_before;
                     self.recording = Some(recording);

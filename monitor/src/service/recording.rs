@@ -1,17 +1,17 @@
 //! A recording under way: its three files in the run folder, and what is known of it.
 
+use super::store::{Setup, Store};
 use crate::conclusion::LIGHT_LAG;
 use crate::latency::IntervalLog;
 use crate::recording::Recorder;
 use crate::recording::continuity::Continuity;
-use crate::recording::file::{RecordingError, RecordingWriter, Resumed};
+use crate::recording::file::parts;
 use crate::recording::info::{Progress, RecordingInfo};
 use crate::run_folder::{FileError, RunFolder};
 use crate::stage::{Inputs, MonitorStage, Outputs};
-use messages::time::Period;
 use messages::{ControllerReport, run_folder};
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::BufWriter;
 use std::time::{Duration, Instant};
 
 /// Length of an interval in the latency log.
@@ -23,8 +23,10 @@ pub(super) struct Recording {
     pub(super) folder: RunFolder,
     stage: MonitorStage,
     outputs: Outputs,
-    writer: RecordingWriter<BufWriter<File>>,
-    log: IntervalLog<BufWriter<File>>,
+    store: Store,
+    /// `None` when it could not be written any further.
+    log: Option<IntervalLog<BufWriter<File>>>,
+    log_refused: Option<FileError>,
     /// Time since the log began, when this process took it up.
     log_began: Duration,
     began: Instant,
@@ -43,8 +45,7 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// Begins the recording of a job, in cycles of this `period`, or goes on with the one that a dead monitor
-    /// has left.
+    /// Begins the recording of a job, or goes on with the one that a dead monitor has left.
     ///
     /// # Errors
     /// A file that cannot be opened or written, with its path.
@@ -52,14 +53,13 @@ impl Recording {
         stream: u64,
         folder: RunFolder,
         overruns_before: u64,
-        period: Period,
+        setup: &Setup,
     ) -> Result<Self, FileError> {
         let left =
             RecordingInfo::of(&folder, stream).filter(|info| info.progress == Progress::Open);
-        let samples = folder.file(run_folder::SAMPLES);
         match left {
-            Some(info) if samples.exists() => Self::resume(folder, info, period),
-            _ => Self::create(stream, folder, overruns_before, period),
+            Some(info) if !parts::of(folder.path()).is_empty() => Self::resume(folder, info, setup),
+            _ => Self::create(stream, folder, overruns_before, setup),
         }
     }
 
@@ -67,7 +67,7 @@ impl Recording {
         stream: u64,
         folder: RunFolder,
         overruns_before: u64,
-        period: Period,
+        setup: &Setup,
     ) -> Result<Self, FileError> {
         // The note first: a recording without one is nobody's.
         RecordingInfo {
@@ -77,22 +77,15 @@ impl Recording {
             ..RecordingInfo::default()
         }
         .write(&folder)?;
-        let samples = folder.file(run_folder::SAMPLES);
-        let writer = RecordingWriter::create(&samples, period).map_err(FileError::at(&samples))?;
+        let store = Store::create(stream, &folder, setup)?;
         let latency = folder.file(run_folder::LATENCY);
         let log = IntervalLog::create(&latency).map_err(FileError::at(&latency))?;
         let stage = MonitorStage::new();
-        Ok(Self::new(stream, folder, stage, writer, (log, Duration::ZERO), overruns_before))
+        Ok(Self::new(stream, folder, stage, store, (log, Duration::ZERO), overruns_before))
     }
 
-    fn resume(folder: RunFolder, info: RecordingInfo, period: Period) -> Result<Self, FileError> {
-        let samples = folder.file(run_folder::SAMPLES);
-        let refused = |error: RecordingError| match error {
-            RecordingError::Io(error) => error,
-            other => io::Error::other(other),
-        };
-        let Resumed { writer, last, records } = RecordingWriter::resume(&samples, period)
-            .map_err(|error| FileError::at(&samples)(refused(error)))?;
+    fn resume(folder: RunFolder, info: RecordingInfo, setup: &Setup) -> Result<Self, FileError> {
+        let (store, last, records) = Store::resume(info.stream, &folder, setup)?;
         let latency = folder.file(run_folder::LATENCY);
         let log = IntervalLog::resume(&latency).map_err(FileError::at(&latency))?;
         let recorder = match &last {
@@ -106,8 +99,7 @@ impl Recording {
             None => Recorder::new(),
         };
         let stage = MonitorStage::with(recorder);
-        let mut recording =
-            Self::new(info.stream, folder, stage, writer, log, info.overruns_before);
+        let mut recording = Self::new(info.stream, folder, stage, store, log, info.overruns_before);
         if let Some(last) = last {
             recording.newest = last.feedback.cycle.0;
             recording.played = last.command.stream == info.stream;
@@ -120,7 +112,7 @@ impl Recording {
         stream: u64,
         folder: RunFolder,
         stage: MonitorStage,
-        writer: RecordingWriter<BufWriter<File>>,
+        store: Store,
         (log, log_began): (IntervalLog<BufWriter<File>>, Duration),
         overruns_before: u64,
     ) -> Self {
@@ -129,9 +121,10 @@ impl Recording {
             folder,
             stage,
             outputs: Outputs::default(),
-            writer,
-            log,
+            store,
+            log: Some(log),
             log_began,
+            log_refused: None,
             began: Instant::now(),
             logged: Duration::ZERO,
             newest: 0,
@@ -152,15 +145,12 @@ impl Recording {
         self.stage.step(inputs, &mut self.outputs);
         self.write()?;
         if self.began.elapsed() >= self.logged + INTERVAL {
-            self.log_interval()?;
+            self.log_interval();
         }
         if self.stage.continuity().gaps > self.gaps_noted {
             // A successor must know of it.
             self.gaps_noted = self.stage.continuity().gaps;
-            // The records first: a successor counts what follows the last one.
-            let flushed = self.writer.flush();
-            flushed.map_err(|source| self.refused(run_folder::SAMPLES, source))?;
-            self.note(Progress::Open, "").write(&self.folder)?;
+            self.note_down(Progress::Open)?;
         }
         Ok(())
     }
@@ -169,20 +159,34 @@ impl Recording {
         if let Some(record) = self.outputs.records.last() {
             self.newest = record.feedback.cycle.0;
         }
-        let written = self.writer.write(&self.outputs.records);
-        written.map_err(|source| self.refused(run_folder::SAMPLES, source))
+        self.store.write(&self.outputs.records)
     }
 
-    fn log_interval(&mut self) -> Result<(), FileError> {
+    /// Logs the latencies since the last time. Where that fails the recording goes on without.
+    fn log_interval(&mut self) {
+        let Some(log) = &mut self.log else { return };
         let now = self.began.elapsed();
         let (start, duration) = (self.log_began + self.logged, now - self.logged);
-        let written = self.stage.histograms_mut().write_interval(&mut self.log, start, duration);
+        let written = self.stage.histograms_mut().write_interval(log, start, duration);
         self.logged = now;
-        written.map_err(|source| self.refused(run_folder::LATENCY, source))
+        if let Err(source) = written.and_then(|()| log.flush()) {
+            let path = self.folder.file(run_folder::LATENCY);
+            (self.log, self.log_refused) = (None, Some(FileError { path, source }));
+        }
     }
 
-    fn refused(&self, name: &str, source: io::Error) -> FileError {
-        FileError { path: self.folder.file(name), source }
+    /// Notes how the recording stands; over the old note where there is no room for a new one.
+    fn note_down(&self, progress: Progress) -> Result<(), FileError> {
+        let info = self.note(progress, &self.reason());
+        info.write(&self.folder).or_else(|error| info.overwrite(&self.folder).map_err(|_| error))
+    }
+
+    /// Why not all of it is in the run folder; empty when it is.
+    fn reason(&self) -> String {
+        match (self.store.reason(), &self.log_refused) {
+            (reason, Some(refused)) if reason.is_empty() => refused.to_string(),
+            (reason, _) => reason,
+        }
     }
 
     fn note(&self, progress: Progress, message: &str) -> RecordingInfo {
@@ -218,12 +222,9 @@ impl Recording {
     pub(super) fn finish(&mut self) -> Result<(), FileError> {
         self.stage.finish(&mut self.outputs);
         self.write()?;
-        self.log_interval()?;
-        let flushed = self.writer.flush();
-        flushed.map_err(|source| self.refused(run_folder::SAMPLES, source))?;
-        let flushed = self.log.flush();
-        flushed.map_err(|source| self.refused(run_folder::LATENCY, source))?;
-        self.note(Progress::Complete, "").write(&self.folder)
+        self.log_interval();
+        self.store.finish()?;
+        self.note_down(Progress::Complete)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::conclusion::RecordingState;
-use crate::recording::file::RecordingReader;
+use crate::recording::file::parts::PartsReader;
 use crate::recording::info::RecordingInfo;
 use crate::run_folder::{FileError, RunFolder};
 use crate::summary::{Outcome, Summary};
@@ -11,8 +11,7 @@ use messages::{
     Command, ControllerReport, Cycle, Fault, FaultCode, Feedback, JobOffer, Nanoseconds, run_folder,
 };
 use runtime::{Instance, Publisher};
-use std::fs::{self, File};
-use std::io::BufReader;
+use std::fs;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 const STREAM: u64 = 3;
@@ -50,7 +49,7 @@ impl Bench {
 
     /// A monitor, as one that was just started.
     fn service(&self) -> Service {
-        Service::open(&self.monitor, Period::OF_SETPOINTS).unwrap()
+        Service::open(&self.monitor, &Machine::builtin(), &RecordingOptions::default()).unwrap()
     }
 
     fn folder(&self) -> RunFolder {
@@ -96,9 +95,8 @@ impl Bench {
     }
 
     fn cycles(&self) -> Vec<u64> {
-        let file = File::open(self.folder().file(run_folder::SAMPLES)).unwrap();
-        let reader = RecordingReader::new(BufReader::new(file)).unwrap();
-        reader.map(|record| record.unwrap().feedback.cycle.0).collect()
+        let reader = PartsReader::open(self.folder.path()).unwrap();
+        reader.map_while(|record| Some(record.ok()?.feedback.cycle.0)).collect()
     }
 
     /// A service that was offered a job, has seen it begin, and half of it.
@@ -314,12 +312,12 @@ fn a_supervisor_that_dies_leaves_no_job_without_a_summary() {
     let mut bench = Bench::new();
     let mut service = bench.playing();
     let source = std::io::ErrorKind::StorageFull.into();
-    service.recorder.drop_recording(&FileError { path: "samples.bin".into(), source }).unwrap();
+    service.recorder.drop_recording(&FileError { path: "samples.mcap".into(), source }).unwrap();
     bench.play(20, STREAM);
     bench.end(0, lost);
     let summary = bench.concluded(&mut service);
     let warnings = summary.warnings.join("; ");
-    assert!(warnings.contains("the recording was broken off: samples.bin"), "{warnings}");
+    assert!(warnings.contains("the recording was broken off: samples.mcap"), "{warnings}");
 }
 
 #[test]

@@ -26,6 +26,8 @@ pub(crate) struct OperationQueue<'a> {
     is_read: bool,
     /// What is passed over, until the stroke to begin with comes.
     passes: Option<Passing>,
+    /// Strokes that were passed over before it.
+    passed: u64,
 }
 
 /// Passes over what comes before a stroke.
@@ -42,7 +44,7 @@ impl<'a> OperationQueue<'a> {
     /// Of `steps`, which `operations` takes.
     pub(crate) fn new(steps: Steps<'a>, operations: Operations<'a>) -> Self {
         let made = VecDeque::new();
-        Self { steps, operations, made, first: 0, is_read: false, passes: None }
+        Self { steps, operations, made, first: 0, is_read: false, passes: None, passed: 0 }
     }
 
     /// Begins with this stroke, from 1; what is marked before is left out. `limits` are those of paths.
@@ -86,7 +88,7 @@ impl<'a> OperationQueue<'a> {
 
     /// Strokes that were passed over before the first.
     pub(crate) fn passed(&self) -> u64 {
-        self.passed
+        self.passes.as_ref().map_or(self.passed, |passing| passing.passed)
     }
 
     /// What a person should know of what has been made so far.
@@ -103,6 +105,7 @@ impl<'a> OperationQueue<'a> {
                         Passed::Over => continue,
                         Passed::On(operation) => return Ok(Some(operation)),
                         Passed::Begun(operation) => {
+                            self.passed = passing.passed;
                             self.passes = None;
                             return Ok(Some(operation));
                         }

@@ -16,27 +16,43 @@ use std::time::{Duration, Instant};
 /// How often the facts are written anew.
 const INTERVAL: Duration = Duration::from_secs(1);
 
-/// The files of a plan in a run folder.
+/// The files of a plan in a run folder. The artwork goes on in a spare folder where this takes no more: the marks are judged by it.
 pub(super) struct PlanFiles {
     artwork: BufWriter<File>,
-    /// Where the lines of each window begin that may still be taken back [bytes].
-    begins: VecDeque<u64>,
-    end: u64,
+    /// Where the lines of each window begin that may still be taken back.
+    begins: VecDeque<Begin>,
+    end: Begin,
     folder: PathBuf,
+    spare: PathBuf,
     noted: Option<Instant>,
+    /// Whether the facts could not be written, which is said once.
+    refused: bool,
+}
+
+/// A place in the artwork.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Begin {
+    /// Whether it is in the spare folder.
+    spared: bool,
+    /// Bytes before it in its file.
+    at: u64,
 }
 
 impl PlanFiles {
     /// Begins them in `folder`.
-    pub(super) fn create(folder: &Path) -> Result<Self, Refusal> {
+    pub(super) fn create(folder: &Path, spare: &Path) -> Result<Self, Refusal> {
+        // What an earlier job left there.
+        let _ = fs::remove_file(spare.join(run_folder::ARTWORK));
         let path = folder.join(run_folder::ARTWORK);
         let artwork = File::create(&path).map_err(|source| failed(path, source))?;
         Ok(Self {
             artwork: BufWriter::new(artwork),
             begins: VecDeque::new(),
-            end: 0,
+            end: Begin { spared: false, at: 0 },
             folder: folder.to_owned(),
+            spare: spare.to_owned(),
             noted: None,
+            refused: false,
         })
     }
 
@@ -45,17 +61,43 @@ impl PlanFiles {
         for line in lines {
             finite(line)?;
         }
-        let mut write = || -> io::Result<u64> {
-            for line in lines {
-                serde_json::to_writer(&mut self.artwork, line)?;
-                self.artwork.write_all(b"\n")?;
-            }
-            self.artwork.flush()?;
-            self.artwork.stream_position()
-        };
-        let end = write();
         self.begins.push_back(self.end);
-        self.end = end.map_err(|source| failed(self.folder.join(run_folder::ARTWORK), source))?;
+        match self.write(lines) {
+            Ok(at) => self.end.at = at,
+            Err(source) if self.end.spared => {
+                return Err(failed(self.folder.join(run_folder::ARTWORK), source));
+            }
+            Err(source) => {
+                let path = self.folder.join(run_folder::ARTWORK);
+                let moved = self.move_out().and_then(|()| self.write(lines));
+                message::tell(&format!("planner: {}: {source}", path.display()));
+                self.end.at = moved.map_err(|_| failed(path, source))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends lines; where the file ends then.
+    fn write(&mut self, lines: &[ArtworkLine]) -> io::Result<u64> {
+        for line in lines {
+            serde_json::to_writer(&mut self.artwork, line)?;
+            self.artwork.write_all(b"\n")?;
+        }
+        self.artwork.flush()?;
+        self.artwork.stream_position()
+    }
+
+    /// Goes on in the spare folder.
+    fn move_out(&mut self) -> io::Result<()> {
+        let spare = BufWriter::new(File::create(self.spare.join(run_folder::ARTWORK))?);
+        // What was buffered is written again.
+        let (file, _) = std::mem::replace(&mut self.artwork, spare).into_parts();
+        file.set_len(self.end.at)?;
+        self.end = Begin { spared: true, at: 0 };
+        // The newest window begins there.
+        if let Some(begin) = self.begins.back_mut() {
+            *begin = self.end;
+        }
         Ok(())
     }
 
@@ -68,14 +110,19 @@ impl PlanFiles {
     pub(super) fn take_back(&mut self, count: usize) -> Result<(), Refusal> {
         let first = self.begins.len().saturating_sub(count);
         let Some(begin) = self.begins.drain(first..).next() else { return Ok(()) };
-        self.end = begin;
-        let mut cut = || -> io::Result<u64> {
+        let path = self.folder.join(run_folder::ARTWORK);
+        let mut cut = || -> io::Result<()> {
+            let left = self.end.spared && !begin.spared;
+            if left {
+                // It goes on in the spare folder all the same: the other one may be full still.
+                File::options().write(true).open(&path)?.set_len(begin.at)?;
+            }
+            self.end = Begin { spared: self.end.spared, at: if left { 0 } else { begin.at } };
             self.artwork.flush()?;
-            self.artwork.get_ref().set_len(begin)?;
-            self.artwork.seek(SeekFrom::Start(begin))
+            self.artwork.get_ref().set_len(self.end.at)?;
+            self.artwork.seek(SeekFrom::Start(self.end.at)).map(drop)
         };
-        cut().map_err(|source| failed(self.folder.join(run_folder::ARTWORK), source))?;
-        Ok(())
+        cut().map_err(|source| failed(path.clone(), source))
     }
 
     /// Writes what the plan comes to so far, now and then and as `is_last`.
@@ -84,6 +131,9 @@ impl PlanFiles {
         facts: &dyn Fn() -> PlanFacts,
         is_last: bool,
     ) -> Result<(), Refusal> {
+        if !is_last && self.refused {
+            return Ok(());
+        }
         if !is_last && self.noted.is_some_and(|noted| noted.elapsed() < INTERVAL) {
             return Ok(());
         }
@@ -98,11 +148,14 @@ impl PlanFiles {
             fs::write(&unfinished, serde_json::to_vec_pretty(&facts)?)?;
             fs::rename(&unfinished, &path)
         };
-        write().map_err(|source| {
+        if let Err(source) = write() {
             // Half a file on a full disk would only make it fuller.
             let _ = fs::remove_file(&unfinished);
-            failed(path, source)
-        })
+            self.refused = true;
+            // The marks need no plan.
+            message::tell(&format!("planner: {}: {source}", path.display()));
+        }
+        Ok(())
     }
 }
 

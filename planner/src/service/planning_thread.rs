@@ -62,13 +62,13 @@ pub(super) struct PlanningThread {
 }
 
 impl PlanningThread {
-    /// Plans the job of the run folder `folder` on `machine` from where the motors stand, load side [m
+    /// Plans the job of the run folder `folder`, whose files go on in `spare` where it takes no more, on `machine` from where the motors stand, load side [m
     /// or rad], as `stream`.
     ///
     /// # Errors
     /// When the operating system gives no thread.
     pub(super) fn start(
-        folder: &Path,
+        (folder, spare): (&Path, &Path),
         machine: &Machine,
         standing: &AxisArray,
         stream: u64,
@@ -79,6 +79,7 @@ impl PlanningThread {
         let (sender, planned) = bounded(1);
         let task = Task {
             folder: folder.to_owned(),
+            spare: spare.to_owned(),
             machine: machine.clone(),
             standing: *standing,
             stream,
@@ -116,6 +117,7 @@ impl Drop for PlanningThread {
 
 struct Task {
     folder: PathBuf,
+    spare: PathBuf,
     machine: Machine,
     standing: AxisArray,
     stream: u64,
@@ -139,7 +141,7 @@ impl Task {
         if self.shared.abandoned.load() {
             return Err(refuse(PlanError::Abandoned));
         }
-        let files = PlanFiles::create(&self.folder)?;
+        let files = PlanFiles::create(&self.folder, &self.spare)?;
         let mut sending = Sending { sender, shared: &self.shared, files, strokes: 0, failed: None };
         let facts = self.plan_to(&job, &mut sending);
         match sending.failed {

@@ -13,6 +13,7 @@ use messages::time::Period;
 use messages::{Command, Feedback, OperatorVerb, PlannerPhase, run_folder};
 use monitor::conclusion::{RunOutcome, summarise};
 use monitor::latency::HopLatency;
+use monitor::recording::file::parts::Extent;
 use monitor::run_analysis::{Clock, RunResults};
 use monitor::stage::{Inputs, MonitorStage, Outputs};
 use monitor::summary::Realtime;
@@ -159,7 +160,8 @@ fn measure(
     let request =
         inputs::job_request(None, &input.machine, input.folder.as_deref(), &input.job_overrides)
             .absolute();
-    let configuration = Configuration::new(input.source.clone(), &arguments.drives)?;
+    let configuration =
+        Configuration::new(input.source.clone(), &arguments.drives, Extent::default())?;
     // Of an unpredictable name and for this user alone; it goes when this ends.
     let folder = tempfile::Builder::new()
         .prefix("graver-bench-")

@@ -59,6 +59,8 @@ impl JobRun<'_> {
         if !self.run_outcome.latched.is_some() {
             self.run_outcome.latched = self.pipeline.latest.progress.fault;
         }
+        let (level, spare) = self.pipeline.recording();
+        (self.run_outcome.level, self.run_outcome.spare) = (level, Some(spare));
         let machine = &self.pipeline.machine;
         self.run_outcome.warnings.splice(0..0, machine.job_warnings());
         // Its report takes its time.

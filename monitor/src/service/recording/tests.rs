@@ -3,11 +3,13 @@
 
 use super::*;
 use crate::conclusion::RecordingState;
-use crate::recording::CycleRecord;
 use crate::recording::continuity::Gap;
-use crate::recording::file::RecordingReader;
+use crate::recording::file::Description;
+use crate::recording::file::parts::PartsReader;
+use messages::time::Period;
 use messages::{Command, Cycle, Feedback, Nanoseconds};
-use std::io::BufReader;
+use std::fs::File;
+use std::io;
 
 const STREAM: u64 = 5;
 
@@ -39,14 +41,28 @@ fn folder(below: &tempfile::TempDir) -> RunFolder {
     RunFolder::create_at(below.path()).unwrap()
 }
 
+/// With a spare place below a folder.
+fn setup(below: &tempfile::TempDir) -> Setup {
+    let description = Description::of(Period::OF_SETPOINTS);
+    Setup { description, quota: None, spare: below.path().join("spare") }
+}
+
 fn begin(below: &tempfile::TempDir) -> Recording {
-    Recording::begin(STREAM, folder(below), 0, Period::OF_SETPOINTS).unwrap()
+    begun(below, folder(below), STREAM, 0).unwrap()
+}
+
+fn begun(
+    below: &tempfile::TempDir,
+    folder: RunFolder,
+    stream: u64,
+    overruns_before: u64,
+) -> Result<Recording, FileError> {
+    Recording::begin(stream, folder, overruns_before, &setup(below))
 }
 
 fn cycles(folder: &RunFolder) -> Vec<u64> {
-    let file = File::open(folder.file(run_folder::SAMPLES)).unwrap();
-    let reader = RecordingReader::new(BufReader::new(file)).unwrap();
-    reader.map(|record| record.unwrap().feedback.cycle.0).collect()
+    let reader = PartsReader::open(folder.path()).unwrap();
+    reader.map_while(|record| Some(record.ok()?.feedback.cycle.0)).collect()
 }
 
 #[test]
@@ -109,20 +125,19 @@ fn the_note_tells_how_the_recording_stands_and_counts_what_is_in_the_file() {
 #[test]
 fn a_successor_goes_on_with_the_recording_and_counts_the_gap() {
     // Killed before anything was written, between two records, and inside one.
-    for torn in [0, 1, size_of::<CycleRecord>() as u64 - 1] {
+    for torn in [0, 1, 30] {
         let below = tempfile::tempdir().unwrap();
         let folder = folder(&below);
-        let mut first = Recording::begin(STREAM, folder.clone(), 7, Period::OF_SETPOINTS).unwrap();
+        let mut first = begun(&below, folder.clone(), STREAM, 7).unwrap();
         take(&mut first, 0, 100, STREAM);
         take(&mut first, 110, 200, STREAM);
-        first.writer.flush().unwrap();
-        drop(first);
+        // As one that is killed.
+        std::mem::forget(first);
         let samples = File::options().write(true).open(folder.file(run_folder::SAMPLES)).unwrap();
         samples.set_len(samples.metadata().unwrap().len() - torn).unwrap();
         let kept = if torn == 0 { 200 } else { 199 };
 
-        let mut second =
-            Recording::begin(STREAM, folder.clone(), 99, Period::OF_SETPOINTS).unwrap();
+        let mut second = begun(&below, folder.clone(), STREAM, 99).unwrap();
         assert_eq!((second.overruns_before, second.played), (7, true));
         take(&mut second, 300, 400, STREAM);
         second.finish().unwrap();
@@ -141,9 +156,8 @@ fn a_successor_goes_on_with_the_recording_and_counts_the_gap() {
 fn a_recording_of_another_job_is_not_gone_on_with() {
     let below = tempfile::tempdir().unwrap();
     let folder = folder(&below);
-    let mut first = Recording::begin(STREAM - 1, folder.clone(), 0, Period::OF_SETPOINTS).unwrap();
+    let mut first = begun(&below, folder.clone(), STREAM - 1, 0).unwrap();
     take(&mut first, 0, 100, STREAM - 1);
-    first.writer.flush().unwrap();
     let mut second = begin(&below);
     take(&mut second, 300, 310, STREAM);
     second.finish().unwrap();
@@ -169,53 +183,52 @@ fn a_file_that_is_no_recording_is_refused_by_its_name() {
     drop(begin(&below));
     let samples = folder(&below).file(run_folder::SAMPLES);
     std::fs::write(&samples, vec![7; 5000]).unwrap();
-    let error = Recording::begin(STREAM, folder(&below), 0, Period::OF_SETPOINTS)
-        .err()
-        .unwrap()
-        .to_string();
-    assert!(error.contains("samples.bin: not a recording"), "{error}");
-}
-
-/// A recording whose samples go to a device that is always full.
-fn on_a_full_disk(below: &tempfile::TempDir) -> Recording {
-    let samples = folder(below).file(run_folder::SAMPLES);
-    let _ = std::fs::remove_file(&samples);
-    std::os::unix::fs::symlink("/dev/full", &samples).unwrap();
-    let mut recording = begin_elsewhere(below);
-    let full = File::options().write(true).open("/dev/full").unwrap();
-    recording.writer = RecordingWriter::append(BufWriter::new(full));
-    recording
-}
-
-/// A recording whose files are elsewhere, but whose note is in the folder.
-fn begin_elsewhere(below: &tempfile::TempDir) -> Recording {
-    let elsewhere = tempfile::tempdir().unwrap();
-    let mut recording = begin(&elsewhere);
-    recording.folder = folder(below);
-    recording.note(Progress::Open, "").write(&recording.folder).unwrap();
-    recording
+    let error = begun(&below, folder(&below), STREAM, 0).err().unwrap().to_string();
+    assert!(error.contains("samples.mcap: not a recording"), "{error}");
 }
 
 #[test]
-fn a_full_disk_ends_the_recording_with_a_reason_and_not_the_monitor() {
+fn a_full_disk_costs_the_recording_and_no_record() {
+    let below = tempfile::tempdir().unwrap();
+    let folder = RunFolder::create_at(&below.path().join("run")).unwrap();
+    let setup = setup(&below);
+    let mut recording = Recording::begin(STREAM, folder.clone(), 0, &setup).unwrap();
+    take(&mut recording, 0, 100, STREAM);
+    // It fills up in the middle of the run.
+    let source = io::Error::from_raw_os_error(28);
+    recording.store.move_out(source).unwrap();
+    take(&mut recording, 100, 200, STREAM);
+    std::mem::forget(recording);
+    // A successor finds where it went.
+    let mut second = Recording::begin(STREAM, folder.clone(), 0, &setup).unwrap();
+    take(&mut second, 190, 300, STREAM);
+    second.finish().unwrap();
+    let RecordingState::Complete(info) = RecordingState::of(&folder, STREAM) else { panic!() };
+    assert!(info.message.contains("samples.mcap: "), "{}", info.message);
+    assert_eq!((info.lost, info.gap_count), (0, 0));
+    let reader = PartsReader::open_both(folder.path(), Some(&setup.spare)).unwrap();
+    let all: Vec<u64> = reader.map_while(|record| Some(record.ok()?.feedback.cycle.0)).collect();
+    assert_eq!(all, (0..300).collect::<Vec<_>>());
+}
+
+#[test]
+fn where_there_is_no_spare_place_either_the_recording_ends_with_the_reason() {
     let below = tempfile::tempdir().unwrap();
     let folder = folder(&below);
-    let mut recording = on_a_full_disk(&below);
-    let error = taken(&mut recording, 0, 100, STREAM).unwrap_err();
-    assert!(error.to_string().contains("samples.bin: No space left"), "{error}");
+    std::fs::write(below.path().join("spare"), "a file").unwrap();
+    let mut recording = begin(&below);
+    take(&mut recording, 0, 100, STREAM);
+    let error = recording.store.move_out(io::Error::from_raw_os_error(28)).unwrap_err();
+    assert!(error.to_string().contains("samples.mcap: No space left"), "{error}");
     give_up(&folder, STREAM, &error).unwrap();
     assert_eq!(RecordingState::of(&folder, STREAM), RecordingState::Failed(error.to_string()));
-    // What is small enough for the buffer is told at the end.
-    let mut recording = on_a_full_disk(&below);
-    taken(&mut recording, 0, 1, STREAM).unwrap();
-    assert!(recording.finish().unwrap_err().to_string().contains("samples.bin: No space left"));
 }
 
 #[test]
 fn a_vanished_folder_ends_the_recording_and_nobody_waits_for_it() {
     let below = tempfile::tempdir().unwrap();
     let place = RunFolder::create_at(&below.path().join("run")).unwrap();
-    let mut recording = Recording::begin(STREAM, place.clone(), 0, Period::OF_SETPOINTS).unwrap();
+    let mut recording = begun(&below, place.clone(), STREAM, 0).unwrap();
     take(&mut recording, 0, 100, STREAM);
     std::fs::remove_dir_all(place.path()).unwrap();
     let error = recording.finish().unwrap_err();
@@ -223,7 +236,7 @@ fn a_vanished_folder_ends_the_recording_and_nobody_waits_for_it() {
     give_up(&place, STREAM, &error).unwrap();
     assert_eq!(RecordingState::of(&place, STREAM), RecordingState::Absent);
     assert!(!place.path().exists());
-    let error = Recording::begin(STREAM, place, 0, Period::OF_SETPOINTS).err().unwrap();
+    let error = begun(&below, place, STREAM, 0).err().unwrap();
     assert!(error.to_string().contains("run/monitor.json: No such file"), "{error}");
 }
 
@@ -232,7 +245,7 @@ fn where_the_note_cannot_be_written_only_one_that_says_open_is_waited_for() {
     let below = tempfile::tempdir().unwrap();
     let folder = folder(&below);
     let source = io::ErrorKind::StorageFull.into();
-    let reason = FileError { path: "samples.bin".into(), source };
+    let reason = FileError { path: "samples.mcap".into(), source };
     // Over a folder of its name no file can be renamed, and it cannot be written into.
     std::fs::create_dir(folder.file(run_folder::WATCH)).unwrap();
     give_up(&folder, STREAM, &reason).unwrap();
