@@ -181,7 +181,8 @@ function startDrop() {
 
 async function list() {
   try {
-    for (const { id, name, size } of await http("GET", "jobs")) {
+    // The newest comes first there, and last here.
+    for (const { id, name, size } of (await http("GET", "jobs")).reverse()) {
       if (!files.has(id)) files.set(id, { id, name, size, kind: kindOf(name), values: {} });
     }
     showFiles();

@@ -120,6 +120,8 @@ function showTriggers() {
 }
 
 function begin(signals) {
+  // Without a pipeline there are none; those that were chosen stay.
+  if (!signals?.length) return;
   const isFirst = traces.known.length === 0;
   traces.setKnown(signals);
   const saved = JSON.parse(localStorage.getItem("graver.signals") ?? "[]");
