@@ -69,23 +69,23 @@ pub struct Failure {
     /// How a run ends that fails this way.
     pub outcome: Outcome,
     /// What is wrong, where, and what would be right.
-    pub refusal: Refusal,
+    pub refusal: Box<Refusal>,
 }
 
 impl Failure {
     /// Bad input.
     pub fn bad_input(message: impl std::fmt::Display) -> Self {
-        Self { outcome: Outcome::Refused, refusal: Refusal::internal(message) }
+        Self { outcome: Outcome::Refused, refusal: Box::new(Refusal::internal(message)) }
     }
 
     /// A service that could not start or died.
     pub fn service(error: impl std::fmt::Display) -> Self {
-        Self { outcome: Outcome::Aborted, refusal: Refusal::internal(error) }
+        Self { outcome: Outcome::Aborted, refusal: Box::new(Refusal::internal(error)) }
     }
 
     /// What a person took back.
     pub fn stopped(message: impl std::fmt::Display) -> Self {
-        Self { outcome: Outcome::Stopped, refusal: Refusal::internal(message) }
+        Self { outcome: Outcome::Stopped, refusal: Box::new(Refusal::internal(message)) }
     }
 
     /// Output that could not be written.
@@ -129,7 +129,7 @@ pub fn other_errors(refusal: &Refusal) -> impl Iterator<Item = ErrorSummary> + '
 
 impl From<Refusal> for Failure {
     fn from(refusal: Refusal) -> Self {
-        Self { outcome: Outcome::Refused, refusal }
+        Self { outcome: Outcome::Refused, refusal: Box::new(refusal) }
     }
 }
 

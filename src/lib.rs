@@ -18,8 +18,8 @@ use arguments::{Arguments, BenchCommand, Command, MachineCommand};
 use clap::Parser;
 use commands::{
     bench, calibrate, check, compare, doctor, export, faults, figures, kinematics, machine, manual,
-    offset, operating, operator, plan, queue, replay, run, serve, service, simulate, size, status, submit, tables,
-    verify,
+    offset, operating, operator, plan, queue, replay, run, serve, service, simulate, size, status,
+    submit, tables, verify,
 };
 use exit::{Exit, Failure};
 use runtime::domain::Role;

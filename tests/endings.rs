@@ -83,7 +83,7 @@ fn a_signal_while_it_marks_brings_the_axes_to_rest_along_the_path() {
     let services = services(&place.await_played(&mut running, 400));
     running.signal(TERMINATE);
     let summary = assert_stopped(&place, &running.wait());
-    assert!(number(&summary, "/marks/missing") > 1e-3, "{summary:#}");
+    assert!(number(&summary, "/left/length") > 1e-3, "{summary:#}");
     support::assert_ends_dark_and_at_rest(&place.recording("run"), 2);
     place.assert_nothing_left(&services);
 }

@@ -6,6 +6,7 @@
 
 mod client;
 mod lanes;
+mod opening;
 mod tty;
 
 use std::io;

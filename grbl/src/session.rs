@@ -14,7 +14,7 @@ mod program;
 mod realtime;
 mod system;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 use ::machine::Machine;
 use ::machine::gcode_settings::{Dialect, WordMeanings};
@@ -133,6 +133,8 @@ pub struct Session {
     output: Vec<u8>,
     asks: Vec<(u64, Ask)>,
     purposes: Vec<(u64, Purpose)>,
+    /// Requests for motion that a reset or a jog cancel has forgotten, and that are not answered yet.
+    orphans: BTreeSet<u64>,
     tickets: u64,
     status: Option<Status>,
     /// When the machine answered last [s].
@@ -145,6 +147,8 @@ pub struct Session {
     /// The fault that was told.
     told_fault: Option<String>,
     is_paused: bool,
+    /// Whether a job that begins is to be held at once.
+    holds_next: bool,
     is_door: bool,
     is_checking: bool,
     is_asleep: bool,
@@ -197,6 +201,7 @@ impl Session {
             output: Vec::new(),
             asks: Vec::new(),
             purposes: Vec::new(),
+            orphans: BTreeSet::new(),
             tickets: 0,
             status: None,
             answered: 0.0,
@@ -205,6 +210,7 @@ impl Session {
             alarm: None,
             told_fault: None,
             is_paused: false,
+            holds_next: false,
             is_door: false,
             is_checking: false,
             is_asleep: false,
@@ -226,9 +232,10 @@ impl Session {
         self.greet();
     }
 
-    /// The client has gone. Its jobs go on; a program of which it has not sent the end is thrown away.
+    /// The client has gone. Its jobs go on, its jogs do not; a program of which it has not sent the end is thrown away.
     pub fn disconnect(&mut self, now: f64) {
         self.now = now;
+        self.cancel_jog();
         self.is_connected = false;
         self.splitter = Splitter::default();
         self.forget_lines();
@@ -279,6 +286,10 @@ impl Session {
             Waiting::Dropped => 1,
         };
         let is_room = self.waiting_bytes + bytes <= MOST_WAITING;
+        // Whoever goes on so far beyond its window counts no answers.
+        if !is_room && self.waiting.len() > MOST_WAITING {
+            return;
+        }
         self.waiting_bytes += if is_room { bytes } else { 1 };
         self.waiting.push_back(if is_room { line } else { Waiting::Dropped });
     }
@@ -300,6 +311,10 @@ impl Session {
             if status.unhomed.is_empty() {
                 self.is_unlocked = false;
             }
+            if self.holds_next && status.state == "running" {
+                self.holds_next = false;
+                self.ask_quietly(Verb::Hold, 0.0);
+            }
             self.status = Some(status);
         }
         self.go_on();
@@ -309,6 +324,10 @@ impl Session {
     pub fn answered(&mut self, ticket: u64, answer: Answer, now: f64) {
         self.now = now;
         let place = self.purposes.iter().position(|(number, _)| *number == ticket);
+        if self.orphans.remove(&ticket) && matches!(answer, Answer::Done(_)) {
+            // It was on its way while a reset forgot it.
+            self.ask_quietly(Verb::Stop, 0.0);
+        }
         if let Some(place) = place {
             let (_, purpose) = self.purposes.swap_remove(place);
             match purpose {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 const MOST: u64 = 1 << 30;
 
 /// Programs that are kept for who looks at what was marked, and for jobs that wait.
-const KEPT: usize = 64;
+const KEPT: usize = 256;
 
 /// A folder of programs, `grbl-N.nc`.
 #[derive(Debug, Clone)]

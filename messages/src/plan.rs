@@ -77,7 +77,6 @@ pub struct LayerFacts {
 
 /// An upright box, machine frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(rename = "BoundingBox")]
 pub struct Bounds {
     /// The lower corner [m].
     pub lower: [f64; 3],

@@ -20,8 +20,8 @@ use crate::run_analysis::{Clock, RunAnalysis, RunResults};
 use crate::run_folder::RunFolder;
 use crate::summary::text::length;
 use crate::summary::{
-    DrivesSummary, ErrorSummary, FaultSummary, JobPlace, JobSummary, LeftSummary, MachineSummary, Outcome,
-    Realtime, StallSummary, Summary,
+    DrivesSummary, ErrorSummary, FaultSummary, JobPlace, JobSummary, LeftSummary, MachineSummary,
+    Outcome, Realtime, StallSummary, Summary,
 };
 use machine::{Actuator, Machine};
 use messages::artwork::Artwork;

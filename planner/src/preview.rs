@@ -4,6 +4,7 @@
 mod simplified;
 
 use machine::Machine;
+use messages::artwork::Artwork;
 use messages::plan::Bounds;
 use nalgebra::Vector3;
 
@@ -12,7 +13,7 @@ use crate::geometry::contour::{Contour, GAP};
 use crate::geometry::operation::{Operation, OperationKind};
 use crate::job::Job;
 use crate::planning::run::{operations, path_limits};
-use simplified::Simplified;
+use simplified::{FINEST, Simplified};
 
 /// What a job draws, by no more points than were asked for.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -73,8 +74,6 @@ pub(crate) enum NoOutline {
 /// # Errors
 /// Where there can be none.
 pub(crate) fn flat_bounds(machine: &Machine, job: &Job) -> Result<Option<Bounds>, NoOutline> {
-    /// How far the box may be inside of a curve [m].
-    const CHORD: f64 = 1e-6;
     let flat = Job { surface: None, ..job.clone() };
     let mut queue =
         operations(machine, &flat, &path_limits(machine, job)).map_err(NoOutline::Refused)?;
@@ -87,7 +86,8 @@ pub(crate) fn flat_bounds(machine: &Machine, job: &Job) -> Result<Option<Bounds>
             }
             OperationKind::Path(contour) => {
                 let lit = contour.stretches().filter(|(demand, _)| demand.power > 0.0);
-                let points = lit.flat_map(|(demand, to)| contour.points(demand.from, to, CHORD));
+                let points = lit
+                    .flat_map(|(demand, to)| contour.points(demand.from, to, Artwork::CHORD_ERROR));
                 points.for_each(|point| Bounds::widen(&mut bounds, &point));
             }
             OperationKind::Dot(dot) => Bounds::widen(&mut bounds, &dot.at.into()),
@@ -123,6 +123,7 @@ impl Pen {
                 self.go(dot.at);
                 self.is_lit = false;
                 let power = dot.exposures.iter().map(|(_, power)| *power).fold(0.0, f64::max);
+                Bounds::widen(&mut self.bounds, &dot.at.into());
                 self.mark(vec![dot.at.into()], power);
                 self.is_lit = false;
             }
@@ -145,7 +146,13 @@ impl Pen {
                 to = end;
             }
             if demand.power > 0.0 {
-                self.mark(contour.points(demand.from, to, self.marks.tolerance()), demand.power);
+                let mut points = contour.points(demand.from, to, FINEST);
+                // The box is that of the job, however coarse its lines become.
+                points.iter().for_each(|point| Bounds::widen(&mut self.bounds, point));
+                if self.marks.tolerance() > FINEST {
+                    points = contour.points(demand.from, to, self.marks.tolerance());
+                }
+                self.mark(points, demand.power);
             } else {
                 self.travel(contour.points(demand.from, to, self.travels.tolerance()));
             }
@@ -161,9 +168,6 @@ impl Pen {
     }
 
     fn mark(&mut self, points: Vec<[f64; 3]>, power: f64) {
-        for point in &points {
-            Bounds::widen(&mut self.bounds, point);
-        }
         let goes_on = core::mem::replace(&mut self.is_lit, true);
         self.marks.push(PreviewLine { points, power, goes_on });
     }

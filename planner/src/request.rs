@@ -71,7 +71,7 @@ pub struct Refusal {
     pub text: String,
     /// What else is wrong.
     #[serde(default)]
-    pub others: Vec<Problem>,
+    pub others: Box<[Problem]>,
 }
 
 /// One thing that is wrong with a file.
@@ -154,7 +154,7 @@ impl JobRequest {
             (None, _) => String::new(),
         };
         let text = format!("{place}{message}");
-        Refusal { file, line, column: None, message, text, others: Vec::new() }
+        Refusal { file, line, column: None, message, text, others: Box::default() }
     }
 }
 
@@ -169,7 +169,7 @@ impl Refusal {
             others: match error {
                 JobError::Document(error) => others_of_document(error),
                 JobError::Gcode(error) => others_of_program(error),
-                _ => Vec::new(),
+                _ => Box::default(),
             },
             ..Self::of_diagnostic(error)
         }
@@ -196,13 +196,13 @@ impl Refusal {
             text = diagnostic.to_string();
         }
         let message = message_of(diagnostic);
-        Self { file: None, line: None, column: None, message, text, others: Vec::new() }
+        Self { file: None, line: None, column: None, message, text, others: Box::default() }
     }
 
     /// A refusal that no line of a file is to blame for.
     pub fn internal(error: impl std::fmt::Display) -> Self {
         let message = error.to_string();
-        let others = Vec::new();
+        let others = Box::default();
         Self { file: None, line: None, column: None, text: message.clone(), message, others }
     }
 }
@@ -216,7 +216,7 @@ fn message_of(diagnostic: &dyn Diagnostic) -> String {
 }
 
 /// All that is wrong with a document but the first.
-fn others_of_document(error: &DocumentError) -> Vec<Problem> {
+fn others_of_document(error: &DocumentError) -> Box<[Problem]> {
     let others = error.problems().skip(1).map(|problem| Problem {
         file: Some(error.file().to_owned()),
         line: problem.line().map(|line| line as u64),
@@ -227,7 +227,7 @@ fn others_of_document(error: &DocumentError) -> Vec<Problem> {
 }
 
 /// All that is wrong with a program but the first.
-fn others_of_program(error: &GcodeError) -> Vec<Problem> {
+fn others_of_program(error: &GcodeError) -> Box<[Problem]> {
     let others = error.others.iter().map(|other| Problem {
         file: Some(other.file.clone()),
         line: Some(other.line),

@@ -17,9 +17,9 @@ const NICENESS: libc::c_int = 10;
 pub struct Bounds {
     /// From its start to its end.
     pub time: Duration,
-    /// Address space [bytes].
+    /// Address space, in bytes.
     pub memory: u64,
-    /// Standard output, and as much standard error [bytes].
+    /// Standard output, and as much standard error, in bytes.
     pub output: usize,
 }
 

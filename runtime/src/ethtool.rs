@@ -50,7 +50,7 @@ impl Offload {
     }
 }
 
-/// How long the card keeps a received packet before it interrupts [µs].
+/// How long the card keeps a received packet before it interrupts, in µs.
 ///
 /// # Errors
 /// A card that does not exist or does not tell.

@@ -4,7 +4,7 @@
 //! process has closed already is shown as root's, so those count as nobody's.
 
 use std::io::{self, BufRead, BufReader};
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream, UdpSocket};
 use std::path::Path;
 use std::time::Duration;
 
@@ -47,7 +47,12 @@ impl PeerUser {
     /// Tables that cannot be read.
     pub fn between(local: SocketAddr, peer: SocketAddr) -> io::Result<Self> {
         let address = canonical(peer).ip();
-        let is_here = address.is_loopback() || address == canonical(local).ip();
+        // Only an address of this computer can be bound; of one that is in doubt we take it to be here.
+        let is_ours = || match UdpSocket::bind((address, 0)) {
+            Ok(_) => true,
+            Err(error) => error.kind() != io::ErrorKind::AddrNotAvailable,
+        };
+        let is_here = address.is_loopback() || address == canonical(local).ip() || is_ours();
         let mut found = None;
         for reading in 0..READINGS {
             if reading > 0 {

@@ -130,6 +130,7 @@ fn thin(stroke: &mut Vec<[f64; 3]>, point: [f64; 3], spacing: f64) {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use messages::math;
 
     #[test]
     fn few_points_are_shown_as_they_are() {
@@ -151,8 +152,9 @@ mod tests {
         for part in 0..100 {
             let angle =
                 |index: usize| (part * 1000 + index) as f64 * std::f64::consts::TAU / 100_000.0;
-            let points: Vec<_> =
-                (0..=1000).map(|index| [angle(index).cos(), angle(index).sin(), 0.0]).collect();
+            let points: Vec<_> = (0..=1000)
+                .map(|index| [math::cos(angle(index)), math::sin(angle(index)), 0.0])
+                .collect();
             outline.add(part > 0, &points);
         }
         let shown = outline.finish();
@@ -161,7 +163,7 @@ mod tests {
         assert!((200..=1000).contains(&stroke.len()), "{}", stroke.len());
         assert_eq!(stroke[0], [1.0, 0.0, 0.0]);
         assert!((stroke[stroke.len() - 1][0] - 1.0).abs() < 1e-9);
-        assert!(stroke.iter().all(|[x, y, _]| (x.hypot(*y) - 1.0).abs() < 1e-12));
+        assert!(stroke.iter().all(|[x, y, _]| (math::hypot(*x, *y) - 1.0).abs() < 1e-12));
         assert_eq!(shown.bounds.unwrap().lower[0], -1.0);
     }
 

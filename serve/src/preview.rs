@@ -209,6 +209,7 @@ pub fn check_changes(set: &[String]) -> Result<(), String> {
         if change.len() > LONGEST_CHANGE || change.contains('\0') {
             return Err(format!("set: the value of {key:?} is too long or has a zero in it"));
         }
+        let key = key.trim();
         // The machine that runs is what it is.
         if key.starts_with("machine.") || key.starts_with("plant.") {
             return Err(format!(

@@ -211,10 +211,10 @@ impl Scope {
                 Edge::Falling => from > level && to <= level,
             }
         };
-        if self.request.mode == Mode::Single {
-            return (first..=last).find(passes);
-        }
-        let found = (first..=last).rev().find(passes);
+        let found = match self.request.mode {
+            Mode::Single => (first..=last).find(passes),
+            _ => (first..=last).rev().find(passes),
+        };
         // All before it has been looked through.
         if found.is_none() && last >= first {
             self.armed = last + 1;

@@ -210,7 +210,7 @@ mod tests {
         assert_eq!(fs::read(&path).unwrap(), b"<svg/>");
         assert_eq!(fs::metadata(&path).unwrap().mode() & 0o777, 0o600);
         assert_eq!(fs::metadata(path.parent().unwrap()).unwrap().mode() & 0o777, 0o700);
-        assert_eq!(spool.files(), [file.clone()]);
+        assert_eq!(spool.files(), std::slice::from_ref(&file));
         spool.remove(&file.id).unwrap();
         assert!(matches!(spool.path(&file.id), Err(SpoolError::Unknown(_))));
     }

@@ -23,6 +23,8 @@ struct State {
     phase: Phase,
     stopped: bool,
     held: bool,
+    /// Stops that are being carried out: a job that begins meanwhile is stopped.
+    stops: u32,
 }
 
 /// Requests for the job under way.
@@ -34,7 +36,9 @@ pub struct JobControl {
 impl JobControl {
     /// The supervisor takes a job up.
     pub fn begin(&self) {
-        *self.lock() = State { phase: Phase::Preparing, ..State::default() };
+        let mut state = self.lock();
+        let stops = state.stops;
+        *state = State { phase: Phase::Preparing, stopped: stops > 0, held: false, stops };
     }
 
     /// Hands the job to the controller, unless it is stopped or held; whether it did.
@@ -72,6 +76,25 @@ impl JobControl {
         state.phase
     }
 
+    /// As [`Self::stop`]; a job that begins before [`Self::end_stop`] is stopped too.
+    pub fn begin_stop(&self) -> Phase {
+        let mut state = self.lock();
+        state.stops += 1;
+        state.stopped |= state.phase != Phase::None;
+        state.phase
+    }
+
+    /// Whether a stop is being carried out: no job begins.
+    pub fn is_stopping(&self) -> bool {
+        self.lock().stops > 0
+    }
+
+    /// A stop has been carried out.
+    pub fn end_stop(&self) {
+        let mut state = self.lock();
+        state.stops = state.stops.saturating_sub(1);
+    }
+
     /// Holds the job until it is resumed; `false` when that is for the controller to do.
     pub fn hold(&self) -> bool {
         let mut state = self.lock();
@@ -100,6 +123,18 @@ impl JobControl {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_job_that_begins_while_a_stop_is_carried_out_is_stopped() {
+        let control = JobControl::default();
+        assert_eq!(control.begin_stop(), Phase::None);
+        control.begin();
+        assert!(control.is_stopped() && !control.play());
+        control.end_stop();
+        control.end();
+        control.begin();
+        assert!(!control.is_stopped() && control.play());
+    }
 
     #[test]
     fn a_job_that_is_not_played_yet_is_stopped_here() {

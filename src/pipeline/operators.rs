@@ -257,11 +257,13 @@ impl Answers {
     /// A stop is never refused: where there is nothing to stop, it has been obeyed already, and
     /// where the controller does not answer, the supervisor ends the job without it.
     fn stop(&self) -> Value {
-        let met = self.control.stop();
-        // Whoever stops the machine does not want it to begin with something else.
-        self.queue.hold("a person stopped the machine");
+        let met = self.control.begin_stop();
         let reply =
             self.link.request_within(OperatorVerb::Stop, 0.0, STOP_PATIENCE).map(VerbReply::from);
+        // Whoever stops the machine does not want it to begin with something else. The queue goes to the disk, so it comes
+        // after the machine.
+        self.queue.hold("a person stopped the machine");
+        self.control.end_stop();
         match (met, reply) {
             (Phase::Preparing, _) => json!(VerbReply::accepted("preparing")),
             (_, Ok(reply)) => json!(VerbReply { accepted: true, ..reply }),

@@ -121,10 +121,11 @@ impl JobQueue {
         number
     }
 
-    /// Puts the next job under way, unless the queue is held.
+    /// Puts the next job under way, unless the queue is held or the machine is being stopped.
     pub fn begin_next(&self, control: &JobControl) -> Option<Entry> {
         let mut state = self.lock();
-        if state.contents.held.is_some() || state.contents.waiting.is_empty() {
+        let is_held = state.contents.held.is_some() || control.is_stopping();
+        if is_held || state.contents.waiting.is_empty() {
             return None;
         }
         let next = state.contents.waiting.remove(0);

@@ -156,7 +156,6 @@ fn serve_says_what_it_cannot_do() {
         assert_eq!(ended.code, Some(code), "{}", ended.error);
         assert!(ended.error.contains(words), "{}", ended.error);
     };
-    refused(&[], 2, "--grbl");
     refused(&["--grbl", "7x"], 2, "such as 127.0.0.1:7123");
     refused(&["--grbl", "0"], 4, "no pipeline is running");
     let mut domain = domain(&place);

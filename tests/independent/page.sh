@@ -8,7 +8,8 @@
 # folder. PICTURES names a folder for pictures of the page.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
-folder=$(mktemp -d)
+# A short name: the sockets below it have room for 107 bytes.
+folder=$(mktemp -d /tmp/pXXXXXX)
 trap 'rm -rf "$folder"' EXIT INT TERM
 (cd "$folder" && npm init --yes >npm.log && npm install --no-audit --no-fund puppeteer-core@24 axe-core@4 >>npm.log 2>&1) || {
     cat "$folder/npm.log" >&2

@@ -38,7 +38,7 @@ export class Machine {
     machine.graver = graver;
     machine.name = `page${process.pid}`;
     machine.environment = {};
-    for (const [key, name] of [["XDG_RUNTIME_DIR", "runtime"], ["XDG_STATE_HOME", "state"]]) {
+    for (const [key, name] of [["XDG_RUNTIME_DIR", "r"], ["XDG_STATE_HOME", "state"]]) {
       machine.environment[key] = join(folder, name);
       mkdirSync(machine.environment[key], { mode: 0o700 });
     }

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use nix::sys::socket::{setsockopt, sockopt};
 
+use super::opening::Opening;
 use super::{Core, Operator, SILENCE, Shared, spawn};
 use crate::machine::Machine;
 use crate::report::Reporter;
@@ -129,10 +130,14 @@ pub(super) fn serve<M: Machine + 'static>(mut client: Client, shared: &Arc<Share
     };
     let mut watcher = Watcher::default();
     let mut bytes = vec![0; CHUNK];
+    let mut opening = Opening::default();
     loop {
         match client.reader.read(&mut bytes) {
             Ok(0) => break,
-            Ok(length) => watcher.hear(&bytes[..length], number, &client, shared),
+            Ok(length) => match opening.take(&bytes[..length]) {
+                Some(heard) => watcher.hear(&heard, number, &client, shared),
+                None => break,
+            },
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(_) => break,
         }

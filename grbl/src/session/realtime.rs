@@ -169,7 +169,7 @@ impl Session {
             Realtime::Report => self.report(),
             Realtime::Hold => self.hold(),
             Realtime::Resume => {
-                (self.is_paused, self.is_door) = (false, false);
+                (self.is_paused, self.is_door, self.holds_next) = (false, false, false);
                 self.ask_quietly(Verb::Resume, 0.0);
             }
             Realtime::Door => {
@@ -199,11 +199,13 @@ impl Session {
         }
         self.cancel_jog();
         self.is_paused = true;
+        // A job that has not begun can't be held yet.
+        self.holds_next = self.state() != "running";
         self.ask_quietly(Verb::Hold, 0.0);
     }
 
     /// Asks for what may have nothing to act on.
-    fn ask_quietly(&mut self, verb: Verb, value: f64) {
+    pub(super) fn ask_quietly(&mut self, verb: Verb, value: f64) {
         self.tickets += 1;
         self.asks.push((self.tickets, Ask::Verb { verb, value }));
     }
@@ -212,10 +214,13 @@ impl Session {
     /// Faults, and what the machine knows of its place, stay.
     fn reset(&mut self) {
         self.ask_quietly(Verb::Stop, 0.0);
+        self.orphan(Purpose::Line);
+        self.orphan(Purpose::Jog);
         self.forget_lines();
         self.drop_work();
         (self.is_paused, self.is_door, self.is_checking, self.is_asleep) =
             (false, false, false, false);
+        self.holds_next = false;
         if self.alarm.is_some_and(|alarm| alarm != Alarm::HardLimit) {
             self.alarm = None;
         }
@@ -228,12 +233,19 @@ impl Session {
         self.greet();
     }
 
-    fn cancel_jog(&mut self) {
+    /// What was asked for `purpose` and is not answered yet is to be stopped if it begins all the same.
+    fn orphan(&mut self, purpose: Purpose) {
+        let tickets =
+            self.purposes.iter().filter(|(_, of)| *of == purpose).map(|(ticket, _)| *ticket);
+        self.orphans.extend(tickets);
+    }
+
+    pub(super) fn cancel_jog(&mut self) {
         let is_jogging = !self.jogs.is_empty() || !self.jogging.is_over();
         // Those that have not been taken yet are answered, and go nowhere.
         for line in &mut self.waiting {
             if let Waiting::Line(line) = line
-                && line.trim_ascii_start().starts_with(b"$J")
+                && is_jog(line)
             {
                 self.waiting_bytes = self.waiting_bytes.saturating_sub(line.len());
                 line.clear();
@@ -241,6 +253,7 @@ impl Session {
         }
         self.jogs.clear();
         self.jogging = Default::default();
+        self.orphan(Purpose::Jog);
         self.purposes.retain(|(_, purpose)| *purpose != Purpose::Jog);
         self.jog_end = None;
         if !is_jogging && self.state() != "jogging" {
@@ -267,4 +280,12 @@ fn changed(percent: u8, change: Option<i8>) -> u8 {
         None => 100,
         Some(change) => percent.saturating_add_signed(change).clamp(RANGE.0, RANGE.1),
     }
+}
+
+/// Whether a line asks for a jog, as it is read: with spaces, and in either case.
+fn is_jog(line: &[u8]) -> bool {
+    let word = line.trim_ascii_start().strip_prefix(b"$");
+    word.is_some_and(|word| {
+        word.trim_ascii_start().first().is_some_and(|letter| letter.eq_ignore_ascii_case(&b'J'))
+    })
 }

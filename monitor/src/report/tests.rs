@@ -324,6 +324,7 @@ fn an_hour_fits_into_twenty_megabytes() {
         name: "spiral".into(),
         strokes: artwork.strokes.len() as u64,
         length: artwork.length(),
+        ..JobSummary::default()
     };
     let summary = Summary::new(Outcome::Completed, job, machine);
     let report = Report {

@@ -83,8 +83,8 @@ mod tests {
     fn a_place_is_found_in_the_drawing_by_its_line_or_else_by_its_stroke() {
         let at = |line, stroke| JobPlace { line, stroke, ..JobPlace::default() };
         let bounds = |line, stroke| at(line, stroke).within(&artwork()).bounds;
-        assert_eq!(bounds(Some(7), 1), Some([[0.2, 0.01, 0.0], [0.32, 0.03, 0.0]]));
-        assert_eq!(bounds(Some(5), 1), Some([[0.1, 0.01, 0.0], [0.12, 0.03, 0.0]]));
+        assert_eq!(bounds(Some(7), 1), Some([[0.2, 0.01, 0.0], [0.3 + 0.02, 0.03, 0.0]]));
+        assert_eq!(bounds(Some(5), 1), Some([[0.1, 0.01, 0.0], [0.1 + 0.02, 0.03, 0.0]]));
         assert_eq!((bounds(None, 0), bounds(Some(9), 4)), (None, None));
     }
 

@@ -120,7 +120,7 @@ impl MarkingTable {
     }
 
     /// The line of a program to begin with, if not the first.
-    pub(super) fn from_line(&self) -> Option<u64> {
+    pub(super) fn first_line(&self) -> Option<u64> {
         let line = self.from_line.as_ref().map(|line| line.value as u64);
         line.filter(|line| *line > 1)
     }

@@ -75,7 +75,7 @@ fn of_program(
         );
     }
     diagnostics.finish(())?;
-    let from_line = marking.from_line();
+    let from_line = marking.first_line();
     let (program, steps) = gcode::ProgramFile::open(path, words, from_line, machine, most)?;
     let survey = program.survey.clone();
     let begins = from_line.map(|line| Note {

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::PreviewLine;
 
 /// How far a line may be from what it stands for while there are few [m].
-const FINEST: f64 = 2e-6;
+pub(super) const FINEST: f64 = 2e-6;
 
 /// Lines that are simplified while they are gathered.
 #[derive(Debug)]
@@ -18,8 +18,8 @@ pub(super) struct Simplified {
     most: usize,
     /// How far a line may be from what it stands for [m].
     tolerance: f64,
-    /// The cells of as large a grid in which there are dots.
-    dots: HashSet<[i64; 3]>,
+    /// The cells of as large a grid in which lines begin, are half done and end; a dot does all in one.
+    covered: HashSet<[[i64; 3]; 3]>,
     /// Whether the last line that was pushed was left out.
     left_out: bool,
 }
@@ -32,7 +32,7 @@ impl Simplified {
             points: 0,
             most: most.max(1),
             tolerance: FINEST,
-            dots: HashSet::new(),
+            covered: HashSet::new(),
             left_out: false,
         }
     }
@@ -61,14 +61,14 @@ impl Simplified {
     fn coarsen(&mut self) {
         self.tolerance *= 2.0;
         self.points = 0;
-        self.dots.clear();
+        self.covered.clear();
         self.left_out = false;
         for line in core::mem::take(&mut self.lines) {
             self.keep(line);
         }
     }
 
-    /// Keeps what the tolerance needs of a line: what is no longer than that is a dot, and dots that would
+    /// Keeps what the tolerance needs of a line: what is no longer than that is a dot, and lines and dots that would
     /// cover each other are one.
     fn keep(&mut self, line: PreviewLine) {
         let PreviewLine { mut points, power, goes_on } = line;
@@ -78,11 +78,13 @@ impl Simplified {
         if points.len() > 1 && !points.iter().any(is_far) && self.tolerance > FINEST {
             points.truncate(1);
         }
-        self.left_out = points.len() == 1 && !self.dots.insert(self.cell(&first));
+        let points = simplified(&points, self.tolerance);
+        let parts = [0, points.len() / 2, points.len() - 1].map(|index| self.cell(&points[index]));
+        let may_cover = points.len() == 1 || self.tolerance > FINEST;
+        self.left_out = may_cover && !self.covered.insert(parts);
         if self.left_out {
             return;
         }
-        let points = simplified(&points, self.tolerance);
         self.points += points.len();
         self.lines.push(PreviewLine { points, power, goes_on });
     }

@@ -20,8 +20,9 @@ pub(crate) const FILES: [&str; 3] = [run_folder::REPORT, run_folder::SUMMARY, ru
 /// The largest that is [bytes].
 const LARGEST: u64 = 256 << 20;
 
-/// A report is a page of its own, with its styles in it; it can neither run nor ask anything here.
-const POLICY: &str = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:";
+/// A report is a page of its own, with its styles and scripts in it; it is nobody here, and can ask nothing.
+const POLICY: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; \
+                      style-src 'unsafe-inline'; img-src data:";
 
 /// A job that has ended.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]

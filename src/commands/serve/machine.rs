@@ -21,10 +21,13 @@ impl Operated {
     /// Puts a program into the queue. One that is held begins with it where nothing else waits: whoever sends a program
     /// is at the machine.
     fn submit(&self, job: JobRequest) -> Result<Answer, ClientError> {
+        // What holds it afterwards only is a stop that this program must not undo.
+        let held = self.queue()?.held;
         let request = Request::Submit { job, out: None, detached: true };
         let Submitted { number } = self.client.ask_for(&request)?;
         let queue = self.queue()?;
-        if queue.held.is_some() && queue.waiting.iter().all(|job| job.number == number) {
+        let is_alone = queue.waiting.iter().all(|job| job.number == number);
+        if queue.held.is_some() && queue.held == held && is_alone {
             self.client.ask(&Request::StartQueue)?;
         }
         Ok(Answer::Submitted(number))

@@ -26,8 +26,8 @@ fn command() -> Command {
 fn times_of_the_cycle_are_small_and_its_number_takes_no_room() {
     let mut bytes = Vec::new();
     command().put(&ORIGIN, &mut bytes);
-    // received 1 + 3, published 1 + 3, setpoint_published (0) 1 + 5, rate 9, laser 1 + 1 + 2.
-    assert_eq!(bytes.len(), 4 + 4 + 6 + 9 + 4);
+    // received 1 + 3, published 1 + 3, setpoint_published (0) 1 + 5, rate 1 + 8, laser 2 + 1 + 2.
+    assert_eq!(bytes.len(), 4 + 4 + 6 + 9 + 5);
     assert_eq!(Command::read(&bytes, &ORIGIN).unwrap(), command());
     // A field of a later version is passed over.
     wire::put_bytes(99, b"new", &mut bytes);
