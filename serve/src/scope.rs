@@ -191,7 +191,14 @@ impl Scope {
         }
         let waited = (AUTO_AFTER / self.period) as u64 + self.after;
         let is_late = self.trigger.is_none() || ring.end() >= self.shown + waited;
-        if self.request.mode == Mode::Auto && is_late && ring.end() >= ring.begin() + samples {
+        let takes_newest = match self.request.mode {
+            Mode::Auto => is_late,
+            // Without a trigger there is nothing to wait for.
+            Mode::Single => self.trigger.is_none(),
+            Mode::Normal => false,
+        };
+        if takes_newest && ring.end() >= ring.begin() + samples {
+            self.is_done = self.request.mode == Mode::Single;
             return Some(self.frame(ring, ring.end() - samples, None));
         }
         None

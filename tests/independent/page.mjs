@@ -96,7 +96,7 @@ async function marks(page) {
   await page.keyboard.press("KeyR");
   await page.keyboard.up("Shift");
   await stateIs(page, "running");
-  await until(page, "the job is completed", () => /square\.ngc.*completed/.test(document.getElementById("queue").textContent));
+  await until(page, "the job is completed", () => /square.*completed/.test(document.getElementById("queue").textContent));
   await until(page, "the history has its report", () => document.querySelector('#history a[href$="report.html"]') !== null);
   const report = await page.evaluate(async () => (await fetch(document.querySelector('#history a[href$="report.html"]').href)).status);
   found(report === 200, `the report is served (${report})`);
