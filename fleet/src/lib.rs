@@ -1,0 +1,1 @@
+//! Publishes the state of a machine to a fleet and takes its jobs, over NATS JetStream.

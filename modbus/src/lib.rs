@@ -1,0 +1,1 @@
+//! Slow inputs and outputs by Modbus TCP: chiller, extraction, laser source, interlock words.
