@@ -100,6 +100,38 @@ fn dark_steps_between_rows_with_overscan_cost_no_stop() {
     assert!((fed / free - 1.0).abs() < 0.05, "{fed} s, {free} s");
 }
 
+/// With room to come to speed in the dark that is drawn, power in proportion marks a row as constant power does, and
+/// what is dark between two rows is flown; without it the tool goes along what is drawn.
+#[test]
+fn rows_in_proportion_are_entered_at_speed_where_the_overscan_has_room() {
+    let machine = machine(false, &[]);
+    for form in FORMS {
+        // 300 mm/s are reached within 7.5 mm.
+        for (overscan, expected) in [(7.0, None), (8.0, Some(10.27))] {
+            let text = raster(form, "M4", 41, overscan).replace("G0 X", "G1 S0 X");
+            let plan = planned(&text, &[], &machine);
+            let name = format!("{form:?}, overscan of {overscan} mm: {} s", plan.facts.duration);
+            let is_close = |expected: f64| (plan.facts.duration / expected - 1.0).abs() < 0.01;
+            assert!(expected.map_or(plan.facts.duration > 11.0, is_close), "{name}");
+            let reach = (25.0 + overscan) * 1e-3 + 1e-9;
+            assert!(plan.setpoints(1).all(|it| it.position[0].abs() < reach), "{name}");
+            assert_eq!(plan.facts.strokes, 41 * 13, "{name}");
+            let lines = lit(&plan, [0.0; 2]);
+            for (index, [from, to]) in lines.iter().enumerate() {
+                let (row, block) = (index / 13, index % 13);
+                let sign = if row % 2 == 0 { 1.0 } else { -1.0 };
+                let start = sign * (-0.025 + 4e-3 * block as f64);
+                let off = (from.x - start).abs().max((to.x - start - sign * 2e-3).abs());
+                let beside = (from.y - row as f64 * PIXEL * 1e-3).abs();
+                assert!(off.max(beside) < 1e-6, "{name}: row {row}, block {block}: {off} m");
+            }
+            let power = plan.trajectory.laser.iter().map(|change| change.power);
+            let full = power.filter(|power| *power > 0.0 && (power - 0.5).abs() > 1e-6).count();
+            assert_eq!(full > 0, expected.is_none(), "{name}");
+        }
+    }
+}
+
 #[test]
 fn free_moves_one_after_the_other_keep_their_corner() {
     let machine = machine(false, &[]);

@@ -75,6 +75,8 @@ pub(crate) struct Contour {
     /// What its tracks weigh.
     weight: usize,
     is_lit: bool,
+    /// Whether it is entered and left at speed although its power goes with the speed.
+    is_flown: bool,
     /// How the tool is turned along it, and where on that it begins [m]; `None` where it says nothing.
     turning: Option<(Arc<Turning>, f64)>,
 }
@@ -96,8 +98,19 @@ impl Contour {
             bend,
             weight,
             is_lit: demands.iter().any(|demand| demand.power > 0.0),
+            is_flown: false,
             turning: None,
         }
+    }
+
+    /// Entered and left at speed, though its power goes with the speed.
+    pub(crate) fn flown(self) -> Self {
+        Self { is_flown: true, ..self }
+    }
+
+    /// Whether the tool comes to it, and leaves it, at the speed of what is lit.
+    pub(crate) fn is_entered_at_speed(&self) -> bool {
+        self.is_lit && (self.is_flown || self.policy == Policy::Constant)
     }
 
     /// With the tool turned as `turning` has it from the place `from` on [m].
@@ -252,6 +265,11 @@ impl Contour {
         let index = self.track_at(distance);
         let (track, from) = (&self.tracks[index], self.starts[index]);
         track.at((distance - from).min(track.length()))
+    }
+
+    /// The number of joints between two places [m].
+    pub(crate) fn joints_between(&self, from: f64, to: f64) -> usize {
+        self.track_at(to) - self.track_at(from)
     }
 
     /// The number of the track at `distance` from the start [m].

@@ -1,6 +1,7 @@
 //! Operations made of a drawing's steps as they come, for every mechanism.
 
 mod dark_ends;
+mod flown_rows;
 mod rasters;
 
 use std::collections::VecDeque;
@@ -12,6 +13,7 @@ use messages::time::Period;
 use nalgebra::Vector3;
 
 use dark_ends::without_dark_ends;
+use flown_rows::flown_rows;
 use rasters::{Extent, RowStep};
 
 use super::operation::{Dot, OffSurface, Operation, OperationKind};
@@ -416,6 +418,9 @@ impl<'a> Operations<'a> {
     fn end(&mut self, contour: Contour, goes_on: bool) {
         let line = contour.line;
         let is_first = !contour.goes_on_from_before();
+        if is_first && !goes_on && self.fly_rows(&contour) {
+            return;
+        }
         let extent = Extent::of(&contour);
         let (contour, left) = without_dark_ends(contour, goes_on, &self.limits);
         self.note_changes(&contour);
@@ -429,6 +434,34 @@ impl<'a> Operations<'a> {
         if let Some(to) = left {
             self.done.push_back(Operation { kind: OperationKind::Rapid(to), line });
         }
+    }
+
+    /// Hands on the rows of a path that they may be marked at speed in, each by itself; says whether it is one.
+    fn fly_rows(&mut self, contour: &Contour) -> bool {
+        let asked = |demand: &Demand| self.speed_of(demand);
+        let rows =
+            if self.surface.is_none() { flown_rows(contour, asked, &self.limits) } else { None };
+        let Some((rows, end)) = rows else { return false };
+        self.note_changes(contour);
+        self.leave_approach();
+        (self.before, self.leaves_dark_end) = ([None; 2], true);
+        for row in rows {
+            let line = row.demands().first().map_or(contour.line, |demand| demand.line);
+            let kind = OperationKind::Path(Arc::new(row));
+            self.done.push_back(Operation { kind, line });
+        }
+        self.done.push_back(Operation { kind: OperationKind::Rapid(end), line: contour.line });
+        true
+    }
+
+    /// The speed that a demand asks for, as far as the machine has it [m/s]; `None` where it is left open.
+    fn speed_of(&self, demand: &Demand) -> Option<f64> {
+        let asked = match self.marking.speed {
+            Some(MarkingSpeed::Constant(speed)) => Some(speed),
+            Some(MarkingSpeed::Optimum) => None,
+            None => demand.speed,
+        };
+        asked.map(|speed| speed.min(self.limits.speed))
     }
 
     /// The power asked for, or the least that the source gives.
@@ -450,11 +483,7 @@ impl<'a> Operations<'a> {
 
     /// Tells of a path that is slowed since its light would change more often than a cycle can say.
     fn note_changes(&mut self, contour: &Contour) {
-        let top = self.limits.speed;
-        let asked = |demand: &Demand| match self.marking.speed {
-            Some(MarkingSpeed::Constant(speed)) => speed.min(top),
-            _ => demand.speed.unwrap_or(top).min(top),
-        };
+        let asked = |demand: &Demand| self.speed_of(demand).unwrap_or(self.limits.speed);
         let mut slowed = contour.demands().iter().zip(change_speeds(contour, self.period));
         if let Some((Demand { line, .. }, _)) = slowed.find(|(demand, most)| *most < asked(demand))
         {

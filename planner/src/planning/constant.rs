@@ -20,7 +20,6 @@ use crate::law::End;
 use crate::law::row::Side;
 use crate::law::time_law::TimeLaw;
 use crate::law::windows::{even_speed, keeps_even};
-use crate::light::Policy;
 use crate::limits::along::AlongPath;
 use crate::limits::motion_limits::Scope;
 use crate::limits::tightening::Tightening;
@@ -223,7 +222,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             return;
         }
         run.even = None;
-        if run.contour.policy == Policy::Proportional || !run.contour.is_lit() {
+        if !run.contour.is_entered_at_speed() {
             return;
         }
         let length = run.path.length();

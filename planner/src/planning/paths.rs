@@ -10,7 +10,6 @@ use crate::error::{Place, PlanError};
 use crate::geometry::contour::Contour;
 use crate::joint_space::configuration::{Refused, trail};
 use crate::joint_space::unwind::divide;
-use crate::light::Policy;
 use crate::limits::motion_limits::Scope;
 use crate::verify::checker::{LimitViolation, Quantity};
 
@@ -32,7 +31,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         if duration.is_nan() || duration >= super::LONGEST {
             return Err(PlanError::TooLong { duration });
         }
-        if contour.policy == Policy::Constant && contour.is_lit() {
+        if contour.is_entered_at_speed() {
             self.begin_constant(contour, draft)
         } else {
             self.begin_from_rest(contour, draft)

@@ -39,7 +39,7 @@ impl Contour {
         // What begins where this does goes on as it does.
         let turning = self.turning_from(from);
         let joint = self.joint.clone().filter(|_| from <= GAP);
-        part.map(|part| Self { joint, turning, ..part })
+        part.map(|part| Self { joint, turning, is_flown: self.is_flown, ..part })
     }
 
     /// What is left of it from a place on [m], as a path that goes on from no other.
@@ -92,7 +92,9 @@ impl Contour {
         let (track, start) = (self.tracks.pop()?, self.starts.pop()?);
         let demands = self.demands_between(start, self.length);
         let turning = self.turning_from(start);
-        let next = Self { joint: Some(joint), turning, ..Self::new(track, &demands, self.policy) };
+        let is_flown = self.is_flown;
+        let new = Self::new(track, &demands, self.policy);
+        let next = Self { joint: Some(joint), turning, is_flown, ..new };
         let first = self.demands.partition_point(|demand| demand.from < start - GAP);
         self.demands.truncate(first);
         self.is_lit = self.demands.iter().any(|demand| demand.power > 0.0);
@@ -118,6 +120,7 @@ impl Contour {
             bend: self.bend,
             weight: self.tracks[first..].iter().map(Track::weight).sum(),
             is_lit: self.is_lit,
+            is_flown: self.is_flown,
             turning: self.turning_from(left_out),
         };
         for (index, track) in next.tracks.iter().enumerate() {
