@@ -5,7 +5,7 @@ use machine::drives::fault_text;
 use machine::{JointUnit, Machine};
 use messages::fault::FaultUnit;
 use messages::time::Period;
-use messages::{Fault, FaultCode, FaultQuantity};
+use messages::{CommandMode, Fault, FaultCode, FaultQuantity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -81,6 +81,7 @@ fn detail(fault: &Fault, joint: Option<JointUnit>, period: Period) -> String {
         (FaultCode::StaleFeedback, _) if fault.limit().is_some_and(|most| fault.value <= most) => {
             "feedback came of another run of drives".to_owned()
         }
+        (_, FaultQuantity::Mode) => unexpected_mode(fault.value),
         (_, FaultQuantity::Setpoint) => {
             format!("setpoint {} came where setpoint {} was due", fault.value, fault.limit)
         }
@@ -97,6 +98,19 @@ fn detail(fault: &Fault, joint: Option<JointUnit>, period: Period) -> String {
             }
         }
     }
+}
+
+/// What it means that drives was told a mode before it had heard that the motors are disabled.
+fn unexpected_mode(mode: f64) -> String {
+    let told = match CommandMode::from_wire(mode as u32) {
+        CommandMode::Driven => "drive the motors",
+        CommandMode::QuickStop | CommandMode::Disabled => "brake the motors",
+    };
+    format!(
+        "drives was told to {told} (command mode {mode}) before it had heard that they are disabled: while they were, no \
+         command had come for longer than `realtime.stall`, as on a loaded PC, or the controller is a new one. `graver \
+         reset` and `graver enable` go on; if it comes again, `graver doctor` says what of this PC to change"
+    )
 }
 
 /// What a fault means that has no value.
@@ -191,6 +205,29 @@ mod tests {
         assert_eq!(told(1.0, &board), "the card's watchdog has bitten (fault word 1 of hostmot2)");
         let unknown = told(f64::from(0x2310), &board);
         assert_eq!(unknown, "fault word 2310h of hostmot2, which its manual explains");
+    }
+
+    #[test]
+    fn a_mode_that_came_too_early_is_told_with_what_to_do() {
+        let told = |mode: CommandMode| {
+            let fault =
+                Fault::new(FaultCode::DriveFault).with(Quantity::Mode, f64::from(mode as u32));
+            FaultSummary::of(&fault, &machine()).unwrap().detail
+        };
+        let driven = told(CommandMode::Driven);
+        assert!(
+            driven.starts_with("drives was told to drive the motors (command mode 4) before"),
+            "{driven}"
+        );
+        assert!(
+            driven.contains("no command had come for longer than `realtime.stall`"),
+            "{driven}"
+        );
+        assert!(driven.contains("`graver reset` and `graver enable` go on"), "{driven}");
+        assert!(
+            told(CommandMode::QuickStop)
+                .starts_with("drives was told to brake the motors (command mode 5)")
+        );
     }
 
     #[test]
