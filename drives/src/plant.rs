@@ -643,8 +643,11 @@ fn profile(actuators: &[Actuator]) -> Profile {
         Motor::Dc(_) => ActuatorMode::ALL.to_vec(),
         Motor::Stepper(_) => vec![ActuatorMode::Position],
     };
-    let each =
-        |actuator: &Actuator| ActuatorProfile { modes: modes(actuator), latency: actuator.latency };
+    let each = |actuator: &Actuator| ActuatorProfile {
+        modes: modes(actuator),
+        latency: actuator.latency,
+        age: actuator.age,
+    };
     Profile {
         clock: PortClock::Ours,
         gate_resolution: Nanoseconds(1),

@@ -18,7 +18,7 @@
 //!   think. The actuation acts from this instant and the [latency](ActuatorProfile::latency) of each actuator
 //!   on, until the next one takes its place.
 //! - [`Port::receive`] follows it. The measurement is that of this deadline, but for places, which may be older by the
-//!   [age](machine::Drives::age) of the drives; its `laser` tells what was fired
+//!   [age](ActuatorProfile::age) that the port declares of each actuator; its `laser` tells what was fired
 //!   between the deadline before and this one, by our clock. A port waits for it within a time of its own,
 //!   a small part of the period. Where nothing came, it gives the measurement before as it was, and counts
 //!   that; from how many in a row on that is a fault is the port's to say.
@@ -149,6 +149,9 @@ pub struct ActuatorProfile {
     /// From the deadline at which a target is sent until the motor follows it [ns]. The controller counts on
     /// the one in the machine file: a port holds the two to each other when it is opened.
     pub latency: Nanoseconds,
+    /// How long before a deadline the place of the motor was measured that is told then [ns]. The controller counts on
+    /// it as on the latency, and so it is held to that of the machine.
+    pub age: Nanoseconds,
 }
 
 /// What a port is: complete once it is open, and what is known before that.
@@ -168,7 +171,7 @@ pub struct Profile {
 impl ActuatorProfile {
     /// A drive that follows targets of `mode` alone, at once.
     pub fn immediate(mode: ActuatorMode) -> Self {
-        Self { modes: vec![mode], latency: Nanoseconds(0) }
+        Self { modes: vec![mode], latency: Nanoseconds(0), age: Nanoseconds(0) }
     }
 }
 
@@ -316,7 +319,8 @@ pub trait Port: Send {
 /// Holds what a port is to what `machine` says of it.
 ///
 /// # Errors
-/// Another number of actuators, a drive without the mode of its actuator, or another latency.
+/// Another number of actuators, a drive without the mode of its actuator, another latency, or measurements of another
+/// age.
 pub fn check(profile: &Profile, machine: &Machine) -> Result<(), PortError> {
     let (found, expected) = (profile.actuators.len(), machine.actuators.len());
     if found != expected {
@@ -335,6 +339,13 @@ pub fn check(profile: &Profile, machine: &Machine) -> Result<(), PortError> {
         }
         let of = || format!("the actuator `{}`", actuator.name);
         check_latency(of, own.latency, actuator.latency)?;
+        if own.age != actuator.age {
+            let [found, counted] = [own.age, actuator.age].map(|age| age.seconds() * 1e6);
+            return Err(PortError::Mismatch {
+                found: format!("{} is measured {found} us before its deadline", of()),
+                expected: format!("the controller counts on {counted} us"),
+            });
+        }
     }
     let of = || "the laser's gate".to_owned();
     check_latency(of, profile.gate_latency, machine.drives.gate_latency)

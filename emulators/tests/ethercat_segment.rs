@@ -272,7 +272,7 @@ fn a_drive_finds_its_home_by_itself() {
     let mut status = Vec::new();
     for _ in 0..3000 {
         status = running.cycle();
-        if status[0].0 & 0x1000 != 0 {
+        if status[0].0 & 0x3400 == 0x1400 {
             break;
         }
     }
@@ -280,6 +280,34 @@ fn a_drive_finds_its_home_by_itself() {
     // An index pulse every revolution of 4096 counts.
     let counts = running.master.segment.wires().motor(0).counts;
     assert!((counts - i64::from(status[0].1) - 4096).abs() < 40, "{counts} {status:?}");
+}
+
+#[test]
+fn a_drive_that_finds_no_switch_says_so_and_one_that_is_told_to_stops() {
+    let mut running = Running::new();
+    running.mode = 6;
+    // There is no home switch: it comes to its limit switch.
+    assert_eq!(running.master.download(1, 0x6098, 0, &[21]), 0);
+    assert_eq!(running.master.download(1, 0x6099, 1, &40_000_u32.to_le_bytes()), 0);
+    running.enable();
+    assert_eq!(running.cycles(4)[0].0 & 0x3400, 0x0400, "not begun");
+    running.word = 0x1F;
+    let moving = running.cycles(300);
+    assert_eq!(moving[0].0 & 0x3400, 0, "{moving:x?}");
+    // Without its bit it comes to rest, and is broken off.
+    running.word = 0x0F;
+    let rest = running.cycles(300);
+    assert_eq!((rest[0].0 & 0x3400, rest[0].1), (0x0400, running.cycles(50)[0].1), "{rest:x?}");
+    running.word = 0x1F;
+    let mut status = running.cycles(300);
+    for _ in 0..20_000 {
+        status = running.cycle();
+        if status[0].0 & 0x3400 != 0 {
+            break;
+        }
+    }
+    status = running.cycles(200);
+    assert_eq!(status[0].0 & 0x3400, 0x2400, "{status:x?}");
 }
 
 #[test]

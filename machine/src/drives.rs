@@ -4,7 +4,6 @@
 mod words;
 
 use messages::Nanoseconds;
-use messages::time::Period;
 
 pub use words::fault_text;
 
@@ -45,18 +44,6 @@ pub struct Drives {
     /// From the deadline at which an actuation is sent until its gate edges count from [ns]. How long a
     /// motor's target takes is [`crate::Actuator::latency`].
     pub gate_latency: Nanoseconds,
-}
-
-impl Drives {
-    /// How long before a deadline the place of a motor was measured that is told then, in cycles of `period`, if its
-    /// targets act by `latency`. On a bus drives measure at the sync signal at which they take their targets, and the
-    /// next frame fetches that.
-    pub fn age(&self, latency: Nanoseconds, period: Period) -> Nanoseconds {
-        match self.kind {
-            DrivesKind::Ethercat(_) => Nanoseconds((period.time() - latency).0.max(0)),
-            DrivesKind::Simulated | DrivesKind::Hostmot2(_) => Nanoseconds(0),
-        }
-    }
 }
 
 impl Default for Drives {
@@ -159,6 +146,36 @@ pub struct Ethercat {
     pub gate: Option<EthercatGate>,
     /// The position on the bus of the analogue output that sets the power.
     pub power: Option<u16>,
+    /// Where each of the machine's inputs is, in their order.
+    pub inputs: Vec<EthercatBit>,
+    /// Where each of its outputs is.
+    pub outputs: Vec<EthercatBit>,
+    /// Who slaves shall be, in the order of the file; nothing is asked of those that are not here.
+    pub identities: Vec<EthercatIdentity>,
+}
+
+/// A bit of what a slave exchanges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EthercatBit {
+    /// Its position on the bus.
+    pub slave: u16,
+    /// The bit, from 0: of a terminal's process data, or of a drive's digital inputs (60FDh).
+    pub bit: u16,
+}
+
+/// Who a slave shall be, by its EEPROM.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EthercatIdentity {
+    /// Its position on the bus.
+    pub slave: u16,
+    /// The number of its maker.
+    pub vendor: u32,
+    /// The maker's number of it.
+    pub product: u32,
+    /// The revision, where it matters.
+    pub revision: Option<u32>,
+    /// The serial number, where it matters.
+    pub serial: Option<u32>,
 }
 
 /// How an EtherCAT bus is reached.

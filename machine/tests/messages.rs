@@ -152,8 +152,8 @@ fn errors_say_what_is_wrong_and_what_would_be_right() {
         "[drives.ethercat]\nudp = \"127.0.0.1:34980\"\nactuators.a.slave = 0\nactuators.b.slave = 1\n\
          [inputs.stop]\nfunction = \"estop\"\n[laser]",
         &[
-            "100:9: the port to an EtherCAT bus does not read the input `stop` yet; leave [inputs] and \
-           [outputs] out, and wire what is for safety",
+            "100:9: nothing is said of where the input `stop` is; add [drives.ethercat.inputs.stop] with its \
+           `slave` and `bit`",
         ],
     );
     for (stall, found) in [("0.9 ms", "0.0009"), ("51 ms", "0.051"), ("1e15 s", "1000000000000000")]

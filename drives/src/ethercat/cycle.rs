@@ -6,6 +6,7 @@ use machine::drives::Ethercat;
 use messages::{CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, Nanoseconds};
 
 use super::cia402::Wanted;
+use super::digital::Digital;
 use super::drive::Drive;
 use super::gate;
 use super::image::Said;
@@ -60,6 +61,10 @@ pub struct BusCycle {
     offset: i64,
     wire: Wire,
     drives: Vec<Drive>,
+    digital: Digital,
+    /// The inputs of the newest measurement, and the outputs that are told, one bit each.
+    inputs: u64,
+    outputs: u64,
     gate: Option<(usize, u16, u16)>,
     power: Option<usize>,
     period: Nanoseconds,
@@ -107,6 +112,9 @@ impl BusCycle {
             offset,
             wire,
             drives,
+            digital: Digital::of(machine, bus),
+            inputs: 0,
+            outputs: 0,
             gate,
             power,
             period,
@@ -176,6 +184,7 @@ impl BusCycle {
             && !self.fault.is_some()
             && self.silent <= BORNE;
         self.begin_light(if may_shine { actuation.laser } else { LaserCycle::OFF });
+        self.outputs = actuation.outputs;
         self.put();
     }
 
@@ -188,6 +197,7 @@ impl BusCycle {
 
     /// Writes what is told into the outputs of the slaves.
     fn put(&self) {
+        self.digital.put(self.outputs, &self.network);
         let Network { main, group, .. } = &self.network;
         for drive in &self.drives {
             if let Ok(slave) = group.subdevice(main, drive.facts.slave) {
@@ -336,6 +346,7 @@ impl BusCycle {
                 faulty.get_or_insert((index, error));
             }
         }
+        self.inputs = self.digital.active(&self.network, &self.drives);
         if let Some((index, error)) = faulty
             && self.mode != CommandMode::Disabled
             && self.stage == Stage::Operational
@@ -358,6 +369,7 @@ impl BusCycle {
                 (*counts, *position, *current) = (drive.moved(), drive.position(), drive.current());
             }
         }
+        measurement.inputs = self.inputs;
         measurement.tool = None;
         measurement.laser = self.fired.take();
         measurement.clock_offset = self.clock_offset;

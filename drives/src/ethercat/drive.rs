@@ -102,6 +102,11 @@ impl Drive {
         State::of(self.said.status).is_fault().then_some(self.said.error)
     }
 
+    /// Its digital inputs, where they are among what it says.
+    pub(super) fn digital(&self) -> u32 {
+        self.said.digital
+    }
+
     /// Counts since the first measurement.
     pub(super) fn moved(&self) -> i64 {
         self.counts - self.zero.unwrap_or(self.counts)

@@ -26,6 +26,9 @@ pub const INPUTS: [Entry; 7] = [
     (0x60f4, 32),
 ];
 
+/// What a drive sends beside that where inputs of the machine are among its own: digital inputs.
+pub const DIGITAL: Entry = (0x60fd, 32);
+
 /// The mapping entry of an object.
 pub fn entry((index, bits): Entry) -> u32 {
     u32::from(index) << 16 | u32::from(bits)
@@ -61,6 +64,8 @@ pub struct Said {
     pub torque: i16,
     /// Error code.
     pub error: u16,
+    /// Digital inputs, where they are mapped: bit 0 is the negative limit switch, 1 the positive one, 2 the home switch.
+    pub digital: u32,
 }
 
 /// Bytes of [`OUTPUTS`] and of [`INPUTS`].
@@ -91,14 +96,15 @@ impl Told {
 impl Said {
     /// Reads it from a drive's inputs; `None` where they are shorter than [`LENGTH`].
     pub fn read(from: &[u8]) -> Option<Self> {
-        let [s0, s1, mode, p0, p1, p2, p3, _, _, _, _, t0, t1, e0, e1, ..] =
-            *from.first_chunk::<LENGTH>()?;
+        let (data, behind) = from.split_first_chunk::<LENGTH>()?;
+        let [s0, s1, mode, p0, p1, p2, p3, _, _, _, _, t0, t1, e0, e1, ..] = *data;
         Some(Self {
             status: u16::from_le_bytes([s0, s1]),
             mode: mode as i8,
             position: i32::from_le_bytes([p0, p1, p2, p3]),
             torque: i16::from_le_bytes([t0, t1]),
             error: u16::from_le_bytes([e0, e1]),
+            digital: behind.first_chunk().copied().map_or(0, u32::from_le_bytes),
         })
     }
 }
@@ -136,6 +142,9 @@ mod tests {
         let said = Said::read(&inputs).unwrap_or_default();
         assert_eq!((said.status, said.mode, said.torque), (0x1237, 9, -1));
         assert_eq!((said.position, said.error), (i32::MIN + 1, 0x8611));
+        assert_eq!(said.digital, 0);
         assert_eq!(Said::read(&inputs[1..]), None);
+        let more = [&inputs[..], &[5, 0, 1, 0]].concat();
+        assert_eq!(Said::read(&more).map(|said| said.digital), Some(0x0001_0005));
     }
 }

@@ -10,12 +10,12 @@ use ethercrab::{
     DefaultLock, EtherCrabWireReadWrite, MainDevice, MainDeviceConfig, PduLoop, RetryBehaviour,
     SubDeviceGroup, SubDeviceRef, Timeouts,
 };
-use machine::drives::{Ethercat, EthercatGate};
-use machine::{Actuator, ActuatorMode};
+use machine::drives::{Ethercat, EthercatBit, EthercatGate};
+use machine::{Actuator, ActuatorMode, Machine};
 use messages::Nanoseconds;
 
 use super::wire::Wire;
-use super::{cia402, image};
+use super::{cia402, digital, identity, image};
 use crate::port::PortError;
 
 /// The most slaves on a bus, and bytes of their process data.
@@ -113,8 +113,8 @@ impl<T> Asked<T> for Result<T, Error> {
 pub struct Wanted<'a> {
     /// What the machine file says of it.
     pub bus: &'a Ethercat,
-    /// The machine's actuators.
-    pub actuators: &'a [Actuator],
+    /// The machine.
+    pub machine: &'a Machine,
     /// The period of the cycle.
     pub period: Nanoseconds,
     /// From a deadline to the sync signal.
@@ -163,7 +163,10 @@ pub async fn set_up(
     let slaves = group.len();
     let bus = wanted.bus;
     let gate = bus.gate.map(|gate| gate.slave);
+    let bits = || bus.inputs.iter().chain(&bus.outputs).map(|place| place.slave);
+    let identities = bus.identities.iter().map(|identity| identity.slave);
     let named = bus.actuators.iter().copied().chain(gate).chain(bus.power);
+    let named = named.chain(bits()).chain(identities);
     if let Some(missing) = named.into_iter().find(|slave| usize::from(*slave) >= slaves) {
         return Err(PortError::Mismatch {
             found: format!("there are {slaves} slaves on the bus"),
@@ -174,10 +177,11 @@ pub async fn set_up(
         }
         .into());
     }
-    let mut drives = Vec::with_capacity(wanted.actuators.len());
-    for (slave, actuator) in bus.actuators.iter().zip(wanted.actuators) {
-        let slave = usize::from(*slave);
-        drives.push(set_up_drive(main, &group, slave, actuator, wanted.period).await?);
+    identity::check(&found(main, &group), &bus.identities)?;
+    let actuators = &wanted.machine.actuators;
+    let mut drives = Vec::with_capacity(actuators.len());
+    for (slave, actuator) in bus.actuators.iter().zip(actuators) {
+        drives.push(set_up_drive(main, &group, usize::from(*slave), actuator, wanted).await?);
     }
     if let Some(EthercatGate { slave, oversampling, .. }) = bus.gate
         && oversampling > 1
@@ -193,9 +197,11 @@ pub async fn set_up(
     for drive in &drives {
         check_watchdog(main, &group, drive.slave, 2).await?;
     }
-    for slave in gate.into_iter().chain(bus.power) {
+    let switched = bus.outputs.iter().map(|place| place.slave);
+    for slave in gate.into_iter().chain(bus.power).chain(switched) {
         check_watchdog(main, &group, usize::from(slave), 0).await?;
     }
+    digital::check(main, &group, wanted.machine, bus)?;
     let whole = group.iter(main).map(|slave| {
         let data = slave.io_raw();
         u16::from(!data.inputs().is_empty()) + 2 * u16::from(!data.outputs().is_empty())
@@ -222,13 +228,28 @@ pub fn offset(network: &Network, wire: &mut Wire) -> Option<i64> {
     best.map(|(_, offset)| offset)
 }
 
+/// Who the slaves are.
+fn found(main: &'static MainDevice<'static>, group: &Unconfigured) -> Vec<identity::Found> {
+    let each = group.iter(main).map(|slave| {
+        let own = slave.identity();
+        identity::Found {
+            name: slave.name().to_owned(),
+            vendor: own.vendor_id,
+            product: own.product_id,
+            revision: own.revision,
+            serial: own.serial,
+        }
+    });
+    each.collect()
+}
+
 /// Holds a drive to its actuator, and maps its process data.
 async fn set_up_drive(
     main: &'static MainDevice<'static>,
     group: &Unconfigured,
     index: usize,
     actuator: &Actuator,
-    period: Nanoseconds,
+    Wanted { bus, machine, period, .. }: Wanted<'_>,
 ) -> Result<DriveFacts, Trouble> {
     let slave = group.subdevice(main, index).asked("looking at a drive")?;
     let name = slave.name().to_owned();
@@ -266,7 +287,23 @@ async fn set_up_drive(
         }
     }
     map(&slave, 0x1c12, 0x1600, &image::OUTPUTS).await?;
-    map(&slave, 0x1c13, 0x1a00, &image::INPUTS).await?;
+    let is_here = |place: &EthercatBit| usize::from(place.slave) == index;
+    let digital = bus.inputs.iter().position(is_here);
+    if let Some(input) = digital.and_then(|input| machine.operating.inputs.get(input))
+        && slave.sdo_read::<u32>(0x60fd, 0).await.is_err()
+    {
+        return Err(PortError::Mismatch {
+            found: format!("drive {index}, \"{name}\", tells no digital inputs (60FDh)"),
+            expected: format!(
+                "the machine file has the input `{}` there: name a terminal",
+                input.name
+            ),
+        }
+        .into());
+    }
+    let own = digital.map(|_| image::DIGITAL);
+    let inputs: Vec<_> = image::INPUTS.into_iter().chain(own).collect();
+    map(&slave, 0x1c13, 0x1a00, &inputs).await?;
     slave.sdo_write(0x6060, 0, mode).await.asked("setting the mode of a drive")?;
     // A quick stop is a ramp, and the drive stays there.
     slave.sdo_write(0x605a, 0, 6_i16).await.asked("setting the quick stop of a drive")?;

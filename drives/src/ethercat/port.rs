@@ -4,7 +4,7 @@ use std::net::ToSocketAddrs;
 
 use ethercrab::PduStorage;
 use machine::drives::{Ethercat, EthercatLink};
-use machine::{ActuatorMode, DrivesKind, Machine};
+use machine::{Actuator, ActuatorMode, DrivesKind, Machine, Motor};
 use messages::{LinkCounters, Nanoseconds};
 use runtime::raw_frames::{ETHERCAT, RawFrames};
 
@@ -66,15 +66,20 @@ impl EthercatPort {
             }
         }
         let samples = bus.gate.map_or(1, |gate| gate.oversampling.max(1));
-        let actuator = |latency| ActuatorProfile {
+        // Drives measure at the sync signal at which they take their targets, and the next frame fetches that.
+        let actuator = |own: &Actuator| ActuatorProfile {
             modes: vec![ActuatorMode::Torque, ActuatorMode::Velocity, ActuatorMode::Position],
-            latency,
+            latency: own.latency,
+            age: match own.motor {
+                Motor::Dc(_) => Nanoseconds(period.0 - own.latency.0),
+                Motor::Stepper(_) => Nanoseconds(0),
+            },
         };
         let profile = Profile {
             clock: PortClock::Bus,
             gate_resolution: Nanoseconds(period.0 / i64::from(samples)),
             gate_latency,
-            actuators: machine.actuators.iter().map(|it| actuator(it.latency)).collect(),
+            actuators: machine.actuators.iter().map(actuator).collect(),
         };
         let (machine, bus) = (machine.clone(), bus.clone());
         Ok(Self { machine, bus, period, profile, link: None, cycle: None })
@@ -152,12 +157,11 @@ impl Port for EthercatPort {
         let main = network::main_device(frames);
         let mut wire = Wire::new(sender, receiver, link);
         let shift = self.machine.actuators.first().map_or(Nanoseconds(0), |it| it.latency);
-        let actuators = &self.machine.actuators;
-        let (bus, period) = (&self.bus, self.period);
+        let (bus, machine, period) = (&self.bus, &self.machine, self.period);
         let clock = wire.clock();
         let mut trouble = None;
         for _ in 0..TRIES {
-            let wanted = Wanted { bus, actuators, period, shift };
+            let wanted = Wanted { bus, machine, period, shift };
             let until = wire.now() + SET_UP;
             match wire.ask(network::set_up(main, wanted, &clock), until, PATIENCE) {
                 Some(Ok(network)) if network.group.is_empty() => break,

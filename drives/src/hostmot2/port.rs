@@ -384,6 +384,8 @@ fn profile(config: &Config) -> Profile {
             Connection::Pwm { .. } => vec![ActuatorMode::Voltage],
         },
         latency: *latency,
+        // Encoders and counted pulses are read by the request of the deadline.
+        age: Nanoseconds(0),
     };
     Profile {
         clock: PortClock::Ours,

@@ -5,6 +5,7 @@ mod cycle;
 pub mod homing;
 pub mod objects;
 pub mod servo;
+pub mod switches;
 pub mod trajectory;
 
 use machine::{Actuator, Axis};
@@ -19,9 +20,10 @@ use super::slave::sii::{Description, Identity, Manager, Use};
 use super::slave::state::Code;
 use super::wires::Wires;
 use cia402::Machine;
-use homing::{Homing, Method};
+use homing::{Homed, Homing, Method};
 use objects::Values;
 use servo::Servo;
+use switches::Switches;
 use trajectory::{Ramp, Segment};
 
 /// What the drives call themselves.
@@ -53,15 +55,17 @@ pub struct Drive {
     servo: Servo,
     /// Period of its loops [s].
     step: f64,
-    /// Counts at which the limit switches close.
-    switches: [i64; 2],
+    switches: Switches,
     machine: Machine,
     mode: i8,
     /// Where it shall be in CSP; speed and torque in the other modes.
     segment: Segment,
     ramp: Option<Ramp>,
     homing: Option<Homing>,
-    homed: bool,
+    /// How the newest homing ended.
+    homed: Homed,
+    /// Speed of a homing [rad/s].
+    pace: f64,
     /// What is added to the encoder's counts.
     offset: i64,
     /// What stood in the way of following for how long [s].
@@ -73,12 +77,13 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// The drive of the motor `index` of `actuator`, which drives `axis` from its `home` [m or rad] on, with
-    /// loops that run every `period`; `None` if it has no servo motor.
+    /// The drive of the motor `index` of `actuator`, which drives `axis`, with these `switches` and loops that run
+    /// every `period`; `None` if it has no servo motor.
     pub fn new(
         wires: Wires,
         index: usize,
-        (actuator, axis, home): (&Actuator, &Axis, f64),
+        (actuator, axis): (&Actuator, &Axis),
+        switches: Switches,
         period: Nanoseconds,
     ) -> Option<Self> {
         let servo = Servo::new(actuator, period.seconds())?;
@@ -96,9 +101,6 @@ impl Drive {
             deceleration: in_counts(axis.limits.acceleration).max(1),
             homing_speed: in_counts(axis.limits.velocity / 20.0).max(4),
         };
-        let switch =
-            |joint: f64| ((joint - home) / (actuator.encoder.resolution() * actuator.ratio)) as i64;
-        let [lower, upper] = axis.limits.position.map(switch);
         Some(Self {
             identity,
             dictionary: objects::dictionary(NAMES[1], &values),
@@ -106,13 +108,14 @@ impl Drive {
             motor: index,
             servo,
             step: period.seconds(),
-            switches: [lower.min(upper), lower.max(upper)],
+            switches,
             machine: Machine::default(),
             mode: 0,
             segment: Segment::rest(Nanoseconds(0), 0.0),
             ramp: None,
             homing: None,
-            homed: false,
+            homed: Homed::Not,
+            pace: 0.0,
             offset: 0,
             astray: 0.0,
             code: 0,

@@ -97,6 +97,11 @@ impl Plant {
         }
     }
 
+    /// Inputs of the machine whose places are in the machine file, one bit each: 1 is active.
+    pub fn inputs(&self) -> u64 {
+        self.measurement.inputs
+    }
+
     /// Tool centre point in the machine frame [m], where the plant knows it.
     pub fn tool(&self) -> Option<[f64; 3]> {
         self.measurement.tool

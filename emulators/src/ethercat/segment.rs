@@ -1,16 +1,17 @@
 //! A line of slaves: frames go through all of them and come back.
 
 use drives::PlantOptions;
-use machine::Machine;
+use machine::{DrivesKind, Machine};
 use messages::Nanoseconds;
 use messages::random::SplitMix64;
 
 use super::drive::Drive;
+use super::drive::switches::Switches;
 use super::frame::{self, ETHERNET_HEADER, ETHERTYPE};
 use super::plant::{Plant, PlantError};
 use super::slave::clock::Clock;
 use super::slave::{Passing, Slave};
-use super::terminal::{Kind, Terminal};
+use super::terminal::{CHANNELS, Kind, Terminal};
 use super::wires::{Bundle, Light, LightEdge, MotorWires, Wires};
 
 /// From one slave to the next.
@@ -36,6 +37,40 @@ impl Default for Layout {
     }
 }
 
+/// A switch of the machine on an input terminal.
+#[derive(Debug, Clone, Copy)]
+struct Wired {
+    /// Its bit among the machine's inputs; none where nothing that the motors do changes it.
+    input: u64,
+    /// Its wire.
+    line: u64,
+    is_active_low: bool,
+}
+
+/// The inputs of `machine` that it has on the terminals of `layout`.
+fn wired(machine: &Machine, layout: &Layout) -> Vec<Wired> {
+    let DrivesKind::Ethercat(bus) = &machine.drives.kind else { return Vec::new() };
+    let inputs = machine.operating.bits().zip(&bus.inputs);
+    let wired = inputs.filter_map(|((bit, input), place)| {
+        let terminal = usize::from(place.slave).checked_sub(machine.actuators.len())?;
+        let (before, own) = (layout.terminals.get(..terminal)?, layout.terminals.get(terminal)?);
+        let is_input = *own == Kind::Inputs && place.bit < u16::from(CHANNELS);
+        let line = u32::from(place.bit) + first_line(before, Kind::Inputs);
+        let is_active_low = input.is_active_low;
+        let bit = if input.simulated.is_some() { bit } else { 0 };
+        let line = 1_u64.checked_shl(line).filter(|_| is_input)?;
+        Some(Wired { input: bit, line, is_active_low })
+    });
+    wired.collect()
+}
+
+/// The wire of the first channel of a terminal of such a kind behind those that are `before` it.
+fn first_line(before: &[Kind], kind: Kind) -> u32 {
+    let is_alike =
+        |other: &&Kind| core::mem::discriminant(*other) == core::mem::discriminant(&kind);
+    u32::from(CHANNELS) * before.iter().filter(is_alike).count() as u32
+}
+
 /// The slaves with the machine that they drive. It has no time of its own: it goes on to the time that each
 /// call gives it, in the emulator's time, from 0 on.
 #[derive(Debug)]
@@ -44,6 +79,8 @@ pub struct Segment {
     /// How many slaves the cable reaches.
     reached: usize,
     wires: Wires,
+    /// The machine's switches that are on terminals.
+    switches: Vec<Wired>,
     plant: Plant,
     now: Nanoseconds,
     /// When the plant is measured next.
@@ -79,18 +116,24 @@ impl Segment {
         for (index, actuator) in machine.actuators.iter().enumerate() {
             let axis = machine.axes.get(actuator.axis).ok_or(PlantError::Steppers)?;
             let home = machine.home_joints.get(actuator.axis).copied().unwrap_or(0.0);
-            let drive = Drive::new(wires.clone(), index, (actuator, axis, home), plant.period());
+            let switches = Switches::of(machine, index, (actuator, axis, home));
+            let drive =
+                Drive::new(wires.clone(), index, (actuator, axis), switches, plant.period());
             let drive = drive.ok_or(PlantError::Steppers)?;
             slaves.push(Slave::new(Box::new(drive), clock()));
         }
-        for kind in &layout.terminals {
-            let terminal = Terminal::new(*kind, wires.clone());
+        for (index, kind) in layout.terminals.iter().enumerate() {
+            let before = layout.terminals.get(..index).unwrap_or_default();
+            let terminal = Terminal::new(*kind, wires.clone(), first_line(before, *kind));
             slaves.push(Slave::new(Box::new(terminal), clock()));
         }
         let reached = slaves.len();
-        let mut segment =
-            Self { slaves, reached, wires, plant, now: Nanoseconds(0), tick: Nanoseconds(0) };
+        let (now, tick) = (Nanoseconds(0), Nanoseconds(0));
+        let switches = wired(machine, layout);
+        let mut segment = Self { slaves, reached, wires, switches, plant, now, tick };
         segment.link();
+        // What nobody has touched yet is not active.
+        segment.switch(|_: &Wired| true);
         Ok(segment)
     }
 
@@ -156,10 +199,21 @@ impl Segment {
 
     fn step(&mut self) {
         self.plant.step(&mut self.wires.lock());
+        self.switch(|wired: &Wired| wired.input != 0);
         for slave in &mut self.slaves {
             slave.tick(self.tick);
         }
         self.tick = self.tick + self.plant.period();
+    }
+
+    /// Gives the wires of those switches that are `meant` the levels that the plant has them at.
+    fn switch(&mut self, meant: impl Fn(&Wired) -> bool) {
+        let active = self.plant.inputs();
+        let mut wires = self.wires.lock();
+        for Wired { input, line, is_active_low } in self.switches.iter().copied().filter(meant) {
+            let level = (active & input != 0) != is_active_low;
+            wires.inputs = if level { wires.inputs | line } else { wires.inputs & !line };
+        }
     }
 
     /// The time that it has gone on to.

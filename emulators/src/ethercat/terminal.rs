@@ -11,7 +11,7 @@ use super::slave::state::Code;
 use super::wires::Wires;
 
 /// Channels of the digital terminals.
-const CHANNELS: u8 = 8;
+pub const CHANNELS: u8 = 8;
 
 /// Full power of the analogue output.
 const FULL: f64 = 32_767.0;
@@ -43,14 +43,21 @@ pub enum Kind {
 pub struct Terminal {
     kind: Kind,
     wires: Wires,
+    /// The wire of its first channel, of those of digital terminals.
+    first: u32,
     /// The last level of the oversampled output.
     level: bool,
 }
 
 impl Terminal {
-    /// A terminal on `wires`.
-    pub fn new(kind: Kind, wires: Wires) -> Self {
-        Self { kind, wires, level: false }
+    /// A terminal on `wires`; digital channels from the `first` wire on.
+    pub fn new(kind: Kind, wires: Wires, first: u32) -> Self {
+        Self { kind, wires, first: first.min(u64::BITS - u32::from(CHANNELS)), level: false }
+    }
+
+    /// Puts `levels` of the channels onto the wires of the outputs.
+    fn switch(&self, outputs: &mut u64, levels: u8) {
+        *outputs = *outputs & !(0xff << self.first) | u64::from(levels) << self.first;
     }
 
     fn facts(&self) -> (u32, [&'static str; 2]) {
@@ -113,7 +120,7 @@ impl Device for Terminal {
                 if let Some(channel) = gate {
                     wires.light.gate(at, levels >> channel.min(7) & 1 != 0);
                 }
-                wires.outputs = levels.into();
+                self.switch(&mut wires.outputs, levels);
             }
             Kind::Oversampled => {
                 let Sync { sync0, count } = sync.unwrap_or(Sync { sync0: 0, count: 1 });
@@ -133,7 +140,7 @@ impl Device for Terminal {
 
     fn inputs(&mut self, data: &mut [u8], _: Nanoseconds) {
         if self.kind == Kind::Inputs {
-            let levels = self.wires.lock().inputs;
+            let levels = self.wires.lock().inputs >> self.first;
             data.iter_mut().zip(levels.to_le_bytes()).for_each(|(to, from)| *to = from);
         }
     }
@@ -153,7 +160,7 @@ impl Device for Terminal {
         match self.kind {
             Kind::Inputs => {}
             Kind::Outputs { gate } => {
-                wires.outputs = 0;
+                self.switch(&mut wires.outputs, 0);
                 if gate.is_some() {
                     wires.light.gate(at, false);
                 }

@@ -116,9 +116,9 @@ pub struct Bundle {
     pub motors: Vec<MotorWires>,
     /// Those of the laser.
     pub light: Light,
-    /// Digital inputs, one bit each.
+    /// Levels of the digital inputs, eight bits for each terminal of them in the order of the line.
     pub inputs: u64,
-    /// Digital outputs that are not the gate, one bit each.
+    /// Levels of the digital outputs, likewise; one of them may be the gate.
     pub outputs: u64,
 }
 

@@ -3,15 +3,17 @@
 pub mod ethercat;
 pub mod hostmot2;
 pub mod simulated;
+mod wiring;
 
 use messages::Nanoseconds;
+use messages::time::Period;
 
 use crate::actuator::Actuator;
 use crate::document::{
     Diagnostics, Named, NonNegative, Number, ProblemKind, Quantity, Span, Spanned, nearest,
 };
 use crate::drives::{Drives, DrivesKind};
-use crate::operating::Operating;
+use crate::operating::{InputFunction, Operating};
 use crate::quantity::Duration;
 use crate::table;
 
@@ -24,6 +26,27 @@ pub(super) struct Built {
     pub(super) gate_latency: Nanoseconds,
     /// Of each actuator.
     pub(super) latency: Vec<Nanoseconds>,
+    /// How old the measurement of an actuator is whose targets act by such a latency.
+    pub(super) age: Age,
+}
+
+/// How long before its deadline a motor is measured.
+#[derive(Clone, Copy)]
+pub(super) enum Age {
+    /// At the deadline.
+    None,
+    /// When the targets of the cycle before have come into force: by the latency after the deadline before.
+    Latched,
+}
+
+impl Age {
+    /// Of an actuator whose targets act by `latency`, in cycles of `period`.
+    fn of(self, latency: Nanoseconds, period: Period) -> Nanoseconds {
+        match self {
+            Self::None => Nanoseconds(0),
+            Self::Latched => Nanoseconds((period.time() - latency).0.max(0)),
+        }
+    }
 }
 
 /// The one list of the drives that a machine file can have: key, table, and what builds them.
@@ -52,6 +75,7 @@ macro_rules! drives_tables {
                     kind: DrivesKind::Simulated,
                     gate_latency: Nanoseconds(0),
                     latency: vec![Nanoseconds(0); actuators.len()],
+                    age: Age::None,
                 })
             }
         }
@@ -67,10 +91,11 @@ drives_tables! {
     ethercat: ethercat::EthercatTable, ethercat::build;
 }
 
-/// The drives of `table`, with the pins of what `operating` has; puts the latency of each actuator into
-/// `actuators`.
+/// The drives of `table` in cycles of `period`, with the pins of what `operating` has; puts the latency of each
+/// actuator, and the age of its measurement, into `actuators`.
 pub(super) fn build(
     table: &DrivesTable,
+    period: Period,
     actuators: &mut [Actuator],
     operating: &Operating,
     diagnostics: &mut Diagnostics,
@@ -82,18 +107,25 @@ pub(super) fn build(
             &format!("keep either [drives.{first}] or [drives.{second}]"),
         );
     }
-    let Some(Built { mut kind, gate_latency, latency }) = table.build(actuators, diagnostics)
+    let Some(Built { mut kind, gate_latency, latency, age }) = table.build(actuators, diagnostics)
     else {
         return Drives::default();
     };
     for (actuator, latency) in actuators.iter_mut().zip(latency) {
         actuator.latency = latency;
+        // A stepper is counted by the pulses that it is told.
+        if actuator.motor.dc().is_some() {
+            actuator.age = age.of(latency, period);
+        }
     }
-    if let (Some(table), DrivesKind::Hostmot2(card)) = (&table.hostmot2, &mut kind) {
-        hostmot2::connect(table, card, operating, diagnostics);
-    }
-    if let Some(table) = &table.ethercat {
-        ethercat::refuse_wiring(table, operating, diagnostics);
+    match (table, &mut kind) {
+        (DrivesTable { hostmot2: Some(table), .. }, DrivesKind::Hostmot2(card)) => {
+            hostmot2::connect(table, card, operating, diagnostics);
+        }
+        (DrivesTable { ethercat: Some(table), .. }, DrivesKind::Ethercat(bus)) => {
+            wiring::connect(table, bus, operating, diagnostics);
+        }
+        _ => {}
     }
     Drives { kind, gate_latency }
 }
@@ -176,6 +208,20 @@ fn each<'a, T>(
         }
     }
     all
+}
+
+/// Notes an index pulse among the inputs, which drives of this kind, in words, do not see; their table is at `span`.
+fn refuse_index(operating: &Operating, kind: &str, span: Span, diagnostics: &mut Diagnostics) {
+    for input in &operating.inputs {
+        if matches!(input.function, InputFunction::Index { .. }) {
+            let name = &input.name;
+            diagnostics.contradict(
+                span,
+                format!("the index pulse `{name}` is shorter than a cycle, and no {kind} sees it"),
+                "home by a `switch`, and leave the input out",
+            );
+        }
+    }
 }
 
 /// The whole number that `number` is; notes one that is not.

@@ -51,13 +51,11 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     } else {
         Operating::default()
     };
-    let drives = drives::build(&table.drives, &mut actuators, &operating, &mut diagnostics);
+    let period = realtime.period;
+    let drives = drives::build(&table.drives, period, &mut actuators, &operating, &mut diagnostics);
     if diagnostics.is_empty() {
         for ((drive, own), actuator) in driven.iter_mut().zip(&mut actuators) {
-            if actuator.motor.dc().is_some() {
-                actuator.age = drives.age(actuator.latency, realtime.period);
-            }
-            loops::slow_down(actuator, &drive.table, realtime.period, &mut diagnostics);
+            loops::slow_down(actuator, &drive.table, period, &mut diagnostics);
             *own = actuator.clone();
         }
     }

@@ -4,7 +4,7 @@ use messages::Nanoseconds;
 
 use super::super::wires::Phases;
 use super::cia402::State;
-use super::homing::{Homing, Method, Step};
+use super::homing::{Homed, Homing, Method, Step};
 use super::objects::{HOMING, POSITION, TORQUE, VELOCITY};
 use super::servo::Target;
 use super::trajectory::{Ramp, Segment};
@@ -46,7 +46,7 @@ impl Drive {
     /// The drive's own supply is gone.
     pub(super) fn power_off(&mut self) {
         self.machine = Default::default();
-        (self.ramp, self.homing, self.homed) = (None, None, false);
+        (self.ramp, self.homing, self.homed, self.pace) = (None, None, Homed::Not, 0.0);
         (self.code, self.mode, self.offset) = (0, 0, 0);
         self.wires.drive(self.motor, Phases::Open);
     }
@@ -69,10 +69,17 @@ impl Drive {
         if mode != self.mode && (mode == 0 || is_mode(mode)) {
             self.mode = mode;
             self.segment = Segment::rest(at, self.angle());
+            (self.homing, self.pace) = (None, 0.0);
+        }
+        // Without its bit, or with the one that halts, a homing is broken off.
+        let following = self.machine.state() == State::OperationEnabled;
+        if !following || word & 0x0110 != 0x10 {
             self.homing = None;
         }
+        if !following {
+            self.pace = 0.0;
+        }
         let position = self.position_target();
-        let following = self.machine.state() == State::OperationEnabled;
         if !following || self.mode != POSITION {
             self.segment = Segment::rest(at, self.angle());
         } else if !was_powered || before == State::QuickStopActive {
@@ -89,7 +96,7 @@ impl Drive {
             let counts = self.wires.motor(self.motor).counts;
             let revolution = i64::from(self.dictionary.number(0x608F, 1));
             self.homing = Method::of(number).map(|it| Homing::new(it, counts, revolution));
-            self.homed = false;
+            self.homed = Homed::Not;
         }
     }
 
@@ -156,29 +163,28 @@ impl Drive {
     /// A homing goes on.
     fn search(&mut self, at: Nanoseconds, angle: f64) -> Target {
         let counts = self.wires.motor(self.motor).counts;
-        let closed = self.switches_closed(counts);
+        let closed = self.switches.closed(counts);
         let step = self.homing.as_mut().map(|homing| homing.step(counts, closed));
+        let mut wanted = 0.0;
         match step {
             Some(Step::Move(way, quick)) => {
-                self.segment = Segment::rest(at, angle);
-                Target::Velocity([way * self.rate(0x6099, if quick { 1 } else { 2 }), 0.0])
+                wanted = way * self.rate(0x6099, if quick { 1 } else { 2 });
             }
             Some(Step::Found(found)) => {
                 self.offset = i64::from(self.dictionary.signed(0x607C, 0)) - found;
-                (self.homing, self.homed) = (None, true);
-                self.segment = Segment::rest(at, angle);
-                Target::Position([angle, 0.0, 0.0])
+                (self.homing, self.homed) = (None, Homed::Attained);
             }
-            None => {
+            Some(Step::Failed) => (self.homing, self.homed) = (None, Homed::Failed),
+            None if self.pace == 0.0 => {
                 let [position, _] = self.segment.at(at);
-                Target::Position([position, 0.0, 0.0])
+                return Target::Position([position, 0.0, 0.0]);
             }
+            None => {}
         }
-    }
-
-    fn switches_closed(&self, counts: i64) -> [bool; 2] {
-        let [lower, upper] = self.switches;
-        [counts <= lower, counts >= upper]
+        let change = self.rate(0x609A, 0) * self.step;
+        self.pace += (wanted - self.pace).clamp(-change, change);
+        self.segment = Segment::rest(at, angle);
+        Target::Velocity([self.pace, 0.0])
     }
 
     /// A following error beyond its limit for longer than its time is a fault.
@@ -235,8 +241,7 @@ impl Drive {
         let error = if follows { demand - position } else { 0 };
         let rated = f64::from(self.dictionary.number(0x6076, 0)) / 1000.0;
         let torque = (self.servo.torque(wires.current) / rated * 1000.0).round() as i16;
-        let [below, above] = self.switches_closed(wires.counts);
-        let inputs = u32::from(below) | u32::from(above) << 1;
+        let inputs = self.switches.closed(wires.counts).bits();
         let status = self.status();
         let mut put = |index, value: &[u8]| self.dictionary.put(index, 0, value);
         put(0x6041, &status.to_le_bytes());
@@ -265,7 +270,13 @@ impl Drive {
             status |= 0x2000;
         }
         if enabled && self.mode == HOMING && self.homing.is_none() {
-            status |= if self.homed { 0x1400 } else { 0x0400 };
+            let ended = match self.homed {
+                Homed::Not => 0x0000,
+                Homed::Attained => 0x1000,
+                Homed::Failed => 0x2000,
+            };
+            // Reached, or at rest.
+            status |= if self.pace == 0.0 { ended | 0x0400 } else { ended };
         }
         status
     }

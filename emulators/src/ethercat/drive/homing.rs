@@ -1,5 +1,7 @@
 //! How a drive finds its home position by itself (CiA 402-2, homing mode).
 
+use super::switches::Closed;
+
 /// How the home position is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
@@ -11,6 +13,19 @@ pub enum Method {
     Limit(Way),
     /// At the first index pulse after the limit switch on this side has opened.
     LimitIndex(Way),
+    /// Where the home switch opens that is closed from its edge on in this direction.
+    Switch(Way),
+}
+
+/// How a homing has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Homed {
+    /// It has not, or was broken off.
+    Not,
+    /// The home position is known.
+    Attained,
+    /// It was not found.
+    Failed,
 }
 
 /// A direction of motion.
@@ -36,6 +51,8 @@ impl Method {
             2 => Some(Self::LimitIndex(Way::Up)),
             17 => Some(Self::Limit(Way::Down)),
             18 => Some(Self::Limit(Way::Up)),
+            19 => Some(Self::Switch(Way::Up)),
+            21 => Some(Self::Switch(Way::Down)),
             33 => Some(Self::Index(Way::Down)),
             34 => Some(Self::Index(Way::Up)),
             35 | 37 => Some(Self::Here),
@@ -59,6 +76,8 @@ pub enum Step {
     Move(f64, bool),
     /// It has found home, at this position [counts of the encoder].
     Found(i64),
+    /// It has come to the end of its way without finding it.
+    Failed,
 }
 
 /// A homing that is under way.
@@ -66,6 +85,8 @@ pub enum Step {
 pub struct Homing {
     stage: Option<Stage>,
     index_after: bool,
+    /// Whether it is the home switch that is looked for, not a limit switch.
+    by_switch: bool,
     revolution: i64,
     before: i64,
 }
@@ -76,20 +97,27 @@ impl Homing {
         let stage = match method {
             Method::Here => None,
             Method::Index(way) => Some(Stage::Index(way)),
-            Method::Limit(way) | Method::LimitIndex(way) => Some(Stage::Approach(way)),
+            Method::Limit(way) | Method::LimitIndex(way) | Method::Switch(way) => {
+                Some(Stage::Approach(way))
+            }
         };
+        let by_switch = matches!(method, Method::Switch(_));
         let index_after = matches!(method, Method::LimitIndex(_));
-        Self { stage, index_after, revolution: revolution.max(1), before: counts }
+        Self { stage, index_after, by_switch, revolution: revolution.max(1), before: counts }
     }
 
-    /// Goes on at `counts` with the limit switches `below` and `above` closed or not.
-    pub fn step(&mut self, counts: i64, [below, above]: [bool; 2]) -> Step {
-        let closed = |way| if way == Way::Down { below } else { above };
+    /// Goes on at `counts` with these switches `closed`.
+    pub fn step(&mut self, counts: i64, switches: Closed) -> Step {
+        let closed = |way| if self.by_switch { switches.home } else { switches.limit(way) };
         let other = |way| if way == Way::Down { Way::Up } else { Way::Down };
         let before = core::mem::replace(&mut self.before, counts);
         let Some(stage) = self.stage else { return Step::Found(counts) };
         match stage {
             Stage::Approach(way) if closed(way) => self.stage = Some(Stage::Leave(way)),
+            // The end of the axis, and the switch was not there; or the axis does not leave it.
+            Stage::Approach(way) if switches.limit(way) => return Step::Failed,
+            Stage::Leave(way) if switches.limit(other(way)) => return Step::Failed,
+            Stage::Index(way) if switches.limit(way) => return Step::Failed,
             Stage::Leave(way) if !closed(way) => {
                 if !self.index_after {
                     return Step::Found(counts);
@@ -117,15 +145,19 @@ impl Homing {
 
 #[cfg(test)]
 mod tests {
+    use super::super::switches::Switches;
     use super::*;
 
-    fn home(number: i8, switch: i64) -> Option<i64> {
+    /// Where it is found from 0 on, with limit switches so far away on either side, and a home switch.
+    fn home(number: i8, limit: i64, home: Option<(i64, Way)>) -> Option<i64> {
+        let switches = Switches { limits: [-limit, limit], home };
         let mut homing = Homing::new(Method::of(number)?, 0, 1000);
         let mut counts = 0;
         for _ in 0..10_000 {
-            match homing.step(counts, [counts <= -switch, counts >= switch]) {
+            match homing.step(counts, switches.closed(counts)) {
                 Step::Move(way, quick) => counts += way as i64 * if quick { 8 } else { 2 },
                 Step::Found(at) => return Some(at),
+                Step::Failed => return None,
             }
         }
         None
@@ -133,13 +165,23 @@ mod tests {
 
     #[test]
     fn each_method_finds_its_home() {
-        assert_eq!(home(35, 100), Some(0));
-        assert_eq!(home(17, 1500), Some(-1498));
-        assert_eq!(home(18, 1500), Some(1498));
-        assert_eq!(home(1, 1500), Some(-1000));
-        assert_eq!(home(2, 1500), Some(1000));
-        assert_eq!(home(34, 5000), Some(1000));
-        assert_eq!(home(33, 5000), Some(0));
-        assert_eq!(home(3, 100), None);
+        assert_eq!(home(35, 100, None), Some(0));
+        assert_eq!(home(17, 1500, None), Some(-1498));
+        assert_eq!(home(18, 1500, None), Some(1498));
+        assert_eq!(home(19, 1500, Some((700, Way::Up))), Some(698));
+        assert_eq!(home(21, 1500, Some((-700, Way::Down))), Some(-698));
+        assert_eq!(home(21, 1500, Some((700, Way::Down))), Some(702), "it stands on its switch");
+        assert_eq!(home(1, 1500, None), Some(-1000));
+        assert_eq!(home(2, 1500, None), Some(1000));
+        assert_eq!(home(34, 5000, None), Some(1000));
+        assert_eq!(home(33, 5000, None), Some(0));
+        assert_eq!(home(3, 100, None), None);
+    }
+
+    #[test]
+    fn what_is_not_there_is_not_looked_for_without_end() {
+        assert_eq!(home(19, 1500, None), None);
+        assert_eq!(home(21, 1500, Some((700, Way::Up))), None);
+        assert_eq!(home(34, 500, None), None);
     }
 }

@@ -1,19 +1,20 @@
 //! Drives on an EtherCAT bus.
 
-use super::{Built, Latency, each, latencies, whole};
+use super::{Age, Built, Latency, each, latencies, whole};
 use crate::actuator::Actuator;
-use crate::document::{Diagnostics, Named, NonNegative, Number, Positive, Quantity, Spanned};
-use crate::drives::{DrivesKind, Ethercat, EthercatGate, EthercatLink};
-use crate::operating::Operating;
+use crate::document::{
+    Diagnostics, Named, NonNegative, Number, Positive, ProblemKind, Quantity, Spanned,
+};
+use crate::drives::{DrivesKind, Ethercat, EthercatGate, EthercatIdentity, EthercatLink};
 use crate::quantity::Duration;
 use crate::table;
 use messages::Nanoseconds;
 
 /// A whole number.
-type Whole = Number<NonNegative>;
+pub(super) type Whole = Number<NonNegative>;
 
 /// The last position on a bus.
-const LAST_SLAVE: u32 = 65_534;
+pub(super) const LAST_SLAVE: u32 = 65_534;
 
 /// The last channel of a terminal.
 const LAST_CHANNEL: u32 = 63;
@@ -41,6 +42,37 @@ table! {
         pub power: Option<EthercatPowerTable>,
         /// The drive of each actuator, by the actuators' names.
         pub actuators: Named<EthercatActuatorTable>,
+        /// Where the machine's inputs are, by their names.
+        pub inputs: Option<Named<EthercatBitTable>>,
+        /// Where its outputs are.
+        pub outputs: Option<Named<EthercatBitTable>>,
+        /// Who slaves shall be, by their positions on the bus, from 0.
+        pub slaves: Option<Named<EthercatSlaveTable>>,
+    }
+}
+
+table! {
+    /// Where an input or an output is.
+    pub struct EthercatBitTable {
+        /// Position of the terminal on the bus, from 0; of an input, that of a drive too.
+        pub slave: Whole,
+        /// The bit, from 0: of the terminal's process data, or of a drive's digital inputs (60FDh), of which 0 is the
+        /// negative limit switch, 1 the positive one, 2 the home switch.
+        pub bit: Whole,
+    }
+}
+
+table! {
+    /// Who a slave shall be, as its EEPROM says.
+    pub struct EthercatSlaveTable {
+        /// Number of the maker.
+        pub vendor: Whole,
+        /// The maker's number of it.
+        pub product: Whole,
+        /// Revision; any when left out.
+        pub revision: Option<Whole>,
+        /// Serial number; any when left out.
+        pub serial: Option<Whole>,
     }
 }
 
@@ -103,33 +135,46 @@ pub(super) fn build(
     let slave = |own: &EthercatActuatorTable| whole(&own.slave, LAST_SLAVE, diagnostics) as u16;
     let slaves = tables.into_iter().map(slave).collect();
     let own = |own: &EthercatActuatorTable| own.latency;
+    let identities = identities(table, diagnostics);
     Some(Built {
         gate_latency: Nanoseconds::from_seconds(table.gate_latency.value),
         latency: latencies(&table.latency, Some(&table.actuators), own, actuators),
+        age: Age::Latched,
         kind: DrivesKind::Ethercat(Ethercat {
             link: link?,
             watchdog: Nanoseconds::from_seconds(table.watchdog.value),
             actuators: slaves,
             gate,
             power,
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            identities,
         }),
     })
 }
 
-/// Refuses inputs and outputs, which the port does not exchange with the bus: an emergency stop that is never
-/// seen is worse than none.
-pub(super) fn refuse_wiring(
-    table: &EthercatTable,
-    operating: &Operating,
-    diagnostics: &mut Diagnostics,
-) {
-    let inputs = operating.inputs.iter().map(|input| ("input", "read", &input.name));
-    let outputs = operating.outputs.iter().map(|output| ("output", "switch", &output.name));
-    if let Some((kind, verb, name)) = inputs.chain(outputs).next() {
-        diagnostics.contradict(
-            table.span,
-            format!("the port to an EtherCAT bus does not {verb} the {kind} `{name}` yet"),
-            "leave [inputs] and [outputs] out, and wire what is for safety",
-        );
+/// Who the slaves of `table` shall be.
+fn identities(table: &EthercatTable, diagnostics: &mut Diagnostics) -> Vec<EthercatIdentity> {
+    let mut identities = Vec::new();
+    for (position, own) in table.slaves.iter().flat_map(|slaves| &slaves.entries) {
+        let slave = position.value.parse::<u16>().ok();
+        let Some(slave) = slave.filter(|slave| u32::from(*slave) <= LAST_SLAVE) else {
+            diagnostics.refuse(
+                ProblemKind::UnknownKey,
+                position.span,
+                format!("`{}` is no position on a bus", position.value),
+                Some(format!("write a whole number from 0 to {LAST_SLAVE}")),
+            );
+            continue;
+        };
+        let mut number = |number: &Whole| whole(number, u32::MAX, diagnostics);
+        identities.push(EthercatIdentity {
+            slave,
+            vendor: number(&own.vendor),
+            product: number(&own.product),
+            revision: own.revision.as_ref().map(&mut number),
+            serial: own.serial.as_ref().map(&mut number),
+        });
     }
+    identities
 }

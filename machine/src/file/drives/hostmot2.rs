@@ -1,12 +1,12 @@
 //! An FPGA card with HostMot2 firmware as drives.
 
-use super::{Built, Latency, each, find, latencies, refuse_others, whole};
+use super::{Age, Built, Latency, each, find, latencies, refuse_index, refuse_others, whole};
 use crate::actuator::Actuator;
 use crate::document::{
     Diagnostics, Named, NonNegative, Number, Positive, ProblemKind, Quantity, Span, Spanned,
 };
 use crate::drives::{DrivesKind, Hostmot2, Hostmot2Actuator, Xy2Frame};
-use crate::operating::{InputFunction, Operating};
+use crate::operating::Operating;
 use crate::quantity::{Angle, Duration};
 use crate::table;
 use messages::Nanoseconds;
@@ -103,6 +103,7 @@ pub(super) fn build(
     Some(Built {
         gate_latency: Nanoseconds::from_seconds(table.gate_latency.value),
         latency: latencies(&table.latency, Some(&table.actuators), own, actuators),
+        age: Age::None,
         kind: DrivesKind::Hostmot2(Hostmot2 {
             address: table.address.value.clone(),
             watchdog: Nanoseconds::from_seconds(table.watchdog.value),
@@ -162,18 +163,7 @@ pub(super) fn connect(
     operating: &Operating,
     diagnostics: &mut Diagnostics,
 ) {
-    for input in &operating.inputs {
-        if matches!(input.function, InputFunction::Index { .. }) {
-            let name = &input.name;
-            diagnostics.contradict(
-                table.span,
-                format!(
-                    "the index pulse `{name}` is shorter than a cycle, and no pin of a card sees it"
-                ),
-                "home by a `switch`, and leave the input out",
-            );
-        }
-    }
+    refuse_index(operating, "pin of a card", table.span, diagnostics);
     let inputs: Vec<&str> = operating.inputs.iter().map(|input| input.name.as_str()).collect();
     let outputs: Vec<&str> = operating.outputs.iter().map(|output| output.name.as_str()).collect();
     let [wired_in, wired_out] = [table.inputs.as_ref(), table.outputs.as_ref()];

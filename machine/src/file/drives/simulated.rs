@@ -1,6 +1,6 @@
 //! The simulated plant as drives.
 
-use super::{Built, Latency, latencies, refuse_unknown};
+use super::{Age, Built, Latency, latencies, refuse_unknown};
 use crate::actuator::Actuator;
 use crate::document::{Diagnostics, Named};
 use crate::drives::DrivesKind;
@@ -39,5 +39,6 @@ pub(super) fn build(
         kind: DrivesKind::Simulated,
         gate_latency: Nanoseconds::from_seconds(gate_latency.value),
         latency: latencies(latency, tables.as_ref(), |own| own.latency, actuators),
+        age: Age::None,
     })
 }
