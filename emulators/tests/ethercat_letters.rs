@@ -29,6 +29,14 @@ fn check(mode: &str, seed: u64) {
     let plan = job::letters(&machine);
     let played = job::play(line::open(machine.clone(), Rates::default(), seed), &plan, None);
     assert_eq!(played.report.completed, 1, "{:?}", played.report.fault);
+    let simulated = job::simulate(&machine, &plan);
+    assert_eq!(simulated.report.completed, 1, "{:?}", simulated.report.fault);
+    // Of drives that close all loops no command answers what was measured.
+    for targets in [false, mode == "position"] {
+        let [own, other] = [&played.records, &simulated.records];
+        assert_eq!(job::digest(own, targets), job::digest(other, targets), "targets: {targets}");
+    }
+
     let link = played.drives.link;
     assert_eq!((link.lost, link.late, link.corrupted, link.bridged), (0, 0, 0, 0), "{link:?}");
 

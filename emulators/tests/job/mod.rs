@@ -4,14 +4,15 @@
 #![allow(dead_code, reason = "each test binary uses its own part")]
 #![allow(unreachable_pub)]
 
+use controller::digest::Digest;
 use controller::{Controller, Inputs, Outputs, Peers};
-use drives::{Bridge, BridgeOptions, Deadlines, Port};
+use drives::{Bridge, BridgeOptions, Deadlines, PlantOptions, Port, SimulatedPlant};
 use emulators::cable::{Bench, Cable, Event, Hardware};
 use machine::Machine;
 use messages::artwork::{Artwork, Stroke, distance};
 use messages::{
-    ControllerReport, DrivesReport, LaserCycle, Nanoseconds, OperatorRequest, OperatorVerb,
-    RealtimeFacts, Setpoint,
+    Command, ControllerReport, DrivesReport, LaserCycle, MAX_ACTUATORS, Nanoseconds,
+    OperatorRequest, OperatorVerb, RealtimeFacts, Setpoint,
 };
 use monitor::recording::CycleRecord;
 use planner::Plan;
@@ -56,14 +57,36 @@ pub fn play<P: Port + 'static, H: Hardware + 'static>(
 ) -> Played<H> {
     let (machine, cable) = (bench.machine.clone(), bench.cable.clone());
     let resolution = bench.profile().gate_resolution.0;
-    let mut deadline = bench.deadline;
+    let deadline = bench.deadline;
     if let Some((after, event)) = event {
         cable.plan(deadline + Nanoseconds(after), event);
     }
+    let Run { records, report, drives } = run(Box::new(bench), &machine, deadline, plan);
+    Played { records, report, drives, cable, resolution }
+}
+
+/// What a run of a job came to.
+pub struct Run {
+    /// Every cycle from the job's start on.
+    pub records: Vec<CycleRecord>,
+    /// What the controller said of the job at its end.
+    pub report: ControllerReport,
+    /// What drives said then.
+    pub drives: DrivesReport,
+}
+
+/// Plays `plan` on the simulated plant of `machine`, with the latencies that its file declares.
+pub fn simulate(machine: &Machine, plan: &Plan) -> Run {
+    let plant = SimulatedPlant::new(machine, PlantOptions::default()).expect("a plant");
+    run(plant, machine, machine.realtime.period.time(), plan)
+}
+
+/// Plays `plan` on `port`, from `deadline` on.
+fn run(port: Box<dyn Port>, machine: &Machine, mut deadline: Nanoseconds, plan: &Plan) -> Run {
     let timing = machine.realtime;
     let options = BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, timing };
-    let mut bridge = Bridge::new(Box::new(bench), options);
-    let mut controller = Controller::new(&machine);
+    let mut bridge = Bridge::new(port, options);
+    let mut controller = Controller::new(machine);
     let (mut outputs, mut setpoints) = (Outputs::default(), plan.setpoints(1));
     let (mut records, mut ended) = (Vec::new(), None::<ControllerReport>);
     for cycle in 1_u64.. {
@@ -98,7 +121,28 @@ pub fn play<P: Port + 'static, H: Hardware + 'static>(
     }
     let report = ended.expect("a final report");
     let drives = bridge.report(RealtimeFacts::default());
-    Played { records, report, drives, cable, resolution }
+    Run { records, report, drives }
+}
+
+/// A number for what the commands of a job mean, from where the axes have come to its start on: how they come there
+/// depends on where they stood. Without `targets` stream time, rate, light and outputs alone: targets of loops that are
+/// closed here answer what was measured.
+pub fn digest(records: &[CycleRecord], targets: bool) -> u64 {
+    let mut digest = Digest::new();
+    let is_played = |command: &Command| command.stream != 0 && command.stream_time > 0.0;
+    let played = records.iter().map(|record| record.command).filter(is_played);
+    let mut cycles = 0;
+    for mut command in played {
+        if !targets {
+            command.position = [command.stream_time; MAX_ACTUATORS];
+            command.velocity = [command.rate; MAX_ACTUATORS];
+            command.effort = [0.0; MAX_ACTUATORS];
+        }
+        digest.add(&command, MAX_ACTUATORS);
+        cycles += 1;
+    }
+    assert!(cycles > 1000, "{cycles}");
+    digest.value()
 }
 
 /// The light that the commands asked for, by the clock of the cable, when the gate is `later` than the deadline
