@@ -118,6 +118,9 @@ pub struct Controller {
     /// What moves without a stream.
     travel: Travel,
     homing: Homing,
+    /// Actuators that follow no target, because their drives look for their references by themselves or shall, one bit
+    /// each: the plan goes where they are.
+    away: u16,
     /// Of each mover that is jogged for as long as it is asked for.
     jogs: [Option<operating::Jog>; MOVERS],
     /// Requests of people that were accepted, and how the newest motion by hand ended.
@@ -173,6 +176,7 @@ impl Controller {
             switching: Switching::new(machine),
             travel: Travel::new(machine, period.seconds()),
             homing: Homing::new(machine, period.seconds()),
+            away: 0,
             jogs: [None; MOVERS],
             requests: 0,
             motion_end: MotionEnd::None,
@@ -226,6 +230,7 @@ impl Controller {
         outputs.reply = inputs.request.map(|request| self.request(&request, feedback));
         self.transition(now, feedback);
         self.advance(feedback);
+        self.go_along(feedback);
         self.await_settled(settling, now);
         self.keep_dark();
         if self.state.follows()

@@ -169,6 +169,16 @@ impl Feedforward {
         }
     }
 
+    /// The motor with this index rests at `angle` [rad], where somebody else has brought it, as if it always had.
+    pub fn put(&mut self, index: usize, angle: f64) {
+        for planned in self.plan.iter_mut().chain([&mut self.now]) {
+            (planned.angle[index], planned.speed[index]) = (angle, 0.0);
+        }
+        for off in self.off.iter_mut() {
+            (off.angle[index], off.speed[index]) = (0.0, 0.0);
+        }
+    }
+
     /// The motors' places are told otherwise by `shift` [rad] from now on: nothing moves.
     pub fn shift(&mut self, shift: &ActuatorArray) {
         for planned in self.plan.iter_mut().chain([&mut self.now]) {

@@ -3,7 +3,8 @@
 //! By a switch: to it, away from it until it is released, and slowly back to its edge; with an index, on to the
 //! first pulse after that. An axis that stands on its switch begins with the way back. Of an axis with
 //! several actuators each has its own edge, and so its own reference, by which the axis is squared afterwards. By
-//! a hard stop: on until the motor's current says that it stands against it.
+//! a hard stop: on until the motor's current says that it stands against it. By the drive: it is asked to, and moves by
+//! itself; the plan goes where it is until it has come back with its reference.
 //!
 //! An edge lies between two measurements: it is taken to be in the middle, right to half of what the axis moves
 //! in a cycle at its latch speed.
@@ -22,17 +23,29 @@ const PRESSING: f64 = 0.02;
 /// What of the range between its soft limits an axis may go to find its reference.
 const MOST_SHARE: f64 = 1.2;
 
+/// For how long a drive may look for its reference at least [s].
+const LEAST_PATIENCE: f64 = 10.0;
+
 /// What is measured of the motors.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a> {
     /// Inputs, one bit each.
     pub inputs: u64,
+    /// Actuators whose drives look for their references by themselves, one bit each.
+    pub away: u16,
     /// Places of the motors [rad].
     pub angle: &'a ActuatorArray,
     /// Their currents [A].
     pub current: &'a ActuatorArray,
     /// Where the plan has them.
     pub standing: &'a Planned,
+}
+
+/// For how long a drive may look for the reference of an axis with such a `range` [m or rad]: twice there and back,
+/// and slowly once [s].
+fn patience(method: &Method, range: f64) -> f64 {
+    let way = MOST_SHARE * range;
+    LEAST_PATIENCE + 4.0 * way / method.speed + way / method.latch_speed
 }
 
 /// How far the search for one axis has come.
@@ -42,6 +55,10 @@ enum Phase {
     Approach,
     Retreat,
     Latch,
+    /// The drive has been asked to look by itself, does so, and has come back.
+    Asked,
+    Away,
+    Back,
     /// Coming to rest, before this.
     Stopping(Next),
     Found,
@@ -76,6 +93,9 @@ pub struct Search {
     /// For how many cycles a motor has pressed, and how many it must.
     pressed: u32,
     pressing: u32,
+    /// For how many cycles the drive has looked, and how many it may.
+    looked: u64,
+    patience: u64,
 }
 
 /// How a search goes on.
@@ -85,8 +105,12 @@ pub enum Outcome {
     Searching,
     /// The axis rests, and its motors' places are to be shifted by so much [rad].
     Found(ActuatorArray),
+    /// The axis rests, and its drive tells places in the machine.
+    Told,
     /// It went so far, as far as it may, and found nothing [m or rad].
     Lost(f64),
+    /// Its drive has looked for so many cycles, as many as it may.
+    Late(u64),
 }
 
 impl Search {
@@ -128,16 +152,48 @@ impl Search {
             before: [0.0; MAX_ACTUATORS],
             pressed: 0,
             pressing: (PRESSING / period).ceil() as u32,
+            looked: 0,
+            patience: (patience(&method, range) / period).ceil() as u64,
+        }
+    }
+
+    /// The bits of its actuators.
+    fn bits(&self) -> u16 {
+        self.own.clone().fold(0, |bits, index| bits | 1 << index)
+    }
+
+    /// The bits of the actuators whose drives shall look.
+    fn asks(&self) -> u16 {
+        if matches!(self.phase, Phase::Asked | Phase::Away) { self.bits() } else { 0 }
+    }
+
+    /// Goes on by one cycle where the drive looks by itself.
+    fn look(&mut self, away: u16) -> Outcome {
+        let is_away = away & self.bits() != 0;
+        self.looked += 1;
+        self.phase = match self.phase {
+            Phase::Begin => Phase::Asked,
+            Phase::Asked if is_away => Phase::Away,
+            Phase::Away if !is_away => Phase::Back,
+            phase => phase,
+        };
+        match self.phase {
+            Phase::Back => Outcome::Told,
+            _ if self.looked > self.patience => Outcome::Late(self.looked),
+            _ => Outcome::Searching,
         }
     }
 
     fn begin(&mut self) {
-        (self.phase, self.pressed) = (Phase::Begin, 0);
+        (self.phase, self.pressed, self.looked) = (Phase::Begin, 0, 0);
         (self.passed, self.found) = ([false; MAX_ACTUATORS], [None; MAX_ACTUATORS]);
     }
 
     /// Goes on by one cycle.
     fn step(&mut self, seen: &Seen<'_>, travel: &mut Travel) -> Outcome {
+        if self.method.method == HomingMethod::Drive {
+            return self.look(seen.away);
+        }
         let joint: ActuatorArray =
             core::array::from_fn(|index| seen.angle[index] * self.ratio[index]);
         let towards = self.method.side.sign();
@@ -174,6 +230,7 @@ impl Search {
                 Next::Found => self.phase = Phase::Found,
             },
             Phase::Approach | Phase::Retreat | Phase::Stopping(_) | Phase::Found => {}
+            Phase::Asked | Phase::Away | Phase::Back => {}
         }
         self.before = joint;
         if self.phase == Phase::Found {
@@ -232,10 +289,14 @@ pub enum GroupOutcome {
     Searching,
     /// An axis was found, and its motors' places are to be shifted by so much [rad].
     Found(usize, ActuatorArray),
+    /// An axis was found by its drive, and places that are told of these actuators are those in the machine.
+    Told(usize, u16),
     /// All axes of the group were found.
     Group,
     /// An axis went so far, as far as it may, and found nothing [m or rad].
     Lost(usize, f64, f64),
+    /// The drive of an axis has looked for so many cycles, more than it may.
+    Late(usize, u64, u64),
 }
 
 impl Homing {
@@ -282,6 +343,13 @@ impl Homing {
         self.asked.get(axis).copied().unwrap_or_default()
     }
 
+    /// Actuators whose drives shall look for their references by themselves, one bit each.
+    pub fn asks(&self) -> u16 {
+        let own =
+            self.searches.iter().filter(|it| self.wanted[it.axis] && it.method.order == self.order);
+        own.fold(0, |bits, search| bits | search.asks())
+    }
+
     /// How fast the axis goes back home [m/s or rad/s].
     pub fn speed(&self, axis: usize) -> f64 {
         let own = self.searches.iter().find(|search| search.axis == axis);
@@ -303,7 +371,14 @@ impl Homing {
                     self.wanted[search.axis] = false;
                     told = GroupOutcome::Found(search.axis, shift);
                 }
-                Outcome::Found(_) => {}
+                Outcome::Told if told == GroupOutcome::Searching => {
+                    self.wanted[search.axis] = false;
+                    told = GroupOutcome::Told(search.axis, search.bits());
+                }
+                Outcome::Found(_) | Outcome::Told => {}
+                Outcome::Late(cycles) => {
+                    return GroupOutcome::Late(search.axis, cycles, search.patience);
+                }
                 Outcome::Lost(way) => return GroupOutcome::Lost(search.axis, way, search.most),
             }
         }

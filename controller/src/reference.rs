@@ -90,6 +90,14 @@ impl Reference {
         pending.iter_mut().zip(shift).for_each(|(sum, shift)| *sum += shift);
     }
 
+    /// What makes the places that drives tell those of the machine, for the actuators with a bit in `actuators` [rad].
+    pub fn told(&self, actuators: u16) -> ActuatorArray {
+        core::array::from_fn(|index| {
+            let is_meant = actuators >> index & 1 != 0;
+            if is_meant { -self.offset[index] } else { 0.0 }
+        })
+    }
+
     /// What was to be added, and is from now on.
     pub fn apply(&mut self) -> Option<ActuatorArray> {
         let shift = self.pending.take()?;

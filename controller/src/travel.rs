@@ -305,6 +305,12 @@ impl Travel {
         Some(planned)
     }
 
+    /// The motor with this index is at `angle` [rad], where somebody else has brought it.
+    pub fn put(&mut self, index: usize, angle: f64) {
+        let Some(driven) = self.driven.get(index) else { return };
+        self.base.angle[index] = angle - self.moved(driven.axis).position / driven.ratio;
+    }
+
     /// The motors' places are told otherwise by `shift` [rad] from now on.
     pub fn shift(&mut self, shift: &ActuatorArray) {
         self.base.angle.iter_mut().zip(shift).for_each(|(angle, shift)| *angle += shift);

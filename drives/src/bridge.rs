@@ -443,6 +443,7 @@ impl Bridge {
         self.feedback.position = measured.position;
         self.feedback.current = measured.current;
         self.feedback.inputs = measured.inputs;
+        self.feedback.homing = measured.homing;
         self.feedback.tool = measured.tool.unwrap_or_default();
         self.feedback.laser = measured.laser;
     }

@@ -3,7 +3,7 @@
 //! - [`link`]: how frames travel; [`wire`]: the crate's frames on it, with a budget of time and without tasks.
 //! - [`cia402`]: the state machine of a drive; [`image`]: a drive's process data; [`gate`]: the laser's.
 //! - [`network`]: finds the slaves, holds them to the machine file and sets them up; [`cycle`]: a cycle of them;
-//!   `drive`: one of its drives; `digital`: its inputs and outputs; [`identity`]: who shall answer; [`port`]: the port.
+//!   `drive`: one of its drives; `homing`: how that finds its reference by itself; `digital`: inputs and outputs; [`identity`]: who shall answer; [`port`]: the port.
 //!
 //! A frame goes out at the deadline and comes back within a part of the period. SYNC0 of all slaves comes by
 //! the latency of the machine file later: there targets come into force together, and the gate's samples begin.
@@ -14,6 +14,7 @@ pub mod cycle;
 mod digital;
 mod drive;
 pub mod gate;
+mod homing;
 pub mod identity;
 pub mod image;
 pub mod link;

@@ -37,6 +37,10 @@
 //!   something similar: the port closes the gate, brakes, and reports a fault, until it is told
 //!   [`CommandMode::Disabled`]. A fault word of a drive is a [`messages::FaultCode::DriveFault`] with
 //!   [`messages::FaultQuantity::DriveWord`] and the word; its text stands in [`machine::drives::fault_text`].
+//! - A drive whose bit in [`Actuation::homing`] is set, where the motors are driven, looks for its reference by itself,
+//!   once: from that send on it has its bit in [`Measurement::homing`] and follows no target. When it has found it, it
+//!   tells places in the machine, comes back to its targets, and then its bit falls. Taken back before, it comes to
+//!   rest, and back. What it does not find is a fault.
 //! - No allocation, lock, print or panic in a send, a receive or a pass.
 
 use machine::{ActuatorMode, Machine};
@@ -74,6 +78,8 @@ pub struct Actuation {
     pub voltage: ActuatorArray,
     /// Digital outputs, one bit each.
     pub outputs: u64,
+    /// Actuators whose drives shall look for their references by themselves, one bit each, once each time that it is set.
+    pub homing: u16,
     /// The laser.
     pub laser: LaserCycle,
 }
@@ -88,6 +94,7 @@ impl Actuation {
         effort: [0.0; MAX_ACTUATORS],
         voltage: [0.0; MAX_ACTUATORS],
         outputs: 0,
+        homing: 0,
         laser: LaserCycle::OFF,
     };
 
@@ -120,6 +127,9 @@ pub struct Measurement {
     pub tool: Option<[f64; 3]>,
     /// Digital inputs in the order of the machine file, one bit each: 1 is active, whichever level that is.
     pub inputs: u64,
+    /// Actuators whose drives look for their references by themselves, one bit each: see
+    /// [`messages::Feedback::homing`].
+    pub homing: u16,
     /// What the laser did since the previous measurement; offsets count from there, through the cycles
     /// that passed since.
     pub laser: LaserCycle,

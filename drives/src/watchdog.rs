@@ -276,6 +276,7 @@ fn actuation(command: &Command, mode: CommandMode) -> Actuation {
         effort: command.effort,
         voltage: command.voltage,
         outputs: command.outputs,
+        homing: if follows { command.homing as u16 } else { 0 },
         laser: if follows { command.laser } else { LaserCycle::OFF },
     }
 }

@@ -58,6 +58,20 @@ fn a_motor_follows_its_target() {
 }
 
 #[test]
+fn the_port_is_held_to_the_age_of_its_measurements() {
+    let bench = line(0);
+    let profile = bench.port.profile();
+    assert!(profile.actuators.iter().all(|it| it.age == Nanoseconds(PERIOD - LATENCY)));
+    let mut machine = bench.machine.clone();
+    machine.actuators[1].age = Nanoseconds(0);
+    let error = drives::port::check(profile, &machine).expect_err("another age");
+    assert_eq!(
+        error.to_string(),
+        "the actuator `b` is measured 500 us before its deadline; the controller counts on 0 us"
+    );
+}
+
+#[test]
 fn an_edge_of_the_gate_is_within_the_resolution_that_the_port_declares() {
     let mut bench = enabled(0);
     let resolution = bench.port.profile().gate_resolution.0;

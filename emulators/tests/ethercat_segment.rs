@@ -299,14 +299,13 @@ fn a_drive_that_finds_no_switch_says_so_and_one_that_is_told_to_stops() {
     let rest = running.cycles(300);
     assert_eq!((rest[0].0 & 0x3400, rest[0].1), (0x0400, running.cycles(50)[0].1), "{rest:x?}");
     running.word = 0x1F;
-    let mut status = running.cycles(300);
+    running.cycles(300);
     for _ in 0..20_000 {
-        status = running.cycle();
-        if status[0].0 & 0x3400 != 0 {
+        if running.cycle()[0].0 & 0x3400 != 0 {
             break;
         }
     }
-    status = running.cycles(200);
+    let status = running.cycles(200);
     assert_eq!(status[0].0 & 0x3400, 0x2400, "{status:x?}");
 }
 

@@ -4,6 +4,7 @@
 
 mod axes;
 pub mod bounds;
+mod drive_homing;
 pub mod drives;
 pub mod frame;
 mod laser;

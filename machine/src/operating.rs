@@ -197,6 +197,8 @@ pub struct Homing {
     pub order: u32,
     /// The current at which a motor counts as standing against its stop [A].
     pub current: f64,
+    /// What its drive is told, where that finds the reference.
+    pub drive: DriveHoming,
 }
 
 /// By what an axis finds its reference.
@@ -210,6 +212,17 @@ pub enum HomingMethod {
     HardStop,
     /// Its encoder is absolute.
     Absolute,
+    /// Its drive finds it by a method of its own.
+    Drive,
+}
+
+/// What a drive is told that finds its reference by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DriveHoming {
+    /// The number of its method, by CiA 402.
+    pub method: i8,
+    /// Acceleration of its motion [m/s² or rad/s²].
+    pub acceleration: f64,
 }
 
 /// What an emergency stop does, by the categories of IEC 60204-1.

@@ -30,7 +30,7 @@ impl CommandMode {
 
 sample! {
     /// The answer to one feedback. Drives latches it and applies it at the next deadline, always.
-    Command = "graver.Command.v5" {
+    Command = "graver.Command.v6" {
         /// The `Feedback::epoch` this answers: a command for another run of drives is not fresh.
         epoch: u64,
         /// The feedback this answers; it takes effect at the deadline of `cycle + 1`.
@@ -54,6 +54,9 @@ sample! {
         state: u32,
         /// Digital outputs in the order of the machine file, one bit each: 1 is on, whichever level that is.
         outputs: u64,
+        /// Actuators whose drives shall look for their references by themselves, one bit each: once each time that it is
+        /// set. A drive whose bit is taken back comes to rest.
+        homing: u64,
         /// Stream time at the instant of the feedback [s].
         stream_time: f64,
         /// Rate at which the stream is played, 1 as planned.

@@ -21,7 +21,7 @@ pub mod status {
 
 sample! {
     /// One measurement, taken at the deadline of `cycle`.
-    Feedback = "graver.Feedback.v4" {
+    Feedback = "graver.Feedback.v5" {
         /// Identifies this run of drives: its start on the monotonic clock [ns].
         epoch: u64,
         /// The cycle that starts with this measurement.
@@ -53,8 +53,10 @@ sample! {
         /// deadlines. Nobody measured in them, and the gate was closed. The largest number stands
         /// for all above it: so long a stall is a fault in any case.
         skipped: u16,
-        /// Always 0; keeps the sample free of padding.
-        reserved: u16,
+        /// Actuators whose drives look for their references by themselves or have not come back from that, one bit each:
+        /// they follow no target. A drive that comes back without a fault has found its reference, and tells places in
+        /// the machine from then on.
+        homing: u16,
         /// Digital inputs in the order of the machine file, one bit each: 1 is active, whichever level that is.
         inputs: u64,
         /// Encoder counts since power-on.

@@ -196,6 +196,7 @@ fn a_machine_that_has_to_find_its_place_is_homed_and_unlocked_by_that() {
     let mut with_switch = machine();
     with_switch.operating.homing[0] = Some(Homing {
         method: HomingMethod::Switch,
+        drive: machine::operating::DriveHoming::default(),
         side: Side::Lower,
         speed: 0.05,
         latch_speed: 0.01,

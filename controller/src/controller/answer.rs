@@ -34,6 +34,7 @@ impl Controller {
             stream_time: self.player.now().time.seconds(),
             rate: self.player.now().rate,
             tool: self.feedforward.now().tool,
+            homing: u64::from(self.asks()),
             laser,
             fault: self.fault,
             ..Command::default()
@@ -113,6 +114,10 @@ impl Controller {
                 continue;
             }
             command.following_error[index] = error;
+            // Its drive looks for its reference by itself: no loop is closed around that.
+            if self.away >> index & 1 != 0 {
+                continue;
+            }
             let Some(cascade) = cascade else { continue };
             // In the time in which the position loop answers, a motor that creeps moves less than
             // a count. Friction holds it, but for a slip of a count now and then: what is within

@@ -10,8 +10,8 @@ use crate::supervision::Finding;
 use crate::travel::{Bounds, MOVERS};
 use machine::operating::{DoorAction, Side, StopCategory};
 use messages::{
-    CommandMode, Cycle, Fault, FaultCode, FaultQuantity, Feedback, HoldCause, MAX_AXES, MotionEnd,
-    Nanoseconds,
+    CommandMode, Cycle, Fault, FaultCode, FaultQuantity, Feedback, HoldCause, MAX_ACTUATORS,
+    MAX_AXES, MotionEnd, Nanoseconds,
 };
 
 /// A way until the probe touches, and where it did.
@@ -81,7 +81,29 @@ impl Controller {
 
     /// Whether what moves without a stream rests, as far as drives have been told.
     pub(super) fn travel_rests(&self) -> bool {
-        self.travel.is_at_rest() && (self.playing != 0 || self.feedforward.rests())
+        let rests = self.travel.is_at_rest() && self.away == 0;
+        rests && (self.playing != 0 || self.feedforward.rests())
+    }
+
+    /// Actuators whose drives shall look for their references by themselves, one bit each.
+    pub(super) fn asks(&self) -> u16 {
+        if self.state == State::Homing(HomingStage::Searching) { self.homing.asks() } else { 0 }
+    }
+
+    /// The plan goes where drives are that look for their references by themselves.
+    pub(super) fn go_along(&mut self, feedback: &Feedback) {
+        self.away = if self.state.follows() { feedback.homing | self.asks() } else { 0 };
+        for index in 0..self.machine.actuators.len().min(MAX_ACTUATORS) {
+            let place = feedback.position[index];
+            if self.away >> index & 1 == 0 || !place.is_finite() {
+                continue;
+            }
+            self.feedforward.put(index, place);
+            self.travel.put(index, place);
+            if let Some(cascade) = &mut self.cascades[index] {
+                cascade.reset();
+            }
+        }
     }
 
     /// Goes on by one cycle where axes are moved without a stream, or stands.
@@ -273,6 +295,7 @@ impl Controller {
             HomingStage::Searching => {
                 let seen = Seen {
                     inputs: feedback.inputs,
+                    away: feedback.homing,
                     angle: &feedback.position,
                     current: &feedback.current,
                     standing: self.feedforward.newest(),
@@ -282,6 +305,16 @@ impl Controller {
                     GroupOutcome::Found(axis, shift) => {
                         self.reference.shift(&shift);
                         self.reference.found(axis);
+                    }
+                    GroupOutcome::Told(axis, actuators) => {
+                        self.reference.shift(&self.reference.told(actuators));
+                        self.reference.found(axis);
+                    }
+                    GroupOutcome::Late(axis, cycles, most) => {
+                        let fault = Fault::new(FaultCode::HomingFailed).on_axis(axis);
+                        let (cycles, most) = (cycles as f64, most as f64);
+                        let fault = fault.beyond(FaultQuantity::Cycles, cycles, most);
+                        self.fail(Finding::sound(fault), now);
                     }
                     GroupOutcome::Group => {
                         self.state = State::Homing(HomingStage::Squaring { begun: false });

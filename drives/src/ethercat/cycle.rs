@@ -3,6 +3,7 @@
 use ethercrab::{Command, SubDeviceState};
 use machine::Machine;
 use machine::drives::Ethercat;
+use machine::operating::HomingMethod;
 use messages::{CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, Nanoseconds};
 
 use super::cia402::Wanted;
@@ -101,7 +102,10 @@ impl BusCycle {
         let power = bus.power.map(usize::from);
         let drives = network.drives.iter().zip(&machine.actuators).map(|(facts, actuator)| {
             let joint = machine.home_joints.get(actuator.axis).copied().unwrap_or(0.0);
-            Drive::new(facts.clone(), actuator, joint / actuator.ratio)
+            let homing = machine.operating.homing(actuator.axis);
+            let homing = homing.filter(|homing| homing.method == HomingMethod::Drive);
+            let reference = homing.map(|homing| homing.position / actuator.ratio);
+            Drive::new(facts.clone(), actuator, joint / actuator.ratio, reference, period)
         });
         let drives = drives.collect();
         let fired =
@@ -337,13 +341,16 @@ impl BusCycle {
     /// Takes in what the drives say.
     fn take(&mut self) {
         let Network { main, group, .. } = &self.network;
-        let mut faulty = None;
+        let (mut faulty, mut lost) = (None, None);
         for (index, drive) in self.drives.iter_mut().enumerate() {
             let Ok(slave) = group.subdevice(main, drive.facts.slave) else { continue };
             let Some(said) = Said::read(slave.io_raw().inputs()) else { continue };
             drive.hear(said);
             if let Some(error) = drive.error() {
                 faulty.get_or_insert((index, error));
+            }
+            if let Some(status) = drive.lost() {
+                lost.get_or_insert((index, status));
             }
         }
         self.inputs = self.digital.active(&self.network, &self.drives);
@@ -352,6 +359,13 @@ impl BusCycle {
             && self.stage == Stage::Operational
         {
             self.fail(Fault::new(FaultCode::DriveFault).on_actuator(index), f64::from(error));
+        }
+        if let Some((index, status)) = lost
+            && self.mode != CommandMode::Disabled
+            && !self.fault.is_some()
+        {
+            let fault = Fault::new(FaultCode::HomingFailed).on_actuator(index);
+            self.fault = fault.with(FaultQuantity::HomingStatus, f64::from(status));
         }
     }
 
@@ -370,6 +384,8 @@ impl BusCycle {
             }
         }
         measurement.inputs = self.inputs;
+        let away = self.drives.iter().enumerate().filter(|(_, drive)| drive.is_away());
+        measurement.homing = away.fold(0, |bits, (index, _)| bits | 1 << index);
         measurement.tool = None;
         measurement.laser = self.fired.take();
         measurement.clock_offset = self.clock_offset;

@@ -2,8 +2,10 @@
 //! measured.
 
 use machine::{Actuator, ActuatorMode};
+use messages::Nanoseconds;
 
 use super::cia402::{self, State, Wanted};
+use super::homing::{Heard, Homing};
 use super::image::{Said, Told};
 use super::network::DriveFacts;
 use crate::port::Actuation;
@@ -24,13 +26,25 @@ pub(super) struct Drive {
     zero: Option<i64>,
     /// Position without the wrap of its 32 bits [counts].
     counts: i64,
+    homing: Homing,
+    /// The angle of the reference that it finds by itself, if it does [rad].
+    reference: Option<f64>,
+    /// Whether it has failed to.
+    is_lost: bool,
     said: Said,
     told: Told,
 }
 
 impl Drive {
-    /// The drive that told `facts`, of an actuator that stands at `home` [rad].
-    pub(super) fn new(facts: DriveFacts, actuator: &Actuator, home: f64) -> Self {
+    /// The drive that told `facts`, of an actuator that stands at `home` [rad], in cycles of `period`; the angle of its
+    /// `reference`, if it finds that by itself [rad].
+    pub(super) fn new(
+        facts: DriveFacts,
+        actuator: &Actuator,
+        home: f64,
+        reference: Option<f64>,
+        period: Nanoseconds,
+    ) -> Self {
         Self {
             facts,
             mode: actuator.mode,
@@ -40,6 +54,9 @@ impl Drive {
             home,
             zero: None,
             counts: 0,
+            homing: Homing::new(period),
+            reference,
+            is_lost: false,
             said: Said::default(),
             told: Told::default(),
         }
@@ -55,8 +72,14 @@ impl Drive {
             ..Told::default()
         };
         if wanted != Wanted::Enabled || state != State::Enabled {
+            self.homing.forget();
+            self.is_lost = false;
             return true;
         }
+        let asked = self.reference.is_some() && actuation.homing >> index & 1 != 0;
+        let (control, mode) = self.homing.ask(asked && !self.is_lost);
+        self.told.control |= control;
+        self.told.mode = mode.unwrap_or(self.code);
         let of =
             |targets: &messages::ActuatorArray| targets.get(index).copied().unwrap_or(f64::NAN);
         let [position, velocity, effort] =
@@ -71,6 +94,13 @@ impl Drive {
             return false;
         }
         let torque = (effort / self.facts.rated * 1000.0).round() as i16;
+        if self.homing.is_away() {
+            // Its targets are where it is, and the torque that its weight takes, until it follows them again.
+            if self.mode == ActuatorMode::Torque {
+                self.told.torque = torque;
+            }
+            return true;
+        }
         match self.mode {
             ActuatorMode::Position => {
                 let moved = ((position - self.home) / self.resolution).round() as i64;
@@ -94,7 +124,18 @@ impl Drive {
 
     /// Whether it drives its motor in the mode of its actuator.
     pub(super) fn is_powered(&self) -> bool {
-        State::of(self.said.status).is_powered() && self.said.mode == self.code
+        let is_in_mode = self.said.mode == self.code || self.homing.is_away();
+        State::of(self.said.status).is_powered() && is_in_mode
+    }
+
+    /// Whether it looks for its reference by itself, or has not come back from that.
+    pub(super) fn is_away(&self) -> bool {
+        self.homing.is_away()
+    }
+
+    /// Its status word, where it has not found its reference.
+    pub(super) fn lost(&self) -> Option<u16> {
+        self.is_lost.then_some(self.said.status)
     }
 
     /// Its error code, if it has a fault.
@@ -107,7 +148,7 @@ impl Drive {
         self.said.digital
     }
 
-    /// Counts since the first measurement.
+    /// Counts since the first measurement, or from the reference that it has found by itself.
     pub(super) fn moved(&self) -> i64 {
         self.counts - self.zero.unwrap_or(self.counts)
     }
@@ -133,6 +174,16 @@ impl Drive {
                 let moved = said.position.wrapping_sub(self.counts as i32);
                 self.counts += i64::from(moved);
             }
+        }
+        match self.homing.hear(&said, self.code) {
+            Heard::Nothing => {}
+            Heard::Found => {
+                // From here on it tells places from its reference.
+                self.counts = i64::from(said.position);
+                self.zero = Some(0);
+                self.home = self.reference.unwrap_or(self.home);
+            }
+            Heard::Failed => self.is_lost = true,
         }
         self.said = said;
     }

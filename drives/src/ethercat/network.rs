@@ -11,11 +11,12 @@ use ethercrab::{
     SubDeviceGroup, SubDeviceRef, Timeouts,
 };
 use machine::drives::{Ethercat, EthercatBit, EthercatGate};
+use machine::operating::{DriveHoming, Homing, HomingMethod};
 use machine::{Actuator, ActuatorMode, Machine};
 use messages::Nanoseconds;
 
 use super::wire::Wire;
-use super::{cia402, digital, identity, image};
+use super::{cia402, digital, homing, identity, image};
 use crate::port::PortError;
 
 /// The most slaves on a bus, and bytes of their process data.
@@ -304,6 +305,11 @@ async fn set_up_drive(
     let own = digital.map(|_| image::DIGITAL);
     let inputs: Vec<_> = image::INPUTS.into_iter().chain(own).collect();
     map(&slave, 0x1c13, 0x1a00, &inputs).await?;
+    if let Some(homing) = machine.operating.homing(actuator.axis)
+        && homing.method == HomingMethod::Drive
+    {
+        set_up_homing(&slave, index, supported, (actuator, homing)).await?;
+    }
     slave.sdo_write(0x6060, 0, mode).await.asked("setting the mode of a drive")?;
     // A quick stop is a ramp, and the drive stays there.
     slave.sdo_write(0x605a, 0, 6_i16).await.asked("setting the quick stop of a drive")?;
@@ -311,6 +317,56 @@ async fn set_up_drive(
     slave.sdo_write(0x60c2, 1, count).await.asked("setting the period of a drive")?;
     slave.sdo_write(0x60c2, 2, exponent).await.asked("setting the period of a drive")?;
     Ok(DriveFacts { slave: index, modes, rated: f64::from(rated) * 1e-3 })
+}
+
+/// Tells a drive how it shall find its reference by itself.
+async fn set_up_homing<S>(
+    slave: &SubDeviceRef<'_, S>,
+    index: usize,
+    supported: u32,
+    (actuator, homing): (&Actuator, &Homing),
+) -> Result<(), Trouble>
+where
+    S: core::ops::Deref<Target = ethercrab::SubDevice>,
+{
+    let DriveHoming { method, acceleration } = homing.drive;
+    let refused = |found: String| PortError::Mismatch {
+        found,
+        expected: format!(
+            "the machine file has `{}` find its reference by the drive: change its [axis] `homing`, by what the \
+             drive's manual says",
+            actuator.name
+        ),
+    };
+    let name = slave.name();
+    if supported & homing::SUPPORTED == 0 {
+        return Err(
+            refused(format!("drive {index}, \"{name}\", has no homing mode (6502h)")).into()
+        );
+    }
+    if slave.sdo_write(0x6098, 0, method).await.is_err() {
+        let found = format!(
+            "drive {index}, \"{name}\", does not take the method {method} of homing (6098h)"
+        );
+        return Err(refused(found).into());
+    }
+    let counts = |joint: f64| {
+        let counts = (joint / (actuator.encoder.resolution() * actuator.ratio)).abs().round();
+        counts.clamp(1.0, f64::from(i32::MAX)) as u32
+    };
+    for (object, sub, value, what) in [
+        (0x6099, 1_u8, counts(homing.speed), "speed of homing (6099h:01)"),
+        (0x6099, 2, counts(homing.latch_speed), "slow speed of homing (6099h:02)"),
+        (0x609a, 0, counts(acceleration), "acceleration of homing (609Ah)"),
+        // The reference is where the drive counts from.
+        (0x607c, 0, 0, "home offset (607Ch)"),
+    ] {
+        if slave.sdo_write(object, sub, value).await.is_err() {
+            let found = format!("drive {index}, \"{name}\", does not take {value} as its {what}");
+            return Err(refused(found).into());
+        }
+    }
+    Ok(())
 }
 
 /// A period as drives are told it: so many times ten to so many seconds.

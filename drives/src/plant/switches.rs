@@ -5,15 +5,21 @@
 //! is set from outside.
 //!
 //! An axis that has to be homed counts from where it stood at power-on, as an incremental encoder does; one
-//! with an absolute encoder from where that reads 0.
+//! with an absolute encoder from where that reads 0. One whose drive finds its reference by itself does not move for that:
+//! the simulated drive knows it, and takes a moment.
 
 use core::f64::consts::TAU;
 
 use machine::operating::{HomingMethod, InputFunction, SimulatedSwitch};
 use machine::{Actuator, Machine};
-use messages::{ActuatorArray, MAX_ACTUATORS};
+use messages::{ActuatorArray, CommandMode, MAX_ACTUATORS, Nanoseconds};
 
 use crate::port::{Actuation, Measurement, Port, Profile};
+
+/// How long a simulated drive looks for its reference, and in how many cycles at least: its places change half way, and
+/// commands are of the cycle before.
+const LOOKING: Nanoseconds = Nanoseconds(8_000_000);
+const LEAST_LOOKING: u64 = 4;
 
 /// A simulated machine with its switches.
 pub struct Switched {
@@ -22,6 +28,13 @@ pub struct Switched {
     switches: Vec<Switch>,
     /// Which actuators count from where they stood at first.
     counts_from_start: [bool; MAX_ACTUATORS],
+    /// Actuators whose drives find their references by themselves, one bit each; those that do so for so many cycles;
+    /// and those that have, and are still asked to.
+    by_drive: u16,
+    homing: [Option<u64>; MAX_ACTUATORS],
+    homed: u16,
+    /// For how many cycles a drive looks.
+    looking: u64,
     /// What is taken from each measured position; `None` before the first measurement [rad].
     zero: Option<ActuatorArray>,
     absolute: ActuatorArray,
@@ -56,10 +69,15 @@ impl Switched {
             return port;
         }
         let (mut counts_from_start, mut absolute) = ([false; MAX_ACTUATORS], [0.0; MAX_ACTUATORS]);
+        let mut by_drive = 0;
         for (index, actuator) in machine.actuators.iter().enumerate().take(MAX_ACTUATORS) {
             let Some(homing) = operating.homing(actuator.axis) else { continue };
             match homing.method {
                 HomingMethod::Absolute => absolute[index] = homing.position / actuator.ratio,
+                HomingMethod::Drive => {
+                    counts_from_start[index] = true;
+                    by_drive |= 1 << index;
+                }
                 _ => counts_from_start[index] = true,
             }
         }
@@ -76,6 +94,10 @@ impl Switched {
             actuators: machine.actuators.clone(),
             port,
             counts_from_start,
+            by_drive,
+            homing: [None; MAX_ACTUATORS],
+            homed: 0,
+            looking: machine.realtime.period.cycles_for(LOOKING).max(LEAST_LOOKING),
             zero: None,
             absolute,
             before: None,
@@ -88,6 +110,42 @@ impl Switched {
         self.shifted = *actuation;
         let zero = self.zero.unwrap_or(self.absolute);
         self.shifted.position.iter_mut().zip(zero).for_each(|(place, zero)| *place += zero);
+        let asked = if actuation.mode == CommandMode::Driven { actuation.homing } else { 0 };
+        self.homed &= asked;
+        for index in 0..MAX_ACTUATORS {
+            let bit = 1 << index;
+            if asked & self.by_drive & !self.homed & bit == 0 {
+                self.homing[index] = None;
+            } else if self.homing[index].is_none() {
+                self.homing[index] = Some(0);
+            }
+            // It stays where it is meanwhile.
+            if let Some(before) = self.before.filter(|_| self.homing[index].is_some()) {
+                (self.shifted.position[index], self.shifted.velocity[index]) = (before[index], 0.0);
+            }
+        }
+    }
+
+    /// Goes on with the homings; the bits of those that are under way.
+    fn look(&mut self) -> u16 {
+        let mut away = 0;
+        for index in 0..MAX_ACTUATORS {
+            let Some(cycles) = &mut self.homing[index] else { continue };
+            *cycles += 1;
+            // Found in the middle of its time: places change while it follows no target.
+            if *cycles == self.looking / 2 {
+                if let Some(zero) = &mut self.zero {
+                    zero[index] = 0.0;
+                }
+            }
+            if *cycles < self.looking {
+                away |= 1 << index;
+            } else {
+                self.homing[index] = None;
+                self.homed |= 1 << index;
+            }
+        }
+        away
     }
 
     /// Whether `switch` is active with the motors at `angle`, which were at `before` [rad].
@@ -132,14 +190,15 @@ impl Port for Switched {
         let angle = measurement.position;
         measurement.inputs = self.inputs(&angle);
         self.before = Some(angle);
-        let (counts_from_start, absolute) = (&self.counts_from_start, &self.absolute);
-        let zero = self.zero.get_or_insert_with(|| {
+        if self.zero.is_none() {
             let from = |index: usize| {
-                if counts_from_start[index] { angle[index] } else { absolute[index] }
+                if self.counts_from_start[index] { angle[index] } else { self.absolute[index] }
             };
-            core::array::from_fn(from)
-        });
-        measurement.position.iter_mut().zip(zero).for_each(|(place, zero)| *place -= *zero);
+            self.zero = Some(core::array::from_fn(from));
+        }
+        measurement.homing = self.look();
+        let zero = self.zero.unwrap_or_default();
+        measurement.position.iter_mut().zip(zero).for_each(|(place, zero)| *place -= zero);
     }
 
     fn pass(&mut self, actuation: &Actuation) {

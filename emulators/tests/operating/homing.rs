@@ -165,6 +165,41 @@ fn an_absolute_encoder_knows_its_place_from_the_start() {
     cell.accept(Stop, 0, 0.0, 0.0);
 }
 
+#[test]
+fn a_simulated_drive_finds_its_reference_without_a_motion() {
+    let by_drive = "method = \"drive\"\ndrive_method = 17\nposition = \"-1 mm\"\n";
+    for mode in ["position", "velocity", "torque"] {
+        let file = CARTESIAN.replace("[axis.x]\n", &format!("[axis.x]\nmode = \"{mode}\"\n"));
+        let text = format!("{file}\n[axis.x.homing]\n{by_drive}");
+        let machine = Machine::parse("homing.toml", &text, &[]).unwrap();
+        let mut cell = Cell::enabled(&machine);
+        assert_eq!(cell.progress.homed & 3, 2);
+        assert_eq!(cell.refuse(Start, 0, 1.0, 0.0), Refusal::NotHomed);
+        let before = cell.truth(0);
+        cell.accept(Home, 0, 0.0, 0.0);
+        let mut away = 0;
+        for _ in 0..1000 {
+            cell.cycle(None);
+            away += u32::from(cell.feedback().homing == 1);
+            assert!((cell.truth(0) - before).abs() < 20e-6, "{mode}: {} {before}", cell.truth(0));
+            if cell.state() == State::Idle {
+                break;
+            }
+        }
+        assert_eq!(
+            (cell.state(), cell.end(), cell.progress.homed & 3),
+            (State::Idle, MotionEnd::Reached, 3)
+        );
+        assert!((4..10).contains(&away), "{away}");
+        // Places are those of the machine from then on, and it moves as it is told.
+        let ratio = machine.actuators[0].ratio;
+        assert!((cell.feedback().position[0] * ratio - before).abs() < 20e-6, "{mode}");
+        cell.accept(Step, X, 0.02, 0.1);
+        cell.until(State::Idle, 5000);
+        assert!((cell.truth(0) - before - 0.02).abs() < 20e-6, "{mode}: {}", cell.truth(0));
+    }
+}
+
 /// The gantry with a switch at either end of its bridge, both at the same place of y.
 const SIDES: &str = r#"
 [inputs.left]

@@ -8,6 +8,7 @@ mod wiring;
 use messages::Nanoseconds;
 use messages::time::Period;
 
+use super::drive_homing;
 use crate::actuator::Actuator;
 use crate::document::{
     Diagnostics, Named, NonNegative, Number, ProblemKind, Quantity, Span, Spanned, nearest,
@@ -117,6 +118,9 @@ pub(super) fn build(
         if actuator.motor.dc().is_some() {
             actuator.age = age.of(latency, period);
         }
+    }
+    for (_, span) in table.declared() {
+        drive_homing::refuse(&kind, operating, span, diagnostics);
     }
     match (table, &mut kind) {
         (DrivesTable { hostmot2: Some(table), .. }, DrivesKind::Hostmot2(card)) => {

@@ -1,6 +1,7 @@
 //! The tables of inputs, outputs, homing and safety, and what they become.
 
 use super::axes::Joint;
+use super::drive_homing;
 use super::tables::AxisTable;
 use crate::actuator::Actuator;
 use crate::axis::Axis;
@@ -71,8 +72,8 @@ table! {
 table! {
     /// How an axis finds its reference. Without this table it knows its place from the start.
     pub struct HomingTable {
-        /// By the edge of its `switch`, by the first `index` pulse after that, by a `hard_stop`, or by its
-        /// `absolute` encoder.
+        /// By the edge of its `switch`, by the first `index` pulse after that, by a `hard_stop`, by its
+        /// `absolute` encoder, or by its `drive`, which looks for it by itself.
         pub method: Spanned<HomingMethod> = "switch",
         /// Towards which end it looks.
         pub direction: Spanned<Side> = "lower",
@@ -87,6 +88,10 @@ table! {
         pub order: Number<NonNegative> = 0.0,
         /// Motor current at which a `hard_stop` is found; when left out, half of the largest one.
         pub current: Option<Quantity<unit::Current, Positive>>,
+        /// The number of the method, by CiA 402, of a `drive` that looks for it by itself.
+        pub drive_method: Option<Number>,
+        /// Acceleration of that `drive`; when left out, it takes 0.1 s to the `speed`.
+        pub acceleration: Option<Quantity<unit::TravelAcceleration, Positive>>,
     }
 }
 
@@ -205,6 +210,7 @@ crate::keyword! {
     "index" => Self::Index,
     "hard_stop" => Self::HardStop,
     "absolute" => Self::Absolute,
+    "drive" => Self::Drive,
 }
 
 crate::keyword! { DoorAction, "what a door does", "hold" => Self::Hold, "stop" => Self::Stop }
@@ -539,8 +545,11 @@ impl Known<'_> {
                 diagnostics.contradict(current.span, message, "lower the `current`");
             }
         }
+        let own = axis.driven_by(self.actuators);
+        let drive = drive_homing::drive_homing(table, axis, own, (unit, search), diagnostics);
         fits.then_some(Homing {
             method,
+            drive: drive.unwrap_or_default(),
             side,
             speed: search,
             latch_speed,
@@ -580,7 +589,7 @@ impl Known<'_> {
         let (needs_switch, needs_index) = match homing.method {
             HomingMethod::Switch => (true, false),
             HomingMethod::Index => (true, true),
-            HomingMethod::HardStop | HomingMethod::Absolute => (false, false),
+            HomingMethod::HardStop | HomingMethod::Absolute | HomingMethod::Drive => (false, false),
         };
         let lacks = if needs_switch && !own.clone().all(switched) {
             "home"

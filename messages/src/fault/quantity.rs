@@ -65,6 +65,8 @@ pub enum FaultQuantity {
     DriveWord = 28,
     /// Cycles in a row without an answer from the hardware.
     LostCycles = 29,
+    /// The status word of a drive that has given up finding its reference.
+    HomingStatus = 30,
 }
 
 /// The unit of a quantity.
@@ -77,7 +79,7 @@ pub enum FaultUnit {
 }
 
 impl FaultQuantity {
-    const ALL: [Self; 30] = [
+    const ALL: [Self; 31] = [
         Self::None,
         Self::FollowingError,
         Self::Position,
@@ -108,6 +110,7 @@ impl FaultQuantity {
         Self::SearchDistance,
         Self::DriveWord,
         Self::LostCycles,
+        Self::HomingStatus,
     ];
 
     /// The quantity with this number in a sample; an unknown number reads as [`Self::None`].
@@ -149,6 +152,7 @@ impl FaultQuantity {
             Self::SearchDistance => ("way without finding the reference", Joint("")),
             Self::DriveWord => ("fault word of the drive", Plain("")),
             Self::LostCycles => ("cycles without an answer of the hardware", Plain("")),
+            Self::HomingStatus => ("status word of the drive", Plain("")),
         }
     }
 }

@@ -82,6 +82,7 @@ fn detail(fault: &Fault, joint: Option<JointUnit>, period: Period) -> String {
             "feedback came of another run of drives".to_owned()
         }
         (_, FaultQuantity::Mode) => unexpected_mode(fault.value),
+        (_, FaultQuantity::HomingStatus) => lost_homing(fault.value as u16),
         (_, FaultQuantity::Setpoint) => {
             format!("setpoint {} came where setpoint {} was due", fault.value, fault.limit)
         }
@@ -111,6 +112,21 @@ fn unexpected_mode(mode: f64) -> String {
          command had come for longer than `realtime.stall`, as on a loaded PC, or the controller is a new one. `graver \
          reset` and `graver enable` go on; if it comes again, `graver doctor` says what of this PC to change"
     )
+}
+
+/// Why a drive with this status word has not found its reference by itself.
+fn lost_homing(status: u16) -> String {
+    /// That it has failed, by CiA 402.
+    const FAILED: u16 = 1 << 13;
+    let (what, look) = if status & FAILED != 0 {
+        (
+            "the drive has not found its reference by its own method",
+            "at its switches and at `drive_method`",
+        )
+    } else {
+        ("the drive does not go into its homing mode", "at its set-up by the tool of its maker")
+    };
+    format!("{what} (status word {status:04X}h): look {look}")
 }
 
 /// What a fault means that has no value.
@@ -228,6 +244,23 @@ mod tests {
             told(CommandMode::QuickStop)
                 .starts_with("drives was told to brake the motors (command mode 5)")
         );
+    }
+
+    #[test]
+    fn a_drive_that_finds_no_reference_is_told_in_words() {
+        let told = |status: f64| {
+            let fault = Fault::new(FaultCode::HomingFailed).on_actuator(0);
+            FaultSummary::of(&fault.with(Quantity::HomingStatus, status), &machine())
+                .unwrap()
+                .detail
+        };
+        let failed = told(f64::from(0x2637));
+        assert_eq!(
+            failed,
+            "the drive has not found its reference by its own method (status word 2637h): look at its switches and at \
+             `drive_method`"
+        );
+        assert!(told(f64::from(0x0237)).starts_with("the drive does not go into its homing mode"));
     }
 
     #[test]

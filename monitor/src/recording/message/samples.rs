@@ -25,7 +25,7 @@ message! {
         12 overruns plain "cycles so far whose work did not end in time",
         13 status plain "1 powered, 2 tool known, 4 command missed, 8 watchdog tripped, 16 slipping, 32 gate inhibited",
         14 skipped plain "cycles left out since the feedback before",
-        15 reserved plain "always 0",
+        15 homing plain "actuators whose drives look for their references by themselves, one bit each",
         16 inputs plain "digital inputs, one bit each",
         17 counts plain "encoder counts by actuator",
         18 position plain "motor position by actuator [rad]",
@@ -61,6 +61,7 @@ message! {
         20 voltage plain "motor voltage in the next cycle by actuator [V]",
         21 laser message "the laser in the next cycle",
         22 fault message "the latched fault",
+        23 homing plain "actuators whose drives shall look for their references by themselves, one bit each",
     }
 }
 
