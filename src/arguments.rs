@@ -3,6 +3,7 @@
 mod bench;
 mod doctor;
 mod examples;
+mod fleet;
 mod offset;
 mod operating;
 mod options;
@@ -21,6 +22,10 @@ pub use self::workbench::{
 };
 pub use bench::{BenchArguments, BenchCommand, LatencyArguments, PlanBenchArguments};
 pub use doctor::DoctorArguments;
+pub use fleet::{
+    FleetCommand, FleetServer, FleetStatusArguments, FleetSubmitArguments, MonitorArguments,
+    PublishArguments,
+};
 pub use offset::{OffsetArguments, OffsetClearArguments, OffsetCommand, OffsetPlace};
 pub use operating::{
     HomeArguments, InputArguments, InputLevel, JogArguments, OutputArguments, ProbeArguments,
@@ -160,6 +165,9 @@ pub enum Command {
     /// Let people and programs in beside the command line: live page, HTTP, metrics, and grbl 1.1.
     #[command(after_help = SERVE_EXAMPLES)]
     Serve(ServeArguments),
+    /// Many machines on one NATS server: jobs for a group of them, and how all of them are.
+    #[command(subcommand, after_help = examples::FLEET_EXAMPLES)]
+    Fleet(FleetCommand),
     /// The planner service: reads, plans and checks a job, and streams its setpoints.
     Planner(ServiceArguments),
     /// The controller service: plays the setpoints and closes the loops.
@@ -167,7 +175,7 @@ pub enum Command {
     /// The drives service: the clock, the port to the motors, and the watchdog.
     Drives(ServiceArguments),
     /// The monitor service: records and measures; nobody waits for it.
-    Monitor(ServiceArguments),
+    Monitor(MonitorArguments),
     /// Hold a summary to what must be true of every one; for scripts.
     #[command(hide = true)]
     VerifySummary {

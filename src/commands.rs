@@ -8,6 +8,8 @@ pub mod doctor;
 pub mod export;
 pub mod faults;
 pub mod figures;
+#[cfg_attr(not(feature = "fleet"), path = "commands/fleet/no_fleet.rs")]
+pub mod fleet;
 pub mod kinematics;
 pub mod machine;
 pub mod manual;

@@ -23,6 +23,10 @@ use graver::commands::plan::PlanReport;
 use graver::commands::plan::preview::PreviewReport;
 use graver::commands::replay::ReplayReport;
 use monitor::summary::Summary;
+use operator::fleet::{
+    FleetStatus, FleetSubmitted, JobRecord, JobRefusal, JobTicket, MachineFaults, MachineJob,
+    MachineMetrics, MachineState,
+};
 use operator::{Queue, Status, Submitted, VerbReply};
 use schemars::{Schema, schema_for};
 use support::{Place, assert_valid, lines};
@@ -40,6 +44,15 @@ fn schemas() -> Vec<(&'static str, Schema)> {
         ("doctor", schema_for!(DoctorReport)),
         ("faults", schema_for!(FaultsReport)),
         ("figures", schema_for!(FiguresReport)),
+        ("fleet_faults", schema_for!(MachineFaults)),
+        ("fleet_job", schema_for!(MachineJob)),
+        ("fleet_metrics", schema_for!(MachineMetrics)),
+        ("fleet_record", schema_for!(JobRecord)),
+        ("fleet_refusal", schema_for!(JobRefusal)),
+        ("fleet_state", schema_for!(MachineState)),
+        ("fleet_status", schema_for!(FleetStatus)),
+        ("fleet_submitted", schema_for!(FleetSubmitted)),
+        ("fleet_ticket", schema_for!(JobTicket)),
         ("kinematics", schema_for!(Reply)),
         ("latency", schema_for!(LatencyReport)),
         ("latency_rates", schema_for!(RatesReport)),

@@ -10,7 +10,7 @@ mod recorder;
 mod recording;
 mod store;
 
-use crate::hub::{Hub, Sink as _};
+use crate::hub::{Hub, Sink};
 use crate::recording::file::Description;
 use crate::recording::level::Level;
 use machine::Machine;
@@ -47,7 +47,8 @@ pub fn spare(instance: &Instance) -> PathBuf {
     instance.root().join(SPARE)
 }
 
-/// Runs until it is told to end (SIGTERM) or the supervisor dies.
+/// Runs until it is told to end (SIGTERM) or the supervisor dies. What the hub receives goes to the recorder, and after it to those
+/// `beside`, who may neither wait nor fail: the recording would wait or end with them.
 ///
 /// # Errors
 /// When a channel fails, or when a recording fails and not even that can be written down.
@@ -55,19 +56,21 @@ pub fn run(
     domain: &Domain,
     machine: &Machine,
     options: &RecordingOptions,
+    beside: &mut [&mut dyn Sink],
 ) -> Result<(), ServiceError> {
     let mut service = Service::open(domain, machine, options)?;
     while signal::termination().is_none() && service.has_supervisor() {
-        service.poll()?;
+        service.poll(beside)?;
         heartbeat::beat();
         std::thread::sleep(POLL_INTERVAL);
     }
     // A summary takes its time.
     let _busy = heartbeat::busy();
-    let polled = service.poll();
+    let polled = service.poll(beside);
     let ended =
         if service.has_supervisor() { service.end() } else { service.conclude_alone(machine) };
-    polled.and(ended)
+    let left = beside.iter_mut().try_for_each(|sink| sink.end());
+    polled.and(ended).and(left)
 }
 
 struct Service {
@@ -106,8 +109,10 @@ impl Service {
         self.peers.state(Role::Domain) != PeerState::Dead
     }
 
-    fn poll(&mut self) -> Result<(), ServiceError> {
-        self.hub.poll(&mut [&mut self.recorder])?;
+    fn poll(&mut self, beside: &mut [&mut dyn Sink]) -> Result<(), ServiceError> {
+        let mut sinks: Vec<&mut dyn Sink> = vec![&mut self.recorder];
+        sinks.extend(beside.iter_mut().map(|sink| &mut **sink as &mut dyn Sink));
+        self.hub.poll(&mut sinks)?;
         let more_comes = self.more_comes();
         self.recorder.end_when_over(more_comes)
     }

@@ -13,6 +13,7 @@ pub mod gcode;
 pub mod letters;
 pub mod letters_table;
 pub mod marking_table;
+pub mod one_file;
 pub mod path_table;
 pub mod points;
 pub mod points_table;

@@ -121,10 +121,24 @@ impl Previewer {
     /// What the job at `path` with these changes would come to on the machine that is described.
     pub fn check(&self, path: &Path, set: &[String], machine: &Description) -> Arc<CheckAnswer> {
         known(&self.checks, (path.to_owned(), set.to_vec(), machine.arguments.clone()), |key| {
-            self.run(key, &["--json".into()]).map_or_else(CheckAnswer::refused, |(told, said)| {
-                CheckAnswer::planned(&told, &said)
-            })
+            self.run(key, &["--json".into()], &|| false)
+                .map_or_else(CheckAnswer::refused, |(told, said)| {
+                    CheckAnswer::planned(&told, &said)
+                })
         })
+    }
+
+    /// As [`Self::check`], until `is_given_up` says that nobody waits for it any more; kept is nothing.
+    pub fn check_unless(
+        &self,
+        path: &Path,
+        set: &[String],
+        machine: &Description,
+        is_given_up: &dyn Fn() -> bool,
+    ) -> CheckAnswer {
+        let key = (path.to_owned(), set.to_vec(), machine.arguments.clone());
+        let planned = self.run(&key, &["--json".into()], is_given_up);
+        planned.map_or_else(CheckAnswer::refused, |(told, said)| CheckAnswer::planned(&told, &said))
     }
 
     /// What the job at `path` with these changes would mark.
@@ -134,7 +148,7 @@ impl Previewer {
             let file = folder.path().join("preview.json");
             let arguments =
                 ["--json".into(), "--preview-only".into(), "--preview".into(), file.clone().into()];
-            self.run(key, &arguments)?;
+            self.run(key, &arguments, &|| false)?;
             let drawn = std::fs::read(&file).map_err(|error| failed(error.to_string()))?;
             serde_json::from_slice(&drawn).map_err(|error| failed(error.to_string()))
         })
@@ -145,6 +159,7 @@ impl Previewer {
         &self,
         (path, set, machine): &Key,
         arguments: &[OsString],
+        is_given_up: &dyn Fn() -> bool,
     ) -> Result<(Value, String), JobError> {
         let mut command = Command::new(&self.program);
         command.arg("plan").args(arguments).args(machine);
@@ -152,7 +167,7 @@ impl Previewer {
             command.arg(format!("--set={change}"));
         });
         command.arg("--").arg(path);
-        let ended = bounded::run(command, &BOUNDS, &|| false)
+        let ended = bounded::run(command, &BOUNDS, is_given_up)
             .map_err(|error| failed(format!("the job could not be planned: {error}")))?;
         let said = String::from_utf8_lossy(&ended.error).into_owned();
         let told: Value = serde_json::from_slice(&ended.output).unwrap_or_default();

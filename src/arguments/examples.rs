@@ -173,3 +173,9 @@ Examples:
 The services are graver drives, controller, planner and monitor with the same --instance;
 machine and drives are the domain's. deploy/ has systemd units. SIGTERM or Ctrl-C ends it with
 the machine at rest; a terminal that is closed does not.";
+
+pub(super) const FLEET_EXAMPLES: &str = "\
+Examples:
+  graver domain --services --publish tls://hall:4222 --publish-credentials cell1.creds --jobs-of lasers
+  graver fleet status tls://hall:4222 --credentials me.creds
+  graver fleet submit tls://hall:4222 plate.svg --group lasers --set marking.power=\"30 %\"";

@@ -1,6 +1,6 @@
 //! Arguments of what runs a job: as processes, in one process, and by services.
 
-use super::{AccessArguments, InstanceArguments, JobOptions, MachineArguments};
+use super::{AccessArguments, InstanceArguments, JobOptions, MachineArguments, PublishArguments};
 use clap::{Args, ValueEnum};
 use monitor::recording::level::Level;
 use std::path::PathBuf;
@@ -214,6 +214,9 @@ pub struct DomainArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub quota: QuotaArguments,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub publish: PublishArguments,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub instance: InstanceArguments,

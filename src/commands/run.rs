@@ -1,6 +1,7 @@
 //! `graver run` and `graver domain`: a pipeline with a job, or one that waits for jobs.
 
 use crate::arguments::{DomainArguments, RunArguments};
+use crate::commands::fleet;
 use crate::exit::{Exit, Failure};
 use crate::files::{Claim, Sources};
 use crate::inputs::MachineSource;
@@ -78,7 +79,9 @@ pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
         file.offsets()?;
     }
     let extent = Extent { level: arguments.record.level(), quota: arguments.quota.record_quota };
+    fleet::check(&arguments.publish, &instance)?;
     let configuration = Configuration::new(source.clone(), &arguments.drives, extent)?;
+    let configuration = configuration.publishing(&arguments.publish)?;
     signal::outlive_terminal().map_err(Failure::service)?;
     signal::install().map_err(Failure::service)?;
     let owner = if arguments.services { ServiceOwner::Own } else { ServiceOwner::Others };

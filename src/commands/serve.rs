@@ -4,7 +4,7 @@
 
 mod machine;
 #[cfg_attr(not(feature = "serve"), path = "serve/no_page.rs")]
-mod page;
+pub(crate) mod page;
 
 use self::machine::Operated;
 use self::page::Page;

@@ -1,20 +1,38 @@
 //! The four services as commands: each joins the domain of its instance, builds itself from the
 //! domain's configuration, and runs until it is told to end.
 
-use crate::arguments::ServiceArguments;
+use crate::arguments::{MonitorArguments, PublishArguments, ServiceArguments};
+use crate::commands::fleet::Station;
 use crate::exit::{Exit, Failure};
 use crate::notify;
 use crate::pipeline::configuration::Configuration;
 use machine::Machine;
 use runtime::domain::Role;
 use runtime::thread::{CONTROLLER_PRIORITY, DRIVES_PRIORITY};
-use runtime::{Domain, Instance, signal};
+use runtime::{Domain, Instance, message, signal};
 
 /// Runs the service with this role.
 ///
 /// # Errors
 /// A domain that is not there, or a channel that fails.
 pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
+    serve(role, arguments, &PublishArguments::default())
+}
+
+/// Runs the monitor, which says what the machine is doing to a fleet where it or the domain's holder was told of one.
+///
+/// # Errors
+/// As [`run`].
+pub fn monitor(arguments: &MonitorArguments) -> Result<Exit, Failure> {
+    let service = ServiceArguments { instance: arguments.instance.clone() };
+    serve(Role::Monitor, &service, &arguments.publish)
+}
+
+fn serve(
+    role: Role,
+    arguments: &ServiceArguments,
+    publish: &PublishArguments,
+) -> Result<Exit, Failure> {
     signal::install().map_err(Failure::service)?;
     let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
     let domain = Domain::join(&instance, role).map_err(Failure::service)?;
@@ -27,7 +45,18 @@ pub fn run(role: Role, arguments: &ServiceArguments) -> Result<Exit, Failure> {
     match role {
         Role::Planner => planner::service::run(&domain, &configuration.machine()?),
         Role::Monitor => {
-            monitor::service::run(&domain, &configuration.machine()?, &configuration.recording())
+            let mut station = if publish.publish.is_some() {
+                Station::start(publish, &instance)?
+            } else {
+                // The domain's holder has found it good; what has come since must not cost the recording.
+                Station::start(&configuration.publish, &instance).unwrap_or_else(|failure| {
+                    message::tell(&format!("fleet: {}", failure.refusal.text.trim()));
+                    Station::default()
+                })
+            };
+            let recording = configuration.recording();
+            let machine = configuration.machine()?;
+            monitor::service::run(&domain, &machine, &recording, &mut station.sinks())
         }
         Role::Controller => {
             let realtime = configuration.realtime_options(CONTROLLER_PRIORITY);

@@ -1,7 +1,7 @@
 //! What the domain's holder tells the services: one file in the domain's root, so that all of
 //! them are built from the same machine.
 
-use crate::arguments::{DrivesArguments, DrivesKind};
+use crate::arguments::{DrivesArguments, DrivesKind, PublishArguments};
 use crate::exit::Failure;
 use crate::inputs::MachineSource;
 use drives::Deadlines;
@@ -33,6 +33,8 @@ pub struct Configuration {
     pub realtime: bool,
     /// What stays of a recording.
     pub record: Extent,
+    /// The fleet that the monitor speaks with.
+    pub publish: PublishArguments,
 }
 
 /// What is driven.
@@ -72,7 +74,22 @@ impl Configuration {
             core: drives.core,
             realtime: !drives.no_realtime,
             record,
+            publish: PublishArguments::default(),
         })
+    }
+
+    /// The same, for a machine of a fleet.
+    ///
+    /// # Errors
+    /// A path without a folder to start from.
+    pub fn publishing(mut self, publish: &PublishArguments) -> Result<Self, Failure> {
+        let whole = |path: &Option<PathBuf>| path.as_deref().map(std::path::absolute).transpose();
+        self.publish = PublishArguments {
+            publish_credentials: whole(&publish.publish_credentials).map_err(Failure::bad_input)?,
+            publish_ca: whole(&publish.publish_ca).map_err(Failure::bad_input)?,
+            ..publish.clone()
+        };
+        Ok(self)
     }
 
     /// Writes it into the domain's root.

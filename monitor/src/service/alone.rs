@@ -51,7 +51,7 @@ impl Service {
     fn await_rest(&mut self, stream: u64) -> Result<(), ServiceError> {
         let lost = Instant::now();
         while !self.rests(stream) && lost.elapsed() < REST_PATIENCE {
-            self.poll()?;
+            self.poll(&mut [])?;
             std::thread::sleep(POLL_INTERVAL);
         }
         Ok(())

@@ -104,9 +104,9 @@ impl Bench {
         let mut service = self.service();
         self.offer();
         self.play(5, 0);
-        service.poll().unwrap();
+        service.poll(&mut []).unwrap();
         self.play(40, STREAM);
-        service.poll().unwrap();
+        service.poll(&mut []).unwrap();
         service
     }
 
@@ -127,10 +127,10 @@ fn a_monitor_started_in_the_middle_of_a_job_goes_on_with_its_recording() {
     let mut second = bench.service();
     bench.offers.greet().unwrap();
     bench.play(10, STREAM);
-    second.poll().unwrap();
+    second.poll(&mut []).unwrap();
     assert_eq!(bench.state(), RecordingState::Open);
     bench.end(1, Fault::default());
-    second.poll().unwrap();
+    second.poll(&mut []).unwrap();
     let RecordingState::Complete(info) = bench.state() else { panic!("{:?}", bench.state()) };
     let cycles = bench.cycles();
     assert_eq!((info.records, info.gap_count), (cycles.len() as u64, 1));
@@ -148,11 +148,11 @@ fn a_monitor_started_soon_after_its_predecessor_lacks_no_cycle() {
     let mut second = bench.service();
     // It hears of the cycles before it hears of the job.
     bench.play(10, STREAM);
-    second.poll().unwrap();
+    second.poll(&mut []).unwrap();
     bench.offers.greet().unwrap();
-    second.poll().unwrap();
+    second.poll(&mut []).unwrap();
     bench.end(1, Fault::default());
-    second.poll().unwrap();
+    second.poll(&mut []).unwrap();
     let RecordingState::Complete(info) = bench.state() else { panic!("{:?}", bench.state()) };
     assert_eq!((info.records, info.gap_count, info.lost), (bench.cycle - 100, 0, 0));
     assert_eq!(bench.cycles(), (100..bench.cycle).collect::<Vec<_>>());
@@ -171,12 +171,12 @@ fn a_monitor_started_after_the_job_completes_the_recording_that_was_left_open() 
             bench.reports.greet().unwrap();
         }
         bench.play(3, 0);
-        second.poll().unwrap();
+        second.poll(&mut []).unwrap();
         if !heard {
             // The controller says it again every second.
             assert_eq!(bench.state(), RecordingState::Open);
             bench.reports.greet().unwrap();
-            second.poll().unwrap();
+            second.poll(&mut []).unwrap();
         }
         assert!(matches!(bench.state(), RecordingState::Complete(_)), "{:?}", bench.state());
     }
@@ -201,7 +201,7 @@ fn an_old_job_is_not_recorded_again() {
         bench.offers.greet().unwrap();
         bench.reports.greet().unwrap();
         bench.play(5, 0);
-        service.poll().unwrap();
+        service.poll(&mut []).unwrap();
         assert!(service.recorder.recording.is_none(), "{case}");
         assert_eq!(fs::read_dir(bench.folder.path()).unwrap().count(), before, "{case}");
     }
@@ -215,22 +215,22 @@ fn a_job_whose_folder_is_gone_costs_no_more_than_its_recording() {
     let offer = JobOffer::new(STREAM - 1, gone.to_str().unwrap()).unwrap();
     bench.offers.publish(&offer).unwrap();
     bench.play(5, STREAM - 1);
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     assert!(service.recorder.recording.is_none() && !gone.exists());
     // Gone while it is recorded.
     fs::create_dir(&gone).unwrap();
     let offer = JobOffer::new(STREAM - 2, gone.to_str().unwrap()).unwrap();
     bench.offers.publish(&offer).unwrap();
     bench.play(5, STREAM - 2);
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     assert!(service.recorder.recording.is_some());
     fs::remove_dir_all(&gone).unwrap();
     bench.offer();
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     assert!(!gone.exists());
     bench.play(5, STREAM);
     bench.end(1, Fault::default());
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     assert!(matches!(bench.state(), RecordingState::Complete(_)));
 }
 
@@ -239,10 +239,10 @@ fn a_withdrawn_job_that_was_never_played_is_complete_at_once() {
     let mut bench = Bench::new();
     let mut service = bench.service();
     bench.offer();
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     assert_eq!(bench.state(), RecordingState::Open);
     bench.withdraw();
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     assert!(matches!(bench.state(), RecordingState::Complete(_)));
 }
 
@@ -253,9 +253,9 @@ fn silence_ends_a_recording_that_waits_for_its_last_cycles() {
     let report = ControllerReport { stream: STREAM, is_final: 1, ..ControllerReport::default() };
     let last_cycle = Cycle(bench.cycle + 50);
     bench.reports.publish(&ControllerReport { last_cycle, ..report }).unwrap();
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     service.hub.silence_for(SILENCE);
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     assert!(matches!(bench.state(), RecordingState::Complete(_)));
 }
 
@@ -276,7 +276,7 @@ fn a_supervisor_that_dies_leaves_no_job_without_a_summary() {
     let mut bench = Bench::new();
     let mut service = bench.playing();
     bench.end(1, Fault::default());
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     assert!(service.recorder.recording.is_none());
     let summary = bench.concluded(&mut service);
     assert_eq!((summary.outcome, summary.error), (Outcome::Completed, None));
@@ -294,7 +294,7 @@ fn a_supervisor_that_dies_leaves_no_job_without_a_summary() {
     let mut service = bench.service();
     bench.offer();
     bench.play(5, 0);
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     let summary = bench.concluded(&mut service);
     assert_eq!((summary.outcome, summary.marks), (Outcome::Aborted, None));
 
@@ -302,7 +302,7 @@ fn a_supervisor_that_dies_leaves_no_job_without_a_summary() {
     let mut bench = Bench::new();
     let mut service = bench.service();
     bench.offer();
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     let refusal = r#"{"file": "job.ngc", "line": 4, "column": 2, "message": "no", "text": "no"}"#;
     bench.folder().write(run_folder::REFUSAL, refusal).unwrap();
     let summary = bench.concluded(&mut service);
@@ -325,7 +325,7 @@ fn a_summary_that_the_supervisor_wrote_is_left_alone() {
     let mut bench = Bench::new();
     let mut service = bench.playing();
     bench.end(1, Fault::default());
-    service.poll().unwrap();
+    service.poll(&mut []).unwrap();
     bench.folder().write(run_folder::SUMMARY, "the supervisor's").unwrap();
     service.conclude_alone(&Machine::builtin()).unwrap();
     let text = fs::read_to_string(bench.folder().file(run_folder::SUMMARY)).unwrap();

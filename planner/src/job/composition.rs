@@ -22,6 +22,7 @@ use nalgebra::Vector3;
 pub(super) use compose::{Composed, Part, Parts, compose};
 pub(super) use recipe::Defaults;
 use rows::Rows;
+pub(super) use source::is_font_file;
 
 use crate::drawing::{Action, Curve, Power, Step};
 

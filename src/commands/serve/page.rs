@@ -71,7 +71,11 @@ impl Page {
     }
 }
 
-fn program() -> Result<PathBuf, Failure> {
+/// This program.
+///
+/// # Errors
+/// One that nobody finds any more.
+pub(crate) fn program() -> Result<PathBuf, Failure> {
     let path = Path::new(THIS_PROGRAM);
     if path.exists() {
         Ok(path.to_owned())
@@ -81,7 +85,10 @@ fn program() -> Result<PathBuf, Failure> {
 }
 
 /// The machine of the pipeline of this instance, as its holder wrote it down.
-fn describe(instance: &Instance) -> Result<Description, String> {
+///
+/// # Errors
+/// No pipeline, in words.
+pub(crate) fn describe(instance: &Instance) -> Result<Description, String> {
     let told = || -> Result<Description, Failure> {
         let configuration = Configuration::read(instance)?;
         let arguments = configuration.source.arguments()?;

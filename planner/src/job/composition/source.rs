@@ -188,7 +188,7 @@ impl<'a> Source<'a> {
 }
 
 /// Whether a font is given by its file and not by its name.
-fn is_font_file(written: &str) -> bool {
+pub(in crate::job) fn is_font_file(written: &str) -> bool {
     let extension = Path::new(written).extension().and_then(|extension| extension.to_str());
     let known = ["ttf", "otf", "ttc", "otc"];
     written.contains('/')
