@@ -154,3 +154,49 @@ fn what_drives_on_a_network_may_is_in_drop_ins_of_their_own() {
         assert_eq!(value(bus, key), "CAP_NET_RAW");
     }
 }
+
+#[test]
+fn a_monitor_that_speaks_with_a_fleet_reaches_one_address_and_keeps_its_jobs_where_it_may_write() {
+    let fleet = &sections("network/fleet.conf")["Service"];
+    assert_eq!((value(fleet, "PrivateNetwork"), value(fleet, "IPAddressDeny")), ("no", "any"));
+    assert_eq!(value(fleet, "IPAddressAllow"), "10.10.0.1");
+    let commands = &fleet["ExecStart"];
+    // The first clears what the unit says.
+    assert_eq!((commands.len(), commands[0].as_str()), (2, ""));
+    let begins = "graver monitor --instance %i --publish tls://10.10.0.1:4222 ";
+    assert!(commands[1].starts_with(begins), "{}", commands[1]);
+    let domain = service("domain");
+    assert_eq!(value(fleet, "Environment"), value(&domain, "Environment"));
+}
+
+/// What the Debian package is made of is in the tree, but for what is made of the program.
+#[test]
+fn the_package_has_every_unit_and_nothing_that_is_not_there() {
+    let manifest = std::fs::read_to_string(support::source("Cargo.toml")).unwrap();
+    let assets = manifest.split_once("\nassets = [\n").unwrap().1.split_once("\n]").unwrap().0;
+    let assets: Vec<&str> = assets.lines().map(|line| line.split('"').nth(1).unwrap()).collect();
+    assert!(assets.contains(&"deploy/*.service") && assets.contains(&"deploy/*.target"));
+    for asset in assets.iter().filter(|asset| !asset.starts_with("target/")) {
+        let (folder, name) = asset.rsplit_once('/').unwrap_or((".", asset));
+        let (begin, end) = name.split_once('*').unwrap_or((name, ""));
+        let entries = std::fs::read_dir(support::source(folder)).unwrap().flatten();
+        let names = entries.filter(|entry| entry.path().is_file());
+        let mut names = names.map(|entry| entry.file_name().into_string().unwrap());
+        let is_meant = |found: &String| {
+            if name.contains('*') {
+                found.starts_with(begin) && found.ends_with(end)
+            } else {
+                found == name
+            }
+        };
+        assert!(names.any(|found| is_meant(&found)), "{asset}");
+    }
+    for script in ["postinst", "prerm", "postrm"] {
+        let text = std::fs::read_to_string(support::source("deploy/debian").join(script)).unwrap();
+        assert!(text.starts_with("#!/bin/sh\n") && text.contains("\nset -e\n"), "{script}");
+        // A machine that runs is stopped by people; what moves is not started by an installation.
+        for verb in ["start", "restart", "enable", "try-restart"] {
+            assert!(!text.contains(&format!("systemctl {verb}")), "{script}: {verb}");
+        }
+    }
+}
