@@ -1,5 +1,6 @@
 //! A child process that is given so much time and memory, for work on what strangers send.
 
+use crate::descriptors;
 use std::io::{self, Read};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -121,16 +122,10 @@ impl Drop for Ended {
 /// In the child, before it becomes another program.
 fn confine(memory: u64) -> io::Result<()> {
     let limit = |bytes: u64| libc::rlimit { rlim_cur: bytes, rlim_max: bytes };
-    // SAFETY: system calls on numbers and on limits that live as long as the call. Closing on exec what iceoryx2 0.10
-    // leaves open, see `membership`; a kernel before 5.11 refuses, and then it leaks as it would without.
+    descriptors::close_on_exec();
+    // SAFETY: system calls on numbers and on limits that live as long as the call.
     #[allow(unsafe_code)]
     unsafe {
-        libc::syscall(
-            libc::SYS_close_range,
-            libc::STDERR_FILENO + 1,
-            libc::c_uint::MAX,
-            libc::CLOSE_RANGE_CLOEXEC,
-        );
         libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL);
         libc::setpriority(libc::PRIO_PROCESS, 0, NICENESS);
         if libc::setrlimit(libc::RLIMIT_CORE, &limit(0)) != 0

@@ -12,11 +12,13 @@
 #![deny(rustdoc::broken_intra_doc_links)]
 
 pub mod allocation;
+pub mod beneath;
 pub mod bounded;
 pub mod channel;
 pub mod child;
 pub mod clock;
 pub mod core_lock;
+mod descriptors;
 pub mod domain;
 #[cfg(feature = "embassy")]
 mod embassy_clock;

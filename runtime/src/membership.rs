@@ -22,6 +22,7 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use crate::descriptors;
 use crate::domain::{DomainError, Role};
 use crate::instance::{Instance, Nonce, Place, create_private, inspect};
 use crate::lock::{Hold, is_locked, try_lock};
@@ -217,24 +218,12 @@ pub(crate) fn member_pid(instance: &Instance, role: Role) -> Option<i32> {
     text.trim().parse().ok()
 }
 
-/// Gives `command`'s process a hold on the domain from its first instruction on, and nothing else:
-/// the descriptors that iceoryx2 0.10 opens would survive the exec, and with them the sockets and
-/// the memory of a dead holder.
+/// Gives `command`'s process a hold on the domain from its first instruction on, and nothing else.
 pub(crate) fn inherit_lock(instance: &Instance, command: &mut Command) -> Result<(), DomainError> {
     let lock = open_existing_lock(instance)?
         .ok_or_else(|| DomainError::Absent { instance: instance.name().into() })?;
     let inherit = move || {
-        // SAFETY: a system call on numbers; it only marks descriptors to be closed by the exec. A
-        // kernel before 5.11 refuses, and then they leak as they would without.
-        #[allow(unsafe_code)]
-        unsafe {
-            libc::syscall(
-                libc::SYS_close_range,
-                libc::STDERR_FILENO + 1,
-                libc::c_uint::MAX,
-                libc::CLOSE_RANGE_CLOEXEC,
-            )
-        };
+        descriptors::close_on_exec();
         // SAFETY: fcntl is async-signal-safe, and `lock` is open as long as this closure lives.
         #[allow(unsafe_code)]
         match unsafe { libc::fcntl(lock.as_raw_fd(), libc::F_SETFD, 0) } {
