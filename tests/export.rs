@@ -111,3 +111,19 @@ fn what_is_no_recording_is_refused_and_left_alone() {
     assert!(ended.error.contains("the recording itself"), "{}", ended.error);
     assert_eq!(std::fs::read(&samples).unwrap(), before);
 }
+
+#[test]
+fn a_simulation_that_was_exported_can_be_played_again() {
+    let place = Place::new();
+    let folder = simulated(&place);
+    let exported = place.path("exported.mcap");
+    let arguments = ["export", folder.to_str().unwrap(), "--format", "mcap", "--out"];
+    place.graver(&[&arguments[..], &[exported.to_str().unwrap()]].concat()).accepted();
+    let played =
+        |recording: &Path| place.graver(&["replay", recording.to_str().unwrap(), "--json"]).json(0);
+    let (one, other) = (played(&folder), played(&exported));
+    assert_eq!((&other["equal"], &one["cycles"]), (&true.into(), &other["cycles"]));
+    // Nothing of it is another.
+    let (before, after) = (folder.join("samples.mcap"), &exported);
+    assert_eq!(std::fs::read(before).unwrap(), std::fs::read(after).unwrap());
+}

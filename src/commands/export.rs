@@ -6,9 +6,11 @@ use crate::files::Sources;
 use messages::{MAX_ACTUATORS, run_folder};
 use monitor::recording::CycleRecord;
 use monitor::recording::file::parts::{self, PartsReader};
+use monitor::recording::file::reader::{Entry, EntryReader};
 use monitor::recording::file::writer::RecordingWriter;
 use monitor::recording::file::{Description, RecordingError};
 use monitor::recording::level::Level;
+use monitor::recording::message::Origin;
 use monitor::recording::old_file::OldReader;
 use monitor::recording::table::TableWriter;
 use monitor::summary::Summary;
@@ -43,7 +45,13 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, Failure> {
             let written = |error| Failure::output(format!("{}: {error}", path.display()));
             let mut writer = RecordingWriter::create(path, &recording.description, Level::Full)
                 .map_err(written)?;
-            copy(recording, |record| writer.write(&[*record]).map_err(written))?;
+            if recording.description.simulated {
+                copy_simulation(&recording.path, |entry| {
+                    rewrite(&mut writer, entry).map_err(written)
+                })?;
+            } else {
+                copy(recording, |record| writer.write(&[*record]).map_err(written))?;
+            }
             writer.finish().map_err(written)?;
             Ok(Exit::Done)
         }
@@ -119,6 +127,42 @@ fn table(
     }
 }
 
+/// Writes what stands in the recording of a simulation, so that it can be played again. What happens in it the writer
+/// finds anew.
+fn rewrite(writer: &mut RecordingWriter, entry: Entry) -> io::Result<()> {
+    let origin = |deadline| Origin { deadline, ..Origin::default() };
+    match entry {
+        Entry::Cycle(record) => writer.write(&[*record]),
+        Entry::Setpoint(deadline, setpoint) => {
+            writer.write_inputs(&origin(deadline), &[*setpoint], None)
+        }
+        Entry::Request(deadline, request) => {
+            writer.write_inputs(&origin(deadline), &[], Some(&request))
+        }
+        Entry::Event(_) => Ok(()),
+    }
+}
+
+/// Hands on what the controller got too: a simulation has one file.
+fn copy_simulation(
+    path: &Path,
+    mut write: impl FnMut(Entry) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    for entry in EntryReader::open(path).map_err(|error| at(path, error))? {
+        match entry {
+            Ok(entry) => write(entry)?,
+            Err(error @ RecordingError::Truncated { .. }) => warn(path, &error),
+            Err(error) => return Err(at(path, error)),
+        }
+    }
+    Ok(())
+}
+
+/// All records before the torn one are whole.
+fn warn(path: &Path, error: &RecordingError) {
+    message::tell(&format!("warning: {}: {error}", path.display()));
+}
+
 /// Hands on record by record.
 fn copy(
     recording: Recording,
@@ -128,10 +172,7 @@ fn copy(
     for record in records {
         match record {
             Ok(record) => write(&record)?,
-            // All records before the torn one are whole.
-            Err(error @ RecordingError::Truncated { .. }) => {
-                message::tell(&format!("warning: {}: {error}", path.display()));
-            }
+            Err(error @ RecordingError::Truncated { .. }) => warn(&path, &error),
             Err(error) => return Err(at(&path, error)),
         }
     }
