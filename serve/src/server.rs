@@ -25,10 +25,21 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-/// Connections at a time, and of them from one address that is not this computer's.
+/// Connections at a time.
 const MOST: usize = 256;
+
+/// Of them, those of other users of this computer, and those from other computers: the rest is kept for the machine's
+/// own user, whom nobody may keep out.
+const MOST_OF_OTHERS: usize = 96;
+const MOST_FROM_ELSEWHERE: usize = 96;
+
+/// From one other computer.
 const MOST_OF_ONE: usize = 64;
+
+/// Connections of which it is being found out whose they are.
+const NAMELESS: usize = 32;
 
 /// How long the head of a request may take to come.
 const HEAD_PATIENCE: Duration = Duration::from_secs(10);
@@ -223,16 +234,19 @@ impl Drop for Threads {
 
 async fn accept(listener: &TcpListener, app: &Router, is_over: impl Fn() -> bool) {
     let places = Arc::new(Places::default());
+    let nameless = Arc::new(Semaphore::new(NAMELESS));
     let mut look = tokio::time::interval(LOOK_PERIOD);
     while !is_over() {
+        let accepted = async {
+            // Those that come meanwhile wait in the kernel, in their order.
+            let turn = nameless.clone().acquire_owned().await.map_err(io::Error::other)?;
+            listener.accept().await.map(|accepted| (accepted, turn))
+        };
         tokio::select! {
             _ = look.tick() => {}
-            accepted = listener.accept() => match accepted {
-                Ok((stream, peer)) => {
-                    // Without a place it is closed: whoever comes too often waits.
-                    if let Some(place) = Place::take(&places, peer.ip()) {
-                        tokio::spawn(serve(stream, peer, app.clone(), place));
-                    }
+            accepted = accepted => match accepted {
+                Ok(((stream, peer), turn)) => {
+                    tokio::spawn(serve(stream, peer, app.clone(), places.clone(), turn));
                 }
                 // Out of descriptors, for example: others will be closed.
                 Err(_) => tokio::time::sleep(LOOK_PERIOD).await,
@@ -241,12 +255,21 @@ async fn accept(listener: &TcpListener, app: &Router, is_over: impl Fn() -> bool
     }
 }
 
-/// Answers what comes over one connection.
-async fn serve(stream: TcpStream, peer: SocketAddr, app: Router, _place: Place) {
+/// Answers what comes over one connection, for which it was its `turn` to be told whose it is.
+async fn serve(
+    stream: TcpStream,
+    peer: SocketAddr,
+    app: Router,
+    places: Arc<Places>,
+    turn: OwnedSemaphorePermit,
+) {
     let Ok(local) = stream.local_addr() else { return };
     // Reading the kernel's tables may take a while where many sockets are open.
     let user = tokio::task::spawn_blocking(move || PeerUser::between(local, peer)).await;
     let user = user.ok().and_then(Result::ok).unwrap_or(PeerUser::Unknown);
+    drop(turn);
+    // Without a place it is closed: whoever comes too often waits.
+    let Some(_place) = Place::take(&places, Owner::of(user, peer.ip())) else { return };
     // What is small must not wait for more.
     let _ = stream.set_nodelay(true);
     let app = app.layer(Extension(Peer { address: peer.ip(), user }));
@@ -260,37 +283,66 @@ async fn serve(stream: TcpStream, peer: SocketAddr, app: Router, _place: Place) 
     let _ = served.await;
 }
 
-/// Connections by address.
+/// Whose a connection is, as far as places go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Owner {
+    /// The user of the machine.
+    Own,
+    /// Another user of this computer, or one that is hidden.
+    Other,
+    /// Somebody at this address.
+    Elsewhere(IpAddr),
+}
+
+impl Owner {
+    fn of(user: PeerUser, address: IpAddr) -> Self {
+        match user {
+            PeerUser::Own => Self::Own,
+            PeerUser::Other(_) | PeerUser::Unknown => Self::Other,
+            PeerUser::Elsewhere => Self::Elsewhere(address),
+        }
+    }
+}
+
+/// Connections by owner.
 #[derive(Debug, Default)]
-struct Places(Mutex<HashMap<IpAddr, usize>>);
+struct Places(Mutex<HashMap<Owner, usize>>);
 
 /// The place of a connection; dropping it gives it free.
 struct Place {
     places: Arc<Places>,
-    address: IpAddr,
+    owner: Owner,
 }
 
 impl Place {
-    fn take(places: &Arc<Places>, address: IpAddr) -> Option<Self> {
+    fn take(places: &Arc<Places>, owner: Owner) -> Option<Self> {
         let mut taken = places.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let all: usize = taken.values().sum();
-        let own = taken.entry(address).or_default();
-        let most = if address.to_canonical().is_loopback() { MOST } else { MOST_OF_ONE };
-        if all >= MOST || *own >= most {
+        let count = |of: &dyn Fn(&Owner) -> bool| -> usize {
+            taken.iter().filter(|(owner, _)| of(owner)).map(|(_, count)| count).sum()
+        };
+        let has_room = match owner {
+            Owner::Own => true,
+            Owner::Other => count(&|it| *it == owner) < MOST_OF_OTHERS,
+            Owner::Elsewhere(_) => {
+                count(&|it| matches!(it, Owner::Elsewhere(_))) < MOST_FROM_ELSEWHERE
+                    && count(&|it| *it == owner) < MOST_OF_ONE
+            }
+        };
+        if !has_room || count(&|_| true) >= MOST {
             return None;
         }
-        *own += 1;
-        Some(Self { places: places.clone(), address })
+        *taken.entry(owner).or_default() += 1;
+        Some(Self { places: places.clone(), owner })
     }
 }
 
 impl Drop for Place {
     fn drop(&mut self) {
         let mut taken = self.places.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(own) = taken.get_mut(&self.address) {
-            *own -= 1;
-            if *own == 0 {
-                taken.remove(&self.address);
+        if let Some(count) = taken.get_mut(&self.owner) {
+            *count -= 1;
+            if *count == 0 {
+                taken.remove(&self.owner);
             }
         }
     }
@@ -302,16 +354,39 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_are_bounded_in_all_and_by_address_and_are_given_free() {
+    fn nobody_takes_the_places_of_the_machines_own_user() {
         let places = Arc::new(Places::default());
-        let take = |address: &str| Place::take(&places, address.parse().unwrap());
-        let mut held: Vec<Place> = (0..MOST_OF_ONE).map(|_| take("192.0.2.1").unwrap()).collect();
-        assert!(take("192.0.2.1").is_none());
-        held.extend((0..MOST - MOST_OF_ONE).map(|_| take("127.0.0.1").unwrap()));
-        assert!(take("192.0.2.2").is_none());
-        held.truncate(1);
-        assert!(take("192.0.2.2").is_some());
+        let take =
+            |user, address: &str| Place::take(&places, Owner::of(user, address.parse().unwrap()));
+        let fill = |user, address: &str| -> Vec<Place> {
+            std::iter::from_fn(|| take(user, address)).take(MOST + 1).collect()
+        };
+        let mut held = Vec::new();
+        // Several users together have no more than one, and so have several computers.
+        for (user, expect) in [
+            (PeerUser::Other(1001), MOST_OF_OTHERS),
+            (PeerUser::Other(1002), 0),
+            (PeerUser::Unknown, 0),
+        ] {
+            let taken = fill(user, "127.0.0.1");
+            assert_eq!(taken.len(), expect, "{user:?}");
+            held.extend(taken);
+        }
+        for (address, expect) in [
+            ("192.0.2.1", MOST_OF_ONE),
+            ("192.0.2.2", MOST_FROM_ELSEWHERE - MOST_OF_ONE),
+            ("192.0.2.3", 0),
+        ] {
+            let taken = fill(PeerUser::Elsewhere, address);
+            assert_eq!(taken.len(), expect, "{address}");
+            held.extend(taken);
+        }
+        let own = fill(PeerUser::Own, "127.0.0.1");
+        assert_eq!(own.len(), MOST - MOST_OF_OTHERS - MOST_FROM_ELSEWHERE);
         drop(held);
+        let others = fill(PeerUser::Own, "::1");
+        assert_eq!(own.len() + others.len(), MOST, "and has all where nobody else is");
+        drop((own, others));
         assert!(places.0.lock().unwrap().is_empty());
     }
 }
