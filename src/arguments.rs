@@ -33,9 +33,9 @@ pub use operating::{
 };
 pub use options::JobOptions;
 pub use pipeline::{
-    DomainArguments, DrivesArguments, DrivesKind, OverrideArguments, QuotaArguments,
-    RecordArguments, RecordLevel, RunArguments, ServiceArguments, SimulateArguments,
-    StatusArguments, SubmitArguments,
+    DomainArguments, DrivesArguments, DrivesKind, OverrideArguments, PipelineArguments,
+    QuotaArguments, RecordArguments, RecordLevel, RunArguments, ServiceArguments,
+    SimulateArguments, StatusArguments, SubmitArguments,
 };
 pub use planning::{
     CheckArguments, ExportArguments, ExportFormat, KinematicsArguments, KinematicsVerb,
@@ -84,7 +84,7 @@ pub enum Command {
     /// Kinematics and dynamics: JSON lines in, JSON lines out.
     #[command(after_help = KINEMATICS_EXAMPLES)]
     Kinematics(KinematicsArguments),
-    /// Write the recording of a run as comma-separated values.
+    /// Write the recording of a run as comma-separated values, or as one MCAP file.
     #[command(after_help = EXPORT_EXAMPLES)]
     Export(ExportArguments),
     /// Feed the stages with a recorded simulation, and compare their outputs bit for bit.
@@ -118,7 +118,7 @@ pub enum Command {
     Hold(InstanceArguments),
     /// Go on from a hold without losing or doubling a mark.
     Resume(InstanceArguments),
-    /// Play the job at another rate.
+    /// Play the job at another rate, or with another power.
     Override(OverrideArguments),
     /// Give the job up: laser off at once, then to rest along the path.
     Stop(InstanceArguments),

@@ -164,6 +164,7 @@ pub fn job_request(
         job: job.map(Path::to_owned).or_else(sample),
         set: set.iter().map(|change| format!("{}={}", change.key, change.value)).collect(),
         offsets: None,
+        confined: false,
     }
 }
 

@@ -64,7 +64,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Reset(arguments) => operator::verb(Verb::Reset, arguments),
         Command::Enable(arguments) => operator::verb(Verb::Enable, arguments),
         Command::Disable(arguments) => operator::verb(Verb::Disable, arguments),
-        Command::Override(arguments) => operator::override_rate(arguments),
+        Command::Override(arguments) => operator::overrides(arguments),
         Command::Home(arguments) => operating::home(arguments),
         Command::Jog(arguments) => operating::jog(arguments),
         Command::TestPulse(arguments) => operating::test_pulse(arguments),
@@ -95,7 +95,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
 /// Whether a failure is also printed as JSON.
 fn wants_json(command: &Command) -> bool {
     match command {
-        Command::Run(arguments) => arguments.instance.json,
+        Command::Run(arguments) => arguments.pipeline.instance.json,
         Command::Simulate(arguments) => arguments.json,
         Command::Plan(arguments) => arguments.json,
         Command::Check(arguments) => arguments.json,

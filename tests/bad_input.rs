@@ -372,6 +372,8 @@ fn broken_arguments_are_refused_with_what_would_be_right() {
         (vec!["simulate", "--set", "plant.axis.a.gear=0"], "gear"),
         (vec!["override", "300 %"], "200 %"),
         (vec!["override", "fast"], "fast"),
+        (vec!["override", "50 %", "--power", "5 %"], "power 5 %"),
+        (vec!["override"], "RATE"),
         (vec!["status", "--instance", "No Name"], "instance"),
         (vec!["run", "--instance", "../up"], "instance"),
         (vec!["simulate", "--seed", "x"], "seed"),

@@ -44,6 +44,48 @@ fn a_job_goes_on_with_a_stroke_without_doubling_or_missing_a_mark() {
     }
 }
 
+/// The first and the last place at which light fell in a simulation, and the marks as judged.
+fn lit_from(options: &[&str]) -> ([f64; 2], Value) {
+    let place = Place::new();
+    let job = place.file("job.ngc", PROGRAM);
+    let out = place.path("run");
+    let arguments = ["simulate", job.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()];
+    let summary = place.graver(&[&arguments[..], options].concat()).json(0);
+    let records = place.recording("run");
+    // Light falls in the cycle before the measurement; at the speed of the job that is 50 µm.
+    let lit = records.windows(2).filter(|pair| pair[1].feedback.laser.is_lit());
+    let places: Vec<f64> =
+        lit.flat_map(|pair| [pair[0].feedback.tool[0], pair[1].feedback.tool[0]]).collect();
+    ([places[0], *places.last().unwrap()], summary)
+}
+
+/// Stopped within a stroke, and gone on with from there: both runs together mark the job once, and the way to the place is
+/// dark.
+#[test]
+fn a_job_goes_on_within_a_stroke_without_doubling_or_missing_a_mark() {
+    let (whole, all) = lit_from(&[]);
+    // The second stroke is from 10 to 15 mm of a path on which the first one lies too.
+    for along in [1.25, 3.0] {
+        let length = format!("{along} mm");
+        let (rest, summary) = lit_from(&["--from-stroke", "2", "--from-along", &length]);
+        support::assert_valid("summary", &summary);
+        let marks = &summary["marks"];
+        let expected = 18e-3 - along * 1e-3;
+        assert!((number(&summary["job"]["length"]) - expected).abs() < 1e-9);
+        assert!((number(&marks["length"]) - expected).abs() < 2e-5, "{marks:#}");
+        for key in ["missing", "double", "stray"] {
+            assert!(number(&marks[key]) < 2e-5, "{marks:#}");
+        }
+        // Where the first run would have been stopped, and not before.
+        let offset = rest[0] - (whole[0] + 10e-3 + along * 1e-3);
+        assert!(offset.abs() < 120e-6, "light begins {offset} m off");
+        assert!((rest[1] - whole[1]).abs() < 120e-6);
+        let together = 5e-3 + along * 1e-3 + number(&marks["length"]);
+        let marked = number(&all["marks"]["length"]);
+        assert!((together - marked).abs() < 4e-5, "{together} m of {marked} m");
+    }
+}
+
 #[test]
 fn a_dry_run_and_a_frame_mark_nothing_and_miss_nothing() {
     let whole = simulated(&[]);

@@ -142,7 +142,8 @@ fn judge(file: &File, text: &str, job: &Path, known: usize) -> Verdict {
     if machine.warnings.len() > known || SimulatedPlant::new(&machine, options).is_err() {
         return Verdict::Told;
     }
-    let request = JobRequest { job: Some(job.to_owned()), set: Vec::new(), offsets: None };
+    let request =
+        JobRequest { job: Some(job.to_owned()), set: Vec::new(), offsets: None, confined: false };
     let Ok(job) = request.read(&machine) else { return Verdict::NoJob };
     if is_long(&machine, &job) {
         return Verdict::NoJob;

@@ -166,6 +166,27 @@ fn jobs_that_wait_survive_the_end_of_their_pipeline_and_begin_when_a_person_says
 }
 
 #[test]
+fn what_a_held_queue_means_is_said_to_whoever_holds_it_and_whoever_submits() {
+    let desk = Desk::new();
+    let none = desk.place.ask(&["queue", "hold"]);
+    assert!(none.error.contains("nothing is held"), "{}", none.error);
+    let job = desk.place.file("long.ngc", LONG);
+    let first = desk.detach(&job);
+    desk.await_running(first);
+    desk.detach(&job);
+    let held = desk.place.ask(&["queue", "hold"]);
+    assert!(!held.error.contains("nothing is held"), "{}", held.error);
+    let told = desk.submit(&job, &["--detach"]).wait().json(0);
+    assert_valid("submitted", &told);
+    assert!(told["held"].as_str().unwrap().contains("a person holds the queue"), "{told:#}");
+    let words = desk.place.ask(&["submit", job.to_str().unwrap(), "--detach"]);
+    assert!(words.error.contains("the queue is held"), "{}", words.error);
+    let repeated = desk.place.ask(&["queue", "repeat", &first.to_string(), "--json"]).json(0);
+    assert!(repeated["held"].is_string(), "{repeated:#}");
+    desk.end().assert_nothing_left(&[]);
+}
+
+#[test]
 fn a_job_outlives_whoever_submitted_it() {
     let desk = Desk::new();
     let job = desk.place.file("job.ngc", &lines(4));

@@ -200,7 +200,15 @@ fn half_the_rate_marks_the_same_lines_in_more_time() {
     let job = place.file("lines.ngc", &lines(3));
     let mut running = place.run(&job, "run", &[]);
     place.await_played(&mut running, 100);
+    let reply = place.ask(&["override", "50 %", "--json", "--power", "80 %"]).json(0);
+    assert_eq!((number(&reply, "/value"), number(&reply, "/power")), (0.5, 0.8));
+    place.await_status(&mut running, "both overrides", |status| {
+        status["rate_override"] == 0.5 && status["power_override"] == 0.8
+    });
+    let reply = place.ask(&["override", "--power", "100 %"]);
+    assert!(reply.error.contains("100 % again when the job ends"), "{}", reply.error);
     let reply = place.ask(&["override", "50 %", "--json"]).json(0);
+    assert_eq!(number(&reply, "/power"), 1.0);
     assert_eq!((&reply["accepted"], reply["value"].as_f64()), (&Value::Bool(true), Some(0.5)));
     place.await_status(&mut running, "half rate", |status| status["rate"] == 0.5);
     let summary = running.wait().json(0);
@@ -241,10 +249,11 @@ fn stop_gives_the_job_up_and_status_tells_all_along() {
     assert_judged_by_what_was_due(&summary);
     // What is left is what the job marks that goes on from there.
     let [stroke, strokes] = ["from_stroke", "strokes"].map(|key| &summary["left"][key]);
-    let goes_on = format!("marking.from_stroke={stroke}");
-    let rest = place.graver(&["plan", job.to_str().unwrap(), "--set", &goes_on, "--json"]).json(0);
-    let begun = number(&summary, "/left/begun");
-    let left = number(&summary, "/left/length") + begun;
+    let goes_on = stroke.to_string();
+    let along = format!("{:.9} m", number(&summary, "/left/along"));
+    let options = ["--from-stroke", &goes_on, "--from-along", &along, "--json"];
+    let rest = place.graver(&[&["plan", job.to_str().unwrap()], &options[..]].concat()).json(0);
+    let left = number(&summary, "/left/length");
     assert!((number(&rest, "/length") - left).abs() < 1e-6, "{rest:#}");
     assert_eq!(
         rest["strokes"].as_u64().unwrap() + stroke.as_u64().unwrap() - 1,

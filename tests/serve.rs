@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
-use support::{PATIENCE, Place, Running, assert_valid, lines};
+use support::{CONTINUE, PATIENCE, Place, Running, STOP, assert_valid, lines};
 
 /// Starts a server of the place's instance, and gives its address.
 fn serve(place: &Place, more: &[&str]) -> (Running, String) {
@@ -114,6 +114,29 @@ fn a_server_sees_a_run_hands_requests_on_and_outlives_it() {
     place.assert_nothing_left(&[]);
 }
 
+/// A stop goes past a process that hangs to the one that moves the machine.
+#[test]
+fn a_stop_over_http_reaches_the_controller_past_a_holder_that_hangs() {
+    let place = Place::new();
+    let (server, address) = serve(&place, &[]);
+    let job = place.file("lines.ngc", &lines(8));
+    let mut running = place.run(&job, "run", &[]);
+    place.await_played(&mut running, 50);
+    await_answer(&address, "/api/v1/status", |status| status["state"] == "running");
+    running.signal(STOP);
+    let reply = done(&address, "POST", "/api/v1/requests/stop", b"");
+    assert_valid("reply", &reply);
+    assert_eq!((&reply["accepted"], &reply["direct"]), (&json!(true), &json!(true)), "{reply:#}");
+    // Nothing else goes past it.
+    running.signal(CONTINUE);
+    assert_eq!(running.wait().json(1)["outcome"], "stopped");
+    support::assert_ends_dark_and_at_rest(&place.recording("run"), 2);
+    // It reads the samples for as long as there are any.
+    server.signal(support::TERMINATE);
+    server.wait();
+    place.assert_nothing_left(&[]);
+}
+
 #[test]
 fn what_cannot_be_served_is_refused_with_what_would_be_right() {
     let place = Place::new();
@@ -144,11 +167,31 @@ fn a_pipeline_with_a_page_takes_a_job_from_its_upload_to_its_report() {
     let file = done(&address, "POST", "/api/v1/jobs?name=one%20line.ngc", program.as_bytes());
     let of_file = |verb: &str| format!("/api/v1/jobs/{}/{verb}", file["id"].as_str().unwrap());
     await_answer(&address, "/api/v1/status", |status| status["services"]["drives"].is_i64());
+    // A file of this user's that an upload has no business with, by a job file and by a change of one.
+    let secret = place.file("secret.ngc", &lines(1));
+    let names = format!("[gcode]\nfile = \"{}\"\n", secret.display());
+    let spy = done(&address, "POST", "/api/v1/jobs?name=spy.toml", names.as_bytes());
+    let of_spy = |verb: &str| format!("/api/v1/jobs/{}/{verb}", spy["id"].as_str().unwrap());
+    let refused = done(&address, "POST", &of_spy("check"), b"");
+    let why = refused["error"]["message"].as_str().unwrap();
+    assert!(refused["ok"] == false && why.contains("below its own folder"), "{refused:#}");
+    let (status, body) = send(&address, "POST", &of_spy("preview"), b"");
+    assert_eq!(status, 422, "{}", String::from_utf8_lossy(&body));
+    let number = done(&address, "POST", &of_spy("submit"), b"")["number"].as_u64().unwrap();
+    let runs = await_answer(&address, "/api/v1/runs", |runs| {
+        runs[0]["n"] == number && runs[0]["outcome"].is_string()
+    });
+    assert_eq!(runs[0]["outcome"], "refused", "{runs:#}");
+    let summary = done(&address, "GET", &format!("/api/v1/runs/{number}/summary.json"), b"");
+    let why = summary["error"]["message"].as_str().unwrap();
+    assert!(why.contains("below its own folder"), "{summary:#}");
     let check = done(&address, "POST", &of_file("check"), b"");
     assert_eq!((&check["ok"], &check["strokes"]), (&json!(true), &json!(1)), "{check:#}");
     assert!((check["length"].as_f64().unwrap() - 0.03).abs() < 1e-6, "{check:#}");
     let number = done(&address, "POST", &of_file("submit"), b"")["number"].as_u64().unwrap();
-    let runs = await_answer(&address, "/api/v1/runs", |runs| runs[0]["outcome"].is_string());
+    let runs = await_answer(&address, "/api/v1/runs", |runs| {
+        runs[0]["n"] == number && runs[0]["outcome"].is_string()
+    });
     assert_eq!(
         (&runs[0]["n"], &runs[0]["outcome"]),
         (&json!(number), &json!("completed")),

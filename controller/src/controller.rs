@@ -249,7 +249,8 @@ impl Controller {
         }
         if self.playing != 0 {
             let now = self.feedforward.now();
-            self.statistics.cycle(&outputs.command, feedback, now);
+            let power = self.player.power_override();
+            self.statistics.cycle(&outputs.command, feedback, now, power);
         }
         outputs.report = self.ended.take();
         if outputs.report.is_none() && self.cycles.is_multiple_of(self.report_interval) {

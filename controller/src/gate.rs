@@ -28,8 +28,10 @@ impl Stretch {
 pub struct Strength {
     /// The least power at which the source gives light, 0..=1.
     pub least: f64,
-    /// So many times what the stream asks for, full power at most.
+    /// So many times what the stream asks for.
     pub share: f64,
+    /// The most that is given, 0..=1.
+    pub most: f64,
 }
 
 /// The laser over `stretch`, dark before `dark_until`. Edges keep their stream time; power follows
@@ -60,6 +62,7 @@ pub fn laser(
         && stretch.to == whole
         && stretch.period == Period::OF_SETPOINTS
         && strength.share == 1.0
+        && strength.most == 1.0
     {
         return Ok(*planned);
     }
@@ -75,7 +78,8 @@ pub fn laser(
         .last()
         .map_or((planned.gate, planned.power), |edge| (edge.gate, edge.power));
     let share = rate * strength.share;
-    let power_at_rate = |power: f64| (power * share).max(power.min(strength.least)).min(1.0);
+    let power_at_rate =
+        |power: f64| (power * share).max(power.min(strength.least)).min(strength.most);
     if start == stretch.from {
         (cycle.gate, cycle.power) = (gate, power_at_rate(power));
     } else if gate != 0 {
@@ -153,7 +157,7 @@ mod tests {
 
     /// As planned, from a source that gives no less than `least`.
     fn planned(least: f64) -> Strength {
-        Strength { least, share: 1.0 }
+        Strength { least, share: 1.0, most: 1.0 }
     }
 
     fn at(setpoints: f64) -> StreamTime {
@@ -238,7 +242,8 @@ mod tests {
         let whole = |from: f64, share: f64| {
             let stretch =
                 Stretch { from: at(from), to: at(from + 1.0), period: Period::OF_SETPOINTS };
-            laser(&ring, stretch, StreamTime(0), Strength { least: 0.05, share }).unwrap()
+            laser(&ring, stretch, StreamTime(0), Strength { least: 0.05, share, most: 1.0 })
+                .unwrap()
         };
         for (share, power) in [(0.5, 0.2), (1.5, 0.6), (2.0, 0.8), (0.1, 0.05), (1.0, 0.4)] {
             assert!((whole(2.0, share).power - power).abs() < 1e-12, "{share}");
@@ -246,10 +251,15 @@ mod tests {
             assert_eq!((lit.gate, lit.edges().len(), lit.edges()[0].offset), (0, 1, 250_000));
             assert!((lit.edges()[0].power - power).abs() < 1e-12, "{share}");
         }
-        let strong = Strength { least: 0.0, share: 9.0 };
+        let strong = Strength { least: 0.0, share: 9.0, most: 1.0 };
         let stretch = Stretch { from: at(2.0), to: at(3.0), period: Period::OF_SETPOINTS };
         assert_eq!(laser(&ring, stretch, StreamTime(0), strong).unwrap().power, 1.0);
         assert!(!whole(5.0, 2.0).is_lit(), "nothing is lit for it");
+        for (share, most, power) in [(2.0, 0.5, 0.5), (1.0, 0.3, 0.3), (0.5, 0.3, 0.2)] {
+            let strength = Strength { least: 0.0, share, most };
+            let given = laser(&ring, stretch, StreamTime(0), strength).unwrap().power;
+            assert!((given - power).abs() < 1e-12, "{share} up to {most}: {given}");
+        }
     }
 
     #[test]

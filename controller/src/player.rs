@@ -113,6 +113,8 @@ pub struct Player {
     asked: f64,
     /// The override of the power.
     power: f64,
+    /// The most power of a frame, 0..=1.
+    frame_power: f64,
 }
 
 impl Player {
@@ -137,10 +139,11 @@ impl Player {
             min_power: machine.laser.min_power,
             asked: 1.0,
             power: 1.0,
+            frame_power: machine.operating.safety.frame_power,
         }
     }
 
-    /// Back to before the first setpoint; the override stays.
+    /// Back to before the first setpoint; the overrides stay.
     pub fn rewind(&mut self) {
         (self.next, self.after) = Default::default();
         self.recent.fill(Instant::default());
@@ -171,6 +174,16 @@ impl Player {
             self.power = power;
         }
         allowed
+    }
+
+    /// So many times the power that the stream asks for is given.
+    pub fn power_override(&self) -> f64 {
+        self.power
+    }
+
+    /// The power as the stream asks for it: what was asked for one job is not for the next.
+    pub fn end_power_override(&mut self) {
+        self.power = 1.0;
     }
 
     /// The rate asked for.
@@ -429,7 +442,9 @@ impl Player {
     fn light(&self, lookahead: &Lookahead) -> Result<LaserCycle, TooManyEdges> {
         let period = self.pace.period();
         let stretch = Stretch { from: self.next.time, to: self.after.time, period };
-        let strength = Strength { least: self.min_power, share: self.power };
+        let is_frame = lookahead.setpoint(self.next.time.sequence()).has(flags::FRAME);
+        let most = if is_frame { self.frame_power } else { 1.0 };
+        let strength = Strength { least: self.min_power, share: self.power, most };
         gate::laser(lookahead, stretch, self.dark_until, strength)
     }
 

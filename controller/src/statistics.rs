@@ -66,9 +66,15 @@ impl Statistics {
         self.digest = Digest::new();
     }
 
-    /// Counts one cycle: what was commanded, and how well the motors follow.
-    pub fn cycle(&mut self, command: &Command, feedback: &Feedback, now: &Planned) {
+    /// Counts one cycle: what was commanded with this override of the power, and how well the motors follow.
+    pub fn cycle(&mut self, command: &Command, feedback: &Feedback, now: &Planned, power: f64) {
         let report = &mut self.report;
+        if command.laser.is_lit() {
+            let [least, most] = report.power_override;
+            let is_first = most == 0.0;
+            report.power_override =
+                [if is_first { power } else { least.min(power) }, most.max(power)];
+        }
         report.count += 1;
         report.last_cycle = feedback.cycle;
         // With those in between that drives skipped.

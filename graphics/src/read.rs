@@ -18,7 +18,7 @@ pub(crate) mod text;
 pub(crate) mod xml;
 
 use std::fs::File;
-use std::io::Read as _;
+use std::io::{self, Read as _};
 use std::path::Path;
 
 use crate::ReadError;
@@ -80,17 +80,24 @@ pub fn read(bytes: &[u8], extension: &str) -> Result<Graphic, ReadError> {
 ///
 /// Those of [`read`], and where the file cannot be read.
 pub fn read_file(path: &Path) -> Result<Graphic, ReadError> {
+    read_opened(File::open(path), path)
+}
+
+/// Reads the drawing in a file that was `opened`, or could not be, and is called `name`; see [`read`].
+///
+/// # Errors
+///
+/// As of [`read_file`].
+pub fn read_opened(opened: io::Result<File>, name: &Path) -> Result<Graphic, ReadError> {
     let mut bytes = Vec::new();
     let limit = MOST_BYTES as u64 + 1;
-    File::open(path).and_then(|file| file.take(limit).read_to_end(&mut bytes)).map_err(
-        |error| {
-            ReadError::new(
-                format!("cannot be read: {error}"),
-                "give a file that exists and may be read",
-            )
-        },
-    )?;
-    let extension = path.extension().unwrap_or_default();
+    opened.and_then(|file| file.take(limit).read_to_end(&mut bytes)).map_err(|error| {
+        ReadError::new(
+            format!("cannot be read: {error}"),
+            "give a file that exists and may be read",
+        )
+    })?;
+    let extension = name.extension().unwrap_or_default();
     read(&bytes, &extension.to_string_lossy())
 }
 

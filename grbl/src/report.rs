@@ -261,18 +261,14 @@ pub fn modes(reader: &LineReader, settings: &Settings) -> String {
 }
 
 /// The answer to `$#`.
-pub fn places(
-    reader: &LineReader,
-    settings: &Settings,
-    home: [f64; 3],
-    probed: ([f64; 3], bool),
-) -> Vec<String> {
+pub fn places(reader: &LineReader, settings: &Settings, probed: ([f64; 3], bool)) -> Vec<String> {
     let origins = reader.origins();
     let mut lines: Vec<String> = (0..6)
         .map(|system| format!("[G{}:{}]", 54 + system, place(settings, origins[system])))
         .collect();
-    lines.push(format!("[G28:{}]", place(settings, home)));
-    lines.push(format!("[G30:{}]", place(settings, home)));
+    for (code, kept) in ["G28", "G30"].into_iter().zip(reader.kept()) {
+        lines.push(format!("[{code}:{}]", place(settings, kept)));
+    }
     lines.push(format!("[G92:{}]", place(settings, reader.shift())));
     lines.push(format!("[TLO:{}]", if settings.in_inches { "0.0000" } else { "0.000" }));
     lines.push(probe(settings, probed.0, probed.1));

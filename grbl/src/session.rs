@@ -9,6 +9,7 @@
 //! [`Session::tick`].
 
 mod hand;
+mod lines;
 mod procedure;
 mod program;
 mod realtime;
@@ -38,9 +39,6 @@ pub const WINDOW: usize = 128;
 
 /// Blocks that `Bf:` and `[OPT:` tell.
 pub const BLOCKS: usize = 15;
-
-/// Bytes of lines that are kept at most; what a client sends beyond is answered with an error.
-const MOST_WAITING: usize = 1 << 16;
 
 /// How long a client that may go on says nothing when its program has ended [s].
 const SILENCE: f64 = 0.5;
@@ -86,6 +84,8 @@ enum Purpose {
     Jog,
     /// A job.
     Submit,
+    /// Another override.
+    Override,
 }
 
 /// A job of this session.
@@ -140,6 +140,8 @@ pub struct Session {
     /// When the machine answered last [s].
     answered: f64,
     overrides: Overrides,
+    /// The number of the newest request for an override that the machine has accepted.
+    override_number: u32,
     /// Whether a client has unlocked a machine that is not homed.
     is_unlocked: bool,
     /// An alarm of the session itself.
@@ -206,6 +208,7 @@ impl Session {
             status: None,
             answered: 0.0,
             overrides: Overrides::NONE,
+            override_number: 0,
             is_unlocked: false,
             alarm: None,
             told_fault: None,
@@ -253,52 +256,6 @@ impl Session {
         }
     }
 
-    /// Forgets all lines that wait, unanswered.
-    fn forget_lines(&mut self) {
-        self.waiting.clear();
-        self.waiting_bytes = 0;
-        self.held = None;
-        self.procedure = Procedure::default();
-        self.purposes.retain(|(_, purpose)| *purpose != Purpose::Line);
-    }
-
-    /// Takes bytes of the client.
-    pub fn receive(&mut self, bytes: &[u8], now: f64) {
-        self.now = now;
-        for &byte in bytes {
-            match self.splitter.take(byte) {
-                Unit::None => {}
-                Unit::Text => self.heard = now,
-                Unit::Realtime(realtime) => self.realtime(realtime),
-                Unit::Line(line) => {
-                    self.heard = now;
-                    self.wait(Waiting::Line(line));
-                }
-                Unit::TooLong => self.wait(Waiting::Dropped),
-            }
-        }
-        self.go_on();
-    }
-
-    fn wait(&mut self, line: Waiting) {
-        let bytes = match &line {
-            Waiting::Line(line) => line.len() + 1,
-            Waiting::Dropped => 1,
-        };
-        let is_room = self.waiting_bytes + bytes <= MOST_WAITING;
-        // Whoever goes on so far beyond its window counts no answers.
-        if !is_room && self.waiting.len() > MOST_WAITING {
-            return;
-        }
-        self.waiting_bytes += if is_room { bytes } else { 1 };
-        self.waiting.push_back(if is_room { line } else { Waiting::Dropped });
-    }
-
-    /// Bytes of its window that the client has left.
-    fn room(&self) -> usize {
-        WINDOW.saturating_sub(self.waiting_bytes + self.splitter.length())
-    }
-
     /// Takes what the machine says; `None` where nobody answers.
     pub fn observe(&mut self, status: Option<Status>, now: f64) {
         self.now = now;
@@ -311,6 +268,7 @@ impl Session {
             if status.unhomed.is_empty() {
                 self.is_unlocked = false;
             }
+            self.follow_overrides(&status);
             if self.holds_next && status.state == "running" {
                 self.holds_next = false;
                 self.ask_quietly(Verb::Hold, 0.0);
@@ -331,11 +289,13 @@ impl Session {
         if let Some(place) = place {
             let (_, purpose) = self.purposes.swap_remove(place);
             match purpose {
-                Purpose::Free => {
-                    if let Answer::Refused(words) = answer {
-                        self.message(&words);
+                Purpose::Free | Purpose::Override => match answer {
+                    Answer::Refused(words) => self.message(&words),
+                    Answer::Done(number) if purpose == Purpose::Override => {
+                        self.override_number = number;
                     }
-                }
+                    _ => {}
+                },
                 Purpose::Line => {
                     let outcome = self.procedure.answered(ticket, &answer);
                     self.end_procedure(outcome);
@@ -381,138 +341,6 @@ impl Session {
     /// Requests to the machine, each with its number.
     pub fn take_asks(&mut self) -> Vec<(u64, Ask)> {
         std::mem::take(&mut self.asks)
-    }
-
-    /// Does whatever can be done now.
-    fn go_on(&mut self) {
-        self.follow_motions();
-        loop {
-            self.release();
-            if self.held.is_some() {
-                break;
-            }
-            let Some(line) = self.waiting.pop_front() else { break };
-            match line {
-                Waiting::Line(line) => {
-                    self.waiting_bytes = self.waiting_bytes.saturating_sub(line.len() + 1);
-                    self.handle(&line);
-                }
-                Waiting::Dropped => {
-                    self.waiting_bytes = self.waiting_bytes.saturating_sub(1);
-                    self.refuse_line(ErrorCode::TooLong, "the line is too long, or one too many");
-                }
-            }
-        }
-        if self.is_program_over() {
-            self.hand_over();
-        }
-        self.next_jog();
-    }
-
-    /// Answers the held line where what it waits for is there.
-    fn release(&mut self) {
-        let now = self.now;
-        match &self.held {
-            Some(Held::Dwell { .. }) if !self.waiting.is_empty() => {
-                self.held = None;
-                self.ok();
-            }
-            Some(Held::Rest { dwell, since } | Held::Dwell { dwell, since }) => {
-                // The program before it goes first.
-                let has_work = self.spool.as_ref().is_some_and(|gathered| gathered.has_work);
-                if has_work || !self.rests() {
-                    self.set_since(None);
-                    return;
-                }
-                let since = *since.as_ref().unwrap_or(&now);
-                let is_over = now - since >= *dwell;
-                self.set_since(Some(since));
-                if is_over {
-                    self.held = None;
-                    self.ok();
-                }
-            }
-            Some(Held::JogRoom) if self.jogs.len() < BLOCKS => {
-                self.held = None;
-                self.ok();
-            }
-            _ => {}
-        }
-    }
-
-    fn set_since(&mut self, value: Option<f64>) {
-        if let Some(Held::Rest { since, .. } | Held::Dwell { since, .. }) = &mut self.held {
-            *since = value;
-        }
-    }
-
-    /// Whether nothing of this session is under way, and the machine stands.
-    fn rests(&self) -> bool {
-        let state = self.status.as_ref().map(|status| status.state.as_str());
-        self.jobs.is_empty()
-            && self.jogs.is_empty()
-            && self.jogging.is_over()
-            && !state.is_some_and(is_busy)
-    }
-
-    /// Handles a line.
-    fn handle(&mut self, line: &[u8]) {
-        let line = line.trim_ascii();
-        if line.is_empty() {
-            self.ok();
-            return;
-        }
-        if self.is_asleep {
-            self.refuse_line(ErrorCode::Locked, "asleep: send a reset (0x18)");
-            return;
-        }
-        match line.strip_prefix(b"$") {
-            Some(system) => {
-                let text = String::from_utf8_lossy(system).trim().to_owned();
-                self.system(&text);
-            }
-            None => self.program_line(line),
-        }
-    }
-
-    // What it says.
-
-    fn ok(&mut self) {
-        self.line("ok");
-    }
-
-    fn refuse_line(&mut self, code: ErrorCode, words: &str) {
-        self.message(words);
-        self.error(code);
-    }
-
-    fn error(&mut self, code: ErrorCode) {
-        self.line(&format!("error:{}", code as u8));
-    }
-
-    /// A push message, which no line of a client is answered with.
-    fn message(&mut self, words: &str) {
-        // Brackets and line ends would end it for a client.
-        let words: String = words
-            .chars()
-            .map(|character| match character {
-                '[' => '(',
-                ']' => ')',
-                character if character.is_control() => ' ',
-                character => character,
-            })
-            .collect();
-        self.line(&format!("[MSG:{words}]"));
-    }
-
-    fn line(&mut self, text: &str) {
-        if !self.is_connected {
-            return;
-        }
-        if self.output.len() < MOST_OUTPUT {
-            self.output.extend_from_slice(text.as_bytes());
-            self.output.extend_from_slice(b"\r\n");
-        }
     }
 
     /// Asks the machine for something.

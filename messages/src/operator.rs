@@ -40,7 +40,7 @@ pub enum OperatorVerb {
     /// Switch output `axis`, from 1, on for a `value` of 1 and off for 0.
     Output = 15,
     /// Override the power of the laser, `value` 0.1..=2: each power that the stream asks for is so many times as much, and
-    /// full power at most.
+    /// full power at most, and a frame `safety.frame_power` of the machine file. It ends with the stream.
     Power = 16,
 }
 
@@ -99,7 +99,7 @@ sample! {
 sample! {
     /// The controller's answer, given as soon as the request is accepted or refused; its effect
     /// shows in the progress.
-    OperatorReply = "graver.OperatorReply.v3" {
+    OperatorReply = "graver.OperatorReply.v4" {
         /// The request's ticket.
         ticket: u32,
         /// 1 when it is carried out, 0 when it is refused.
@@ -118,5 +118,7 @@ sample! {
         limit: f64,
         /// The rate that is asked for since the last override, 1 before the first.
         value: f64,
+        /// So many times the power that the stream asks for is given since the last override of it, 1 before the first.
+        power: f64,
     }
 }

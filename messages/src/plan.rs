@@ -14,6 +14,9 @@ pub struct PlanFacts {
     /// Strokes and dots of the job before those, which it says to pass over.
     #[serde(default)]
     pub passed_over: u64,
+    /// How much of the first of those it says to leave out at its beginning [m].
+    #[serde(default)]
+    pub passed_along: f64,
     /// Whether the job has been planned to its end.
     #[serde(default)]
     pub is_whole: bool,

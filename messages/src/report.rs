@@ -52,7 +52,7 @@ sample! {
 
 sample! {
     /// What the controller counted over one stream: published every second, also after its end.
-    ControllerReport = "graver.ControllerReport.v2" {
+    ControllerReport = "graver.ControllerReport.v3" {
         /// The stream it speaks of.
         stream: u64,
         /// 1 once the stream has ended and this is final, else 0.
@@ -85,6 +85,8 @@ sample! {
         path_acceleration_use: f64,
         /// Largest share of the limit used: jerk along and across the path.
         path_jerk_use: f64,
+        /// Least and greatest override of the power while light was commanded; both 0 where none was.
+        power_override: [f64; 2],
         /// The fault that ended the stream, if any.
         fault: Fault,
         /// Real-time set-up of the controller's thread.

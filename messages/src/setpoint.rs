@@ -8,6 +8,8 @@ pub mod flags {
     pub const LAST: u64 = 1;
     /// The program pauses here, at rest and in the dark, until a person resumes (M0).
     pub const PAUSE: u64 = 1 << 1;
+    /// What is lit shows where a job lies: the machine file's `safety.frame_power` bounds its power.
+    pub const FRAME: u64 = 1 << 2;
 }
 
 sample! {

@@ -9,7 +9,7 @@ pub mod verdict;
 
 pub use crate::recording::info::{RecordingInfo, RecordingState};
 
-use crate::marks::{MarkEvaluation, Marks, StreamEnd};
+use crate::marks::{DrawnPlace, MarkEvaluation, Marks, StreamEnd};
 use crate::recording::file::RecordingError;
 use crate::recording::file::parts::PartsReader;
 use crate::recording::file::reduce::reduce;
@@ -151,6 +151,7 @@ pub fn summarise(
             Ok(evaluation) => {
                 summary.warnings.extend(warnings(evaluation));
                 summary.left = LeftSummary::of(evaluation, plan);
+                summary.place = place_of(evaluation, plan);
                 summary.marks = Some(evaluation.marks.clone());
             }
             Err(reason) => summary.warnings.push(reason.to_string()),
@@ -277,7 +278,15 @@ pub fn conclude(
     }
     let mut summary = summarise(machine, &plan, &run_outcome, results.as_ref(), Clock::Real);
     if summary.outcome != Outcome::Completed {
-        summary.place = run_outcome.place.map(|place| place.within(&drawn));
+        // What the marks tell comes before what was last heard, which names the file.
+        let heard = run_outcome.place.map(|place| place.within(&drawn));
+        summary.place = match summary.place.take() {
+            Some(marked) => {
+                let heard = heard.unwrap_or_default();
+                Some(JobPlace { file: heard.file, line: marked.line.or(heard.line), ..marked })
+            }
+            None => heard,
+        };
     }
     summary.report_time = began.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
@@ -292,6 +301,19 @@ pub fn conclude(
         let _ = fs::remove_file(spare.with_file_name(run_folder::ARTWORK));
     }
     summary
+}
+
+/// Where the job ended that was not played to its end, as its marks tell it.
+fn place_of(evaluation: &MarkEvaluation, plan: &PlanFacts) -> Option<JobPlace> {
+    let left = evaluation.left?;
+    let DrawnPlace { line, position, bounds } = left.place?;
+    Some(JobPlace {
+        file: None,
+        line: (line > 0).then_some(line),
+        stroke: plan.passed_over + left.stroke,
+        tool: Some(position),
+        bounds: Some(bounds),
+    })
 }
 
 /// Writes report and summary into the run folder, tells the summary where that is, and adds what

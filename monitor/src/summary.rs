@@ -101,6 +101,9 @@ pub struct Summary {
     pub following_error: FollowingError,
     /// The largest share of each limit used, as planned.
     pub limits: LimitUse,
+    /// Least and greatest override of the power while the laser was lit: so many times what the job asks for.
+    #[serde(default = "no_override")]
+    pub power_override: [f64; 2],
     /// What bound the motion as planned, the limit that ruled longest first.
     #[serde(default)]
     pub binding: Vec<Binding>,
@@ -122,6 +125,10 @@ pub struct Summary {
     /// What a person should know, each said once.
     #[serde(default)]
     pub warnings: Vec<String>,
+}
+
+fn no_override() -> [f64; 2] {
+    [1.0; 2]
 }
 
 /// An error in a file, or of a service.
@@ -268,6 +275,7 @@ impl Summary {
             recording: None,
             following_error: FollowingError::default(),
             limits: LimitUse::default(),
+            power_override: no_override(),
             binding: Vec::new(),
             cycles: 0,
             overruns: 0,
@@ -290,6 +298,9 @@ impl Summary {
         let squares = report.following_error_squares;
         let count = report.count.max(1) as f64;
         self.cycles = report.cycles;
+        if report.power_override[1] > 0.0 {
+            self.power_override = report.power_override;
+        }
         self.digest = format!("{:016x}", report.digest);
         self.following_error = FollowingError {
             max: first(&report.following_error_max, actuators),
@@ -381,6 +392,12 @@ mod tests {
         let mut summary = summary();
         summary.take_controller(&report);
         assert_eq!(summary.following_error.rms, [0.0, 0.5]);
+        assert_eq!(summary.power_override, [1.0; 2], "nothing was lit");
+        assert!(!summary.text().contains("power override"));
+        report.power_override = [0.8, 1.2];
+        summary.take_controller(&report);
+        let row = "power override    80 to 120 %, 100 % again after the job\n";
+        assert!(summary.text().contains(row), "{}", summary.text());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The asking end of the operators' socket.
 
-use crate::{Request, Status, VerbReply};
+use crate::{Request, Status, VerbReply, direct};
 use runtime::Instance;
 use runtime::socket::{ANSWER_PATIENCE, OperatorClient, SocketError};
 use serde::de::DeserializeOwned;
@@ -16,6 +16,14 @@ pub enum ClientError {
     /// The socket.
     #[error(transparent)]
     Socket(#[from] SocketError),
+    /// Neither the holder answered nor the controller.
+    #[error("{silent}; the controller could not be asked directly either: {error}")]
+    Unheard {
+        /// That the holder did not.
+        silent: SocketError,
+        /// Why the controller could not be asked.
+        error: String,
+    },
     /// The holder's words.
     #[error("{0}")]
     Refused(String),
@@ -41,13 +49,30 @@ impl Client {
         &self.instance
     }
 
-    /// Asks, and waits for the answer: a second for a stop or a hold, else [`ANSWER_PATIENCE`].
+    /// Asks, and waits for the answer: a second for a stop or a hold, else [`ANSWER_PATIENCE`]. A stop or a hold goes
+    /// to the controller where the holder does not answer.
     ///
     /// # Errors
     /// No pipeline, one that does not answer, or one that says that it cannot do what is asked.
     pub fn ask(&self, request: &Request) -> Result<Value, ClientError> {
-        let urgent = matches!(request, Request::Verb { verb, .. } if verb.is_urgent());
-        let patience = if urgent { URGENT_PATIENCE } else { ANSWER_PATIENCE };
+        let urgent = match request {
+            Request::Verb { verb, value } if verb.is_urgent() => Some((*verb, *value)),
+            _ => None,
+        };
+        let patience = if urgent.is_some() { URGENT_PATIENCE } else { ANSWER_PATIENCE };
+        match (self.ask_holder(request, patience), urgent) {
+            (
+                Err(ClientError::Socket(silent @ SocketError::Silent { .. })),
+                Some((verb, value)),
+            ) => {
+                let reply = direct::ask(&self.instance, verb, value);
+                Ok(json!(reply.map_err(|error| ClientError::Unheard { silent, error })?))
+            }
+            (answer, _) => answer,
+        }
+    }
+
+    fn ask_holder(&self, request: &Request, patience: Duration) -> Result<Value, ClientError> {
         let mut socket = OperatorClient::connect(&self.instance)?;
         let reply = socket.request_within(&json!(request), patience)?;
         match reply["error"].as_str() {

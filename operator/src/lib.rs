@@ -2,6 +2,7 @@
 //! its status. The domain holder answers; the command line, the page and software that speaks grbl ask.
 
 pub mod client;
+mod direct;
 pub mod fleet;
 pub mod queue;
 pub mod request;

@@ -26,6 +26,9 @@ pub struct QueuedJob {
     pub file: Option<String>,
     /// Changes of the job, `KEY=VALUE`.
     pub set: Vec<String>,
+    /// Whether it may read the files of its own folder only, as one that was uploaded.
+    #[serde(default)]
+    pub confined: bool,
     /// Its run folder; null before it has one.
     pub out: Option<String>,
     /// When it was submitted, in seconds since 1970.
@@ -41,8 +44,12 @@ pub struct QueuedJob {
 }
 
 /// The answer to a job that is not followed, as `graver submit --detach --json` prints it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Submitted {
     /// The job's number.
     pub number: u64,
+    /// Why the jobs that wait, and this one with them, do not begin until a person starts the queue; null while they
+    /// begin one after the other.
+    #[serde(default)]
+    pub held: Option<String>,
 }

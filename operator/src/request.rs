@@ -123,7 +123,7 @@ pub enum Verb {
     JogOn,
     /// Switch an output.
     Output,
-    /// Another power of the laser.
+    /// Another power of the laser, until the job ends.
     Power,
 }
 
@@ -142,14 +142,19 @@ pub struct VerbReply {
     pub state: String,
     /// The rate now wanted, 1 as planned.
     pub value: f64,
+    /// So many times the power that the job asks for is given, until the job ends.
+    pub power: f64,
     /// What limits the override: why the job cannot run as fast as asked; null where nothing does.
     pub capped_by: Option<String>,
+    /// Whether the controller answered past a holder that does not: of a stop and a hold.
+    #[serde(default)]
+    pub direct: bool,
 }
 
 impl VerbReply {
     /// A request that is carried out without the controller.
     pub fn accepted(state: &str) -> Self {
-        let reply = OperatorReply { accepted: 1, value: 1.0, ..OperatorReply::default() };
+        let reply = OperatorReply { accepted: 1, value: 1.0, power: 1.0, ..Default::default() };
         Self { state: state.to_owned(), ..Self::from(reply) }
     }
 
@@ -170,7 +175,9 @@ impl From<OperatorReply> for VerbReply {
             number: reply.number,
             state: ControllerState::from_wire(reply.state).name().to_owned(),
             value: reply.value,
+            power: reply.power,
             capped_by: None,
+            direct: false,
         }
     }
 }

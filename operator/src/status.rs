@@ -49,6 +49,10 @@ pub struct Status {
     pub held: bool,
     /// Rate at which the stream is played.
     pub rate: f64,
+    /// The rate that is asked for, 1 as planned; the stream is played at it where nothing holds it up.
+    pub rate_override: f64,
+    /// So many times the power that the job asks for is given, until it ends.
+    pub power_override: f64,
     /// Where the plan has the tool [m].
     pub tool: [f64; 3],
     /// Axes that know their place; all of a machine without homing.

@@ -37,6 +37,20 @@ pub enum PlanError {
         /// How many strokes and dots there are.
         strokes: u64,
     },
+    /// The place to begin with is beyond the end of its stroke.
+    #[error(
+        "stroke {stroke} is {:.4} mm long: there is no place {:.4} mm along it to begin with (marking.from_along)",
+        length * 1e3,
+        asked * 1e3
+    )]
+    NoPlace {
+        /// The stroke, from 1.
+        stroke: u64,
+        /// How far along it the job is to begin [m].
+        asked: f64,
+        /// Its length [m], 0 of a dot.
+        length: f64,
+    },
     /// A motion that would not end while anybody waits for it.
     #[error("this job would take {:.1} days, more than a week", duration / 86_400.0)]
     TooLong {
@@ -156,6 +170,7 @@ impl PlanError {
             | Self::NotOnPaper
             | Self::Abandoned
             | Self::NoStroke { .. }
+            | Self::NoPlace { .. }
             | Self::TooLong { .. } => 0,
             Self::TooShort { line, .. }
             | Self::Unreadable { line, .. }

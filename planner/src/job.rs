@@ -7,6 +7,7 @@ mod drawing_error;
 pub mod drawing_table;
 mod estimate;
 pub mod file;
+pub(crate) mod files;
 mod frame;
 mod frequency;
 pub mod gcode;
@@ -30,6 +31,7 @@ use machine::{DocumentError, Machine, Override};
 use crate::drawing::{Drawing, Power, Step, Turns};
 use crate::light::Policy;
 pub use drawing_error::DrawingError;
+use files::JobFiles;
 use gcode::GcodeError;
 
 /// A job, read and understood, but not planned.
@@ -104,6 +106,8 @@ pub struct Marking {
     pub frequency: Option<f64>,
     /// The stroke to begin with, from 1: what is marked before is left out.
     pub from_stroke: u64,
+    /// How much of that stroke is left out, from its beginning [m].
+    pub from_along: f64,
     /// Whether nothing is lit: the same motion in the dark.
     pub is_dry: bool,
     /// How the box around all of it is shown instead of marking it; `None` where it is marked.
@@ -129,9 +133,18 @@ impl Default for Marking {
             turns: Turns::default(),
             frequency: None,
             from_stroke: 1,
+            from_along: 0.0,
             is_dry: false,
             frame: None,
         }
+    }
+}
+
+impl Job {
+    /// Whether it shows where something else lies instead of marking it.
+    pub(crate) fn shows_frame(&self) -> bool {
+        let composition = self.composition.as_ref();
+        self.marking.frame.is_some() || composition.is_some_and(|composition| composition.is_frame)
     }
 }
 
@@ -158,7 +171,8 @@ pub enum JobError {
     /// The file cannot be read.
     #[error("{}: cannot be read: {cause}", path.display())]
     #[diagnostic(help(
-        "give the path of a job file (.toml) or a G-code program (.ngc, .nc, .gcode, .tap, .gc, .cnc, .g)"
+        "give the path of a job file (.toml), a G-code program (.ngc, .nc, .gcode, .tap, .gc, .cnc, .g), a drawing \
+         (.svg, .dxf, .lbrn2, .plt and their like) or an image (.png, .jpg, .bmp and their like)"
     ))]
     Unreadable {
         /// The file.
@@ -210,7 +224,7 @@ impl Job {
     /// # Errors
     /// Where it cannot be read or is not sound, with the place.
     pub fn read(path: &Path, overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
-        Self::read_up_to(path, overrides, machine, u64::MAX)
+        Self::read_up_to(path, &JobFiles::of(path, false), overrides, machine, u64::MAX)
     }
 
     /// Like [`Job::read`], but the steps of a G-code program with more than [`Job::HELD`] lines stay in
@@ -219,7 +233,7 @@ impl Job {
     /// # Errors
     /// As of [`Job::read`].
     pub fn open(path: &Path, overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
-        Self::read_up_to(path, overrides, machine, Self::HELD)
+        Self::read_up_to(path, &JobFiles::of(path, false), overrides, machine, Self::HELD)
     }
 
     /// The steps of its drawing, in order, from memory or from the program's file.
@@ -234,8 +248,11 @@ impl Job {
         Ok(self.drawing.steps.iter().cloned().map(Ok).chain(composed).chain(rest))
     }
 
-    fn read_up_to(
+    /// Reads the job at `path`, whose files are `files`; the steps of a G-code program with more than `most` lines
+    /// stay in its file.
+    pub(crate) fn read_up_to(
         path: &Path,
+        files: &JobFiles,
         overrides: &[Override],
         machine: &Machine,
         most: u64,
@@ -243,14 +260,15 @@ impl Job {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or("");
         let extension = extension.to_ascii_lowercase();
         if GCODE.contains(&extension.as_str()) {
-            return program_table::program(path, overrides, machine, most)?.framed(machine);
+            return program_table::program(path, files, overrides, machine, most)?.framed(machine);
         }
         if DRAWINGS.contains(&extension.as_str()) {
-            return drawing_table::drawing(path, overrides, machine)?.framed(machine);
+            return drawing_table::drawing(path, files, overrides, machine)?.framed(machine);
         }
         if extension != JOB_FILE {
-            if gcode::is_program(path) {
-                return program_table::program(path, overrides, machine, most)?.framed(machine);
+            if gcode::is_program(path, files) {
+                return program_table::program(path, files, overrides, machine, most)?
+                    .framed(machine);
             }
             let known = || GCODE.into_iter().chain([JOB_FILE]).chain(DRAWINGS);
             let help = match nearest(&extension, known()) {
@@ -265,11 +283,10 @@ impl Job {
             };
             return Err(JobError::UnknownExtension { path: path.to_owned(), help });
         }
-        let text = read_text(path)?;
+        let text = read_text(path, files)?;
         let name = path.display().to_string();
         let document = Document::parse(&name, &text)?.override_with(overrides, "")?;
-        let folder = path.parent().unwrap_or_else(|| Path::new(""));
-        let mut job = file::job(document, folder, machine, most)?;
+        let mut job = file::job(document, files, machine, most)?;
         job.files.push(path.to_owned());
         job.framed(machine)
     }
@@ -280,7 +297,7 @@ impl Job {
     /// Where an override is not sound.
     pub fn builtin(overrides: &[Override], machine: &Machine) -> Result<Self, JobError> {
         let document = Document::parse("letters.toml", BUILTIN)?.override_with(overrides, "")?;
-        file::job(document, Path::new(""), machine, u64::MAX)?.framed(machine)
+        file::job(document, &JobFiles::of_text(), machine, u64::MAX)?.framed(machine)
     }
 
     /// The job file called `name` with this `text`, which may name no other file.
@@ -288,7 +305,8 @@ impl Job {
     /// # Errors
     /// Where it is not sound, with the place.
     pub fn parse(name: &str, text: &str, machine: &Machine) -> Result<Self, JobError> {
-        file::job(Document::parse(name, text)?, Path::new(""), machine, u64::MAX)?.framed(machine)
+        let document = Document::parse(name, text)?;
+        file::job(document, &JobFiles::of_text(), machine, u64::MAX)?.framed(machine)
     }
 }
 
@@ -319,7 +337,7 @@ impl JobError {
 }
 
 /// The text of the file at `path`.
-fn read_text(path: &Path) -> Result<String, JobError> {
-    std::fs::read_to_string(path)
-        .map_err(|cause| JobError::Unreadable { path: path.to_owned(), cause })
+fn read_text(path: &Path, files: &JobFiles) -> Result<String, JobError> {
+    let read = || std::io::read_to_string(files.open(JobFiles::own_name(path))?);
+    read().map_err(|cause| JobError::Unreadable { path: path.to_owned(), cause })
 }

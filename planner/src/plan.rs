@@ -30,6 +30,7 @@ pub struct Plan {
     mechanism: MechanismKind,
     axes: Vec<Axis>,
     actuators: Vec<Actuator>,
+    is_frame: bool,
 }
 
 /// Plans `job` for `machine` and checks every sample against the limits of path and axes.
@@ -100,6 +101,7 @@ fn plan_within(
         mechanism: machine.mechanism.clone(),
         axes: machine.axes.clone(),
         actuators: machine.actuators.clone(),
+        is_frame: job.shows_frame(),
     })
 }
 
@@ -162,6 +164,7 @@ pub(crate) fn sampler<const N: usize, M: Mechanism<N>>(
     let (axes, actuators) = (&plan.axes, &plan.actuators);
     let sampler = Sampler::new(mechanism, axes, actuators, rest.clone(), attitude, stream);
     let mut sampler = sampler.ok()?;
+    sampler.show_frame(plan.is_frame);
     sampler.extend(trajectory, true);
     Some(sampler)
 }

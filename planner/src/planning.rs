@@ -13,6 +13,7 @@ mod open_speeds;
 pub(crate) mod operations;
 pub(crate) mod outlet;
 mod parts;
+pub(crate) mod passing;
 mod path_run;
 mod paths;
 mod plateau;
@@ -57,6 +58,7 @@ use crate::verify::interpolation::InterpolationCheck;
 use account::{Account, Asked, Slowed};
 use front::{Checkpoint, Front};
 use operations::OperationQueue;
+use passing::PassedOver;
 use trials::{Failure, Trials};
 
 /// Jobs that last longer are refused, most likely for a wrong number [s].
@@ -97,6 +99,8 @@ pub(crate) struct Task<'a> {
     pub(crate) estimate: f64,
     /// Whether nothing is lit.
     pub(crate) is_dry: bool,
+    /// Whether what is lit shows where a job lies.
+    pub(crate) is_frame: bool,
     /// Where the tool is before it [m].
     pub(crate) start: Vector3<f64>,
     /// Where the joints stand [m or rad].
@@ -204,6 +208,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
             cause,
         })?;
         sampler.tell_ahead(told_ahead(&machine.laser));
+        sampler.show_frame(task.is_frame);
         // On straight joints the cubic is the tool's own.
         let interpolates = scope == Scope::Machine && !mechanism.is_linear();
         let tolerance = limits.path.tolerance;
@@ -341,8 +346,8 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
         self.front.sampler.has_ended()
     }
 
-    /// Strokes that were passed over before the first.
-    pub(crate) fn passed_over(&self) -> u64 {
+    /// What was passed over before the first stroke.
+    pub(crate) fn passed_over(&self) -> PassedOver {
         self.operations.passed()
     }
 

@@ -1,6 +1,7 @@
 //! What the domain asks of the planner and what the planner answers besides samples: small JSON
 //! files in the run folder.
 
+use crate::job::files::JobFiles;
 use crate::job::gcode::GcodeError;
 use crate::job::{Job, JobError};
 use crate::{Plan, PlanError};
@@ -21,6 +22,10 @@ pub struct JobRequest {
     /// The offsets that people have set at the machine; null where there are none.
     #[serde(default)]
     pub offsets: Option<OffsetsFile>,
+    /// Whether it may read the files of its own folder only, as a job must that a stranger may have sent: see
+    /// [`runtime::beneath`]. Fonts are found by their names all the same.
+    #[serde(default)]
+    pub confined: bool,
 }
 
 /// A file of offsets as it was when the job was asked for: see [`machine::offsets`].
@@ -100,7 +105,7 @@ impl JobRequest {
     /// # Errors
     /// What is wrong with it, and where.
     pub fn read(&self, machine: &Machine) -> Result<Job, Refusal> {
-        self.read_by(Job::read, machine)
+        self.read_up_to(u64::MAX, machine)
     }
 
     /// Reads the job that is asked for, but leaves the steps of a long program in its file.
@@ -108,14 +113,10 @@ impl JobRequest {
     /// # Errors
     /// As of [`Self::read`].
     pub fn open(&self, machine: &Machine) -> Result<Job, Refusal> {
-        self.read_by(Job::open, machine)
+        self.read_up_to(Job::HELD, machine)
     }
 
-    fn read_by(
-        &self,
-        read: impl Fn(&Path, &[Override], &Machine) -> Result<Job, JobError>,
-        machine: &Machine,
-    ) -> Result<Job, Refusal> {
+    fn read_up_to(&self, most: u64, machine: &Machine) -> Result<Job, Refusal> {
         let overrides: Vec<Override> = self
             .set
             .iter()
@@ -128,7 +129,10 @@ impl JobRequest {
         };
         let machine = applied.as_ref().unwrap_or(machine);
         match &self.job {
-            Some(path) => read(path, &overrides, machine),
+            Some(path) => {
+                let files = JobFiles::of(path, self.confined);
+                Job::read_up_to(path, &files, &overrides, machine, most)
+            }
             None => Job::builtin(&overrides, machine),
         }
         .map_err(|error| Refusal::of_job(&error))

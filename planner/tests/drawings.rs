@@ -227,6 +227,8 @@ fn a_frame_shows_the_outline_alone() {
     let feeds = steps(&dark).into_iter().filter(|step| matches!(step.action, Action::Feed { .. }));
     assert_eq!(feeds.count(), 4);
     let lit = read(DRAWING, &["frame.shape=hull", "frame.power=1 %"]).unwrap();
+    let strong = read(DRAWING, &["frame.power=6 %"]).unwrap_err();
+    assert!(strong.to_string().contains("5 % of full power at most, not 6 %"), "{strong}");
     is_near(extent(&lit), [-40.0, -15.0, 40.0, 15.0]);
     assert_eq!(marks(&lit).len(), 4);
 }

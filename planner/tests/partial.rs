@@ -54,6 +54,76 @@ fn what_is_marked_up_to_a_stroke_and_from_it_on_is_the_whole_job_once() {
     }
 }
 
+/// Of two runs, one up to a place in a stroke and one from there on, everything is marked once.
+#[test]
+fn a_job_goes_on_from_a_place_within_a_stroke() {
+    let machine = machine(false, &[]);
+    for mode in ["M3", "M4"] {
+        let program = program(mode);
+        let whole = lit(&planned(&program, &[], &machine), [0.0; 2]);
+        // In the first, in one on the same path as others, and in the last.
+        for (stroke, along) in [(1, 0.004), (2, 0.0025), (4, 0.009)] {
+            let settings = [
+                format!("marking.from_stroke={stroke}"),
+                format!("marking.from_along=\"{} mm\"", along * 1e3),
+            ];
+            let rest = planned(&program, &settings.each_ref().map(String::as_str), &machine);
+            let mut expected = whole[stroke - 1..].to_vec();
+            let [from, to] = expected[0];
+            expected[0][0] = from + (to - from).normalize() * along;
+            assert!(are_same(&lit(&rest, [0.0; 2]), &expected), "{mode} {stroke} {along}");
+            let facts = &rest.facts;
+            assert_eq!((facts.strokes, facts.passed_over), (5 - stroke, stroke as u64 - 1));
+            assert_eq!(facts.passed_along, along);
+            let length: f64 = expected.iter().map(|[from, to]| (to - from).norm()).sum();
+            assert!((facts.length - length).abs() < 1e-9, "{facts:?}");
+            let text = format!("begins with stroke {stroke}, {:.4} mm along it", along * 1e3);
+            assert!(facts.notes.iter().any(|note| note.text.contains(&text)), "{:?}", facts.notes);
+        }
+    }
+}
+
+#[test]
+fn a_place_is_found_along_curves_and_corners_as_they_are_drawn() {
+    let machine = machine(false, &[]);
+    let program = "G21 G90 G64\nM4 S500 F3000\nG1 X10\nG1 Y10\nG3 X0 Y20 I-10\nG1 X-10\n";
+    let whole = planned(program, &[], &machine);
+    assert_eq!(whole.facts.strokes, 1);
+    // 10 mm, 10 mm, a quarter of a circle with a radius of 10 mm; then 3 mm more.
+    let along = 20.0 + 5.0 * std::f64::consts::PI + 3.0;
+    let setting = format!("marking.from_along=\"{along} mm\"");
+    let rest = planned(program, &[&setting], &machine);
+    let [from, to] = lit(&rest, [0.0; 2])[0];
+    let end = lit(&whole, [0.0; 2])[0][1];
+    assert!((from - (end + Vector3::new(7e-3, 0.0, 0.0))).norm() < 1e-6, "{from} {end}");
+    assert!((to - end).norm() < 1e-8);
+    assert!((rest.facts.length - 7e-3).abs() < 1e-6);
+}
+
+#[test]
+fn the_end_of_a_stroke_is_the_beginning_of_the_next_and_beyond_it_is_refused() {
+    let machine = machine(false, &[]);
+    let program = program("M4") + "M3 S200\nG4 P0.1\n";
+    let settings = ["marking.from_stroke=2", "marking.from_along=\"10 mm\""];
+    let rest = planned(&program, &settings, &machine);
+    assert_eq!((rest.facts.passed_over, rest.facts.passed_along, rest.facts.strokes), (2, 0.0, 3));
+    // The dot is the fifth.
+    let dot = planned(&program, &["marking.from_stroke=5"], &machine);
+    assert_eq!((dot.facts.passed_over, dot.facts.strokes), (4, 1));
+    for (stroke, along, length) in
+        [(2, "10.1", "10.0000"), (4, "11", "10.0000"), (5, "1", "0.0000")]
+    {
+        let settings =
+            [format!("marking.from_stroke={stroke}"), format!("marking.from_along=\"{along} mm\"")];
+        let job = job("program.nc", &program, &settings.each_ref().map(String::as_str), &machine);
+        let error = plan(&machine, &job).unwrap_err().to_string();
+        let expect = format!("stroke {stroke} is {length} mm long");
+        assert!(error.contains(&expect) && error.contains("marking.from_along"), "{error}");
+    }
+    let both = refused(&program, &["marking.from_line=4", "marking.from_along=\"1 mm\""], &machine);
+    assert!(both.contains("both say where to begin"), "{both}");
+}
+
 #[test]
 fn a_stroke_beyond_the_last_is_refused_with_their_number() {
     let machine = machine(false, &[]);
@@ -316,4 +386,18 @@ fn the_layers_of_a_drawing_are_told_by_name() {
     assert_eq!(names, [Some("cut"), None]);
     assert_eq!((layers[0].power, layers[0].speed, layers[0].passes), (0.4, Some(0.05), 2));
     assert!(layers.iter().all(|layer| layer.length > 1e-3 && layer.marks > 0));
+}
+
+/// The controller bounds the power of a frame after an override: each of its setpoints says that it is one.
+#[test]
+fn every_setpoint_of_a_frame_says_so_and_no_other_does() {
+    let machine = machine(false, &[]);
+    let program = program("M4");
+    let are_frames = |settings: &[&str]| -> Vec<bool> {
+        let plan = planned(&program, settings, &machine);
+        plan.setpoints(1).map(|setpoint| setpoint.has(messages::setpoint::flags::FRAME)).collect()
+    };
+    let lit = are_frames(&["marking.frame=true", "marking.frame_power=\"1 %\""]);
+    assert!(lit.len() > 100 && lit.iter().all(|is_frame| *is_frame));
+    assert!(are_frames(&[]).iter().all(|is_frame| !is_frame));
 }

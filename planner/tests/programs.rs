@@ -139,7 +139,7 @@ fn planned(text: &str) -> Result<Plan, (Option<u64>, String)> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("program.nc");
     std::fs::write(&path, text).unwrap();
-    let request = JobRequest { job: Some(path), set: Vec::new(), offsets: None };
+    let request = JobRequest { job: Some(path), set: Vec::new(), offsets: None, confined: false };
     let plan = request.plan(&Machine::builtin());
     plan.map_err(|refusal| (refusal.line, refusal.message))
 }

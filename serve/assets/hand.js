@@ -1,4 +1,4 @@
-// What an operator does by hand, besides the jog: axes and homing, the override, the probe, the test pulse, inputs and
+// What an operator does by hand, besides the jog: axes and homing, the overrides, the probe, the test pulse, inputs and
 // outputs.
 
 import { byId, make, note, setAttribute, setOptions, setText, show } from "./dom.js";
@@ -46,30 +46,31 @@ function showAxes(now) {
   setOptions(byId("probe-axis"), names.map((name) => [name, name]));
 }
 
-function startOverride() {
-  const slider = byId("override");
-  const value = byId("override-value");
-  const noteElement = byId("override-note");
+/** A slider that asks for `verb`; `told` is what the status says of it. */
+function startOverride(id, verb, told) {
+  const slider = byId(id);
+  const value = byId(`${id}-value`);
+  const noteElement = byId(`${id}-note`);
   let timer = 0;
   let isHeld = 0;
   const wanted = () => setText(value, `${slider.value} %`);
-  const request = () => ask("override", { value: Number(slider.value) / 100 }, noteElement);
+  const request = () => ask(verb, { value: Number(slider.value) / 100 }, noteElement);
   slider.addEventListener("input", () => {
     wanted();
     isHeld = performance.now();
     clearTimeout(timer);
     timer = setTimeout(request, 120);
   });
-  byId("override-100").addEventListener("click", () => {
+  byId(`${id}-100`).addEventListener("click", () => {
     slider.value = 100;
     wanted();
     request();
   });
   on("status", ({ status: now }) => {
-    // The rate falls to 0 in a hold; what is wanted stays.
-    if (now.state !== "running" || performance.now() - isHeld < 2500 || document.activeElement === slider) return;
-    if (!(now.override > 0)) return;
-    slider.value = Math.round(now.override * 100);
+    // What was just asked for is not there yet.
+    if (performance.now() - isHeld < 2500) return;
+    if (!(now[told] > 0)) return;
+    slider.value = Math.round(now[told] * 100);
     wanted();
   });
 }
@@ -177,7 +178,8 @@ function startSwitches() {
 /** Gives the controls by hand their work. */
 export function startHand() {
   on("status", ({ status: now }) => showAxes(now));
-  startOverride();
+  startOverride("override", "override", "rate_override");
+  startOverride("power-override", "power", "power_override");
   startProbe();
   startPulse();
   startSwitches();

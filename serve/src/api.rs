@@ -71,7 +71,9 @@ impl From<ClientError> for ApiError {
         let status = match error {
             // It is there, and says that this cannot be done.
             ClientError::Refused(_) => StatusCode::CONFLICT,
-            ClientError::Socket(_) | ClientError::Unreadable(_) => StatusCode::SERVICE_UNAVAILABLE,
+            ClientError::Socket(_) | ClientError::Unheard { .. } | ClientError::Unreadable(_) => {
+                StatusCode::SERVICE_UNAVAILABLE
+            }
         };
         Self::new(status, error.to_string())
     }

@@ -37,6 +37,9 @@ struct OutcomeLabel {
     outcome: String,
 }
 
+/// A gauge of a number that is not whole.
+type FloatGauge = Gauge<f64, AtomicU64>;
+
 /// All of them.
 #[derive(Debug)]
 pub struct Metrics {
@@ -49,6 +52,8 @@ pub struct Metrics {
     gate_faults: Counter,
     gate_trips: AtomicU64,
     lit: Gauge,
+    rate_override: FloatGauge,
+    power_override: FloatGauge,
     state: Family<StateLabel, Gauge>,
     faults: Family<CodeLabel, Counter>,
     jobs: Family<OutcomeLabel, Counter>,
@@ -112,6 +117,16 @@ impl Metrics {
                 "gate_open",
                 "1 while the gate of the laser is open"
             ),
+            rate_override: registered!(
+                FloatGauge::default(),
+                "rate_override",
+                "Rate that is asked for, 1 as planned"
+            ),
+            power_override: registered!(
+                FloatGauge::default(),
+                "power_override",
+                "Multiple of the power that the job asks for, until it ends"
+            ),
             state: registered!(Family::default(), "state", "1 for the state of the controller"),
             faults: registered!(
                 Family::default(),
@@ -169,6 +184,11 @@ impl Metrics {
 
     pub(crate) fn status(&self, before: Option<&Value>, now: &Value) {
         self.up.set(1);
+        for (gauge, key) in
+            [(&self.rate_override, "rate_override"), (&self.power_override, "power_override")]
+        {
+            gauge.set(now[key].as_f64().unwrap_or(1.0));
+        }
         let state = now["state"].as_str().unwrap_or("unknown");
         if before.and_then(|before| before["state"].as_str()) != Some(state) {
             self.state.clear();
@@ -242,7 +262,7 @@ mod tests {
         for gate_trips in [1, 4, 2] {
             metrics.drives(&DrivesReport { gate_trips, ..DrivesReport::default() });
         }
-        let status = |state: &str, fault: Option<&str>| json!({ "state": state, "fault": fault });
+        let status = |state: &str, fault: Option<&str>| json!({ "state": state, "fault": fault, "power_override": 0.8 });
         metrics.status(None, &status("running", None));
         metrics.status(Some(&status("running", None)), &status("faulted", Some("overload")));
         let job = |number: u64, outcome: &str| json!({ "number": number, "outcome": outcome });
@@ -270,6 +290,8 @@ mod tests {
             "graver_jobs_waiting 1",
             "graver_clients 1",
             "graver_up 1",
+            "graver_rate_override 1.0",
+            "graver_power_override 0.8",
         ] {
             assert!(text.lines().any(|it| it == line), "{line} in\n{text}");
         }

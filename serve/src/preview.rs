@@ -162,7 +162,7 @@ impl Previewer {
         is_given_up: &dyn Fn() -> bool,
     ) -> Result<(Value, String), JobError> {
         let mut command = Command::new(&self.program);
-        command.arg("plan").args(arguments).args(machine);
+        command.arg("plan").args(arguments).args(machine).arg("--confined");
         set.iter().for_each(|change| {
             command.arg(format!("--set={change}"));
         });
@@ -176,6 +176,9 @@ impl Previewer {
                 .map_err(|error| failed(error.to_string()))?;
             // Where the server keeps it is of no use to whoever sent it.
             error.file = error.file.map(|file| file_name(&file));
+            if let Some(folder) = path.parent() {
+                error.message = error.message.replace(&format!("{}/", folder.display()), "");
+            }
             return Err(error);
         }
         if !ended.status.success() {
@@ -276,8 +279,9 @@ mod tests {
         assert!(Arc::ptr_eq(&check, &previewer.check(&job, &set, &description())));
         let given = std::fs::read_to_string(folder.path().join("arguments")).unwrap();
         let job = job.display();
-        let expected =
-            format!("plan\n--json\n--machine\nmine.toml\n--set=letters.text=--json\n--\n{job}\n");
+        let expected = format!(
+            "plan\n--json\n--machine\nmine.toml\n--confined\n--set=letters.text=--json\n--\n{job}\n"
+        );
         assert_eq!(given, expected);
     }
 
@@ -294,15 +298,18 @@ mod tests {
     #[test]
     fn what_is_wrong_with_a_job_is_told_without_the_servers_paths() {
         let folder = tempfile::tempdir().unwrap();
-        let answer = r#"{"outcome":"refused","error":{"file":"/spool/1/a.ngc","line":2,"column":5,"message":"no"}}"#;
-        let previewer = Previewer::new(program(folder.path(), answer, ""));
         let job = folder.path().join("a.ngc");
+        let answer = format!(
+            r#"{{"outcome":"refused","error":{{"file":"{0}","line":2,"column":5,"message":"{0}: no"}}}}"#,
+            job.display()
+        );
+        let previewer = Previewer::new(program(folder.path(), &answer, ""));
         let check = previewer.check(&job, &[], &description());
         let error = check.error.as_ref().unwrap();
         assert_eq!((error.file.as_deref(), error.line), (Some("a.ngc"), Some(2)));
         assert!(!check.ok && check.time.is_none());
         let drawn = previewer.draw(&job, &[], &description());
-        assert_eq!(drawn.as_ref().as_ref().unwrap_err().message, "no");
+        assert_eq!(drawn.as_ref().as_ref().unwrap_err().message, "a.ngc: no");
         let none = Previewer::new(folder.path().join("none")).check(&job, &[], &description());
         assert!(none.error.as_ref().unwrap().message.contains("could not be planned"), "{none:?}");
     }

@@ -42,8 +42,8 @@ Examples, one object a line in and out, SI units and radians:
   dynamics   {\"q\": [0.2, 0], \"qd\": [0, 0], \"qdd\": [10, 10]}
   ellipse    {\"q\": [0.2, 0]}
 
-A line that asks for an impossible pose or motion gets {\"error\": {\"code\", \"detail\", ..}}, and the next line is
-answered; a line that is not such an object ends the command with exit code 2.";
+A line that asks for an impossible pose or motion gets {\"error\": {\"code\", \"detail\", ..}}, and
+the next line is answered; a line that is not such an object ends the command with exit code 2.";
 
 pub(super) const FIGURES_EXAMPLES: &str = "\
 Examples:
@@ -99,8 +99,9 @@ Examples:
   graver calibrate poses.csv --machine mine.toml --out calibrated.toml
   graver calibrate poses.csv --machine mine.toml --free legs,base
 
-poses.csv has the columns xD,yD,xE,yE,xF,yF (where the motors say the feet are) and x,y,z,qw,qx,qy,qz (the
-measured pose of the tool, with base free in the instrument's own frame), in metres, a pose a line.";
+poses.csv has the columns xD,yD,xE,yE,xF,yF (where the motors say the feet are) and
+x,y,z,qw,qx,qy,qz (the measured pose of the tool, with base free in the instrument's own frame), in
+metres, a pose a line.";
 
 pub(super) const COMPARE_EXAMPLES: &str = "\
 Examples:
@@ -124,8 +125,8 @@ Examples:
   graver submit job.ngc --detach                    its number, at once; it outlives this terminal
   graver submit jobs/letters.toml --set letters.text=S --json
 
-Ctrl-C stops the job that is followed; a second one leaves it to come to rest alone. A terminal that is closed leaves
-the job to go on.";
+Ctrl-C stops the job that is followed; a second one leaves it to come to rest alone. A terminal
+that is closed leaves the job to go on.";
 
 pub(super) const QUEUE_EXAMPLES: &str = "\
 Examples:
@@ -135,8 +136,8 @@ Examples:
   graver queue repeat 9                             job 9 once more
   graver queue start                                begin what waits after a restart, a fault or a stop
 
-The jobs are kept on disk. After a start of the pipeline, a fault or `graver stop` those that wait begin only when a
-person starts the queue.";
+The jobs are kept on disk. After a start of the pipeline, a fault or `graver stop` those that
+wait begin only when a person starts the queue.";
 
 pub(super) const SERVE_EXAMPLES: &str = "\
 Examples:

@@ -2,6 +2,7 @@
 
 use super::{AccessArguments, InstanceArguments, JobOptions, MachineArguments, PublishArguments};
 use clap::{Args, ValueEnum};
+use monitor::recording::file::parts::Extent;
 use monitor::recording::level::Level;
 use std::path::PathBuf;
 
@@ -87,18 +88,12 @@ fn size(text: &str) -> Result<u64, String> {
     bytes.filter(|bytes| *bytes > 0).ok_or_else(wrong)
 }
 
-/// Arguments of `run`.
+/// Arguments of whatever is a pipeline: its machine, its drives, what is recorded, and who may speak to it.
 #[derive(Debug, Clone, Args)]
-pub struct RunArguments {
-    /// Job: G-code, a drawing (.svg .dxf .lbrn2 .plt …), an image or a job file (.toml);
-    /// without it the machine's sample job.
-    pub job: Option<PathBuf>,
+pub struct PipelineArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub machine: MachineArguments,
-    #[command(flatten)]
-    #[allow(missing_docs)]
-    pub options: JobOptions,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub drives: DrivesArguments,
@@ -114,6 +109,27 @@ pub struct RunArguments {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub access: AccessArguments,
+}
+
+impl PipelineArguments {
+    /// How much is recorded, and how large that may grow.
+    pub fn extent(&self) -> Extent {
+        Extent { level: self.record.level(), quota: self.quota.record_quota }
+    }
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Clone, Args)]
+pub struct RunArguments {
+    /// Job: G-code, a drawing (.svg .dxf .lbrn2 .plt …), an image or a job file (.toml);
+    /// without it the machine's sample job.
+    pub job: Option<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub options: JobOptions,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub pipeline: PipelineArguments,
     /// Run folder; without it `runs/DATE-TIME-JOB`.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -187,7 +203,12 @@ pub struct StatusArguments {
 #[derive(Debug, Clone, Args)]
 pub struct OverrideArguments {
     /// Rate: "50 %" or 0.5, from 10 % to 200 %; no limit of the machine is broken for it.
-    pub rate: String,
+    #[arg(required_unless_present = "power")]
+    pub rate: Option<String>,
+    /// Power: "80 %" or 0.8 of what the job asks for, from 10 % to 200 %, never above full power; 100 % again when
+    /// the job ends.
+    #[arg(long, value_name = "POWER")]
+    pub power: Option<String>,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub instance: InstanceArguments,
@@ -201,25 +222,10 @@ pub struct DomainArguments {
     pub services: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
-    pub machine: MachineArguments,
-    #[command(flatten)]
-    #[allow(missing_docs)]
-    pub drives: DrivesArguments,
-    #[command(flatten)]
-    #[allow(missing_docs)]
-    pub access: AccessArguments,
-    #[command(flatten)]
-    #[allow(missing_docs)]
-    pub record: RecordArguments,
-    #[command(flatten)]
-    #[allow(missing_docs)]
-    pub quota: QuotaArguments,
-    #[command(flatten)]
-    #[allow(missing_docs)]
     pub publish: PublishArguments,
     #[command(flatten)]
     #[allow(missing_docs)]
-    pub instance: InstanceArguments,
+    pub pipeline: PipelineArguments,
 }
 
 /// Arguments of one service; machine and drives are the domain's.

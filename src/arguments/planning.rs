@@ -44,6 +44,10 @@ pub struct PlanArguments {
     /// --pulses and --pulse-path then write the motion of that profile.
     #[arg(long, value_enum)]
     pub profile: Option<ProfileName>,
+    /// Open only files below the job's own folder, by relative paths without `..` and symbolic links: for a job
+    /// that a stranger may have sent.
+    #[arg(long)]
+    pub confined: bool,
     /// Print one JSON object on stdout.
     #[arg(long)]
     pub json: bool,

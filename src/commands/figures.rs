@@ -140,6 +140,7 @@ fn subjects(
                     job: Some(path.to_owned()),
                     set: arguments.set.clone(),
                     offsets: None,
+                    confined: false,
                 };
                 subject.jobs = vec![subject_job(&request, &subject.machine, sources)?];
             }

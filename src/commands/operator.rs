@@ -5,16 +5,11 @@ use crate::arguments::{InstanceArguments, OverrideArguments};
 use crate::exit::{Exit, Failure};
 use crate::output::{self, say};
 use machine::quantity;
-use operator::{Request, Verb, VerbReply};
-use runtime::operator::OperatorLink;
-use runtime::socket::{ANSWER_PATIENCE, OperatorClient, SocketError};
-use runtime::{Domain, Instance, Role, message};
+use operator::{Client, Request, Verb};
+use runtime::socket::OperatorClient;
+use runtime::{Instance, message};
 use serde_json::{Value, json};
 use std::time::Duration;
-
-/// How long the supervisor may take to answer a stop or a hold, before the controller is asked past
-/// it.
-const URGENT_PATIENCE: Duration = Duration::from_secs(1);
 
 /// Asks for a verb without argument.
 ///
@@ -27,31 +22,59 @@ pub fn verb(verb: Verb, arguments: &InstanceArguments) -> Result<Exit, Failure> 
     ask(&Request::Verb { verb, value: 0.0 }, arguments)
 }
 
-/// Asks for another rate.
+/// Asks for another rate, another power, or both.
 ///
 /// # Errors
-/// A rate that is none, no pipeline, or one that refuses.
-pub fn override_rate(arguments: &OverrideArguments) -> Result<Exit, Failure> {
-    let value = quantity::read_share(&arguments.rate)
-        .map_err(|error| Failure::bad_input(format!("rate {:?}: {error}", arguments.rate)))?;
-    if !(0.1..=2.0).contains(&value) {
-        return Err(Failure::bad_input(format!(
-            "rate {}: {:.0} % is outside 10 % to 200 %",
-            arguments.rate,
-            value * 100.0
-        )));
+/// A rate or a power that is none, no pipeline, or one that refuses.
+pub fn overrides(arguments: &OverrideArguments) -> Result<Exit, Failure> {
+    let asked =
+        [("rate", Verb::Override, &arguments.rate), ("power", Verb::Power, &arguments.power)];
+    // Both are read before either is asked for.
+    let mut requests = Vec::new();
+    for (name, verb, text) in asked {
+        let Some(text) = text else { continue };
+        requests.push(Request::Verb { verb, value: read_override(name, text)? });
     }
-    ask(&Request::Verb { verb: Verb::Override, value }, &arguments.instance)
+    let Some((last, others)) = requests.split_last() else { return Ok(Exit::Done) };
+    for request in others {
+        let reply = answer(request, &arguments.instance)?;
+        if reply["accepted"].as_bool() != Some(true) {
+            return report(&reply, &arguments.instance);
+        }
+    }
+    let exit = ask(last, &arguments.instance)?;
+    if exit == Exit::Done && arguments.power.is_some() && !arguments.instance.json {
+        say!("the power is 100 % again when the job ends");
+    }
+    Ok(exit)
+}
+
+fn read_override(name: &str, text: &str) -> Result<f64, Failure> {
+    let value = quantity::read_share(text)
+        .map_err(|error| Failure::bad_input(format!("{name} {text:?}: {error}")))?;
+    if (0.1..=2.0).contains(&value) {
+        return Ok(value);
+    }
+    let percent = value * 100.0;
+    Err(Failure::bad_input(format!("{name} {text}: {percent:.0} % is outside 10 % to 200 %")))
 }
 
 fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure> {
+    report(&answer(request, arguments)?, arguments)
+}
+
+fn answer(request: &Request, arguments: &InstanceArguments) -> Result<Value, Failure> {
     let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
-    let reply = match send(request, &instance) {
-        Err(error @ SocketError::Silent { .. }) => ask_controller(request, &instance, &error)?,
-        reply => checked(reply.map_err(Failure::service)?)?,
-    };
+    let reply = Client::new(instance).ask(request).map_err(Failure::service)?;
+    if reply["direct"] == true {
+        message::tell("the pipeline's holder does not answer; the controller was asked directly");
+    }
+    Ok(reply)
+}
+
+fn report(reply: &Value, arguments: &InstanceArguments) -> Result<Exit, Failure> {
     if arguments.json {
-        output::json(&reply)?;
+        output::json(reply)?;
     }
     let state = reply["state"].as_str().unwrap_or("unknown");
     if reply["accepted"].as_bool() == Some(true) {
@@ -67,39 +90,6 @@ fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure
         message::tell(&format!("refused: {}", reply["refusal"].as_str().unwrap_or(&otherwise)));
         Ok(Exit::Stopped)
     }
-}
-
-/// Asks the controller directly when the supervisor does not answer: a stop or a hold must not fail
-/// for want of a process that moves nothing.
-fn ask_controller(
-    request: &Request,
-    instance: &Instance,
-    silent: &SocketError,
-) -> Result<Value, Failure> {
-    let Request::Verb { verb: verb @ (Verb::Stop | Verb::Hold), value } = request else {
-        return Err(Failure::service(silent));
-    };
-    let asked = || -> Result<VerbReply, String> {
-        let domain = Domain::join_within(instance, Role::Observer, Duration::ZERO);
-        let domain = domain.map_err(|error| error.to_string())?;
-        let link = OperatorLink::start(&domain).map_err(|error| error.to_string())?;
-        let reply = link.request((*verb).into(), *value).map_err(|error| error.to_string())?;
-        Ok(VerbReply::from(reply))
-    };
-    let reply = asked().map_err(|error| {
-        Failure::service(format!(
-            "{silent}; the controller could not be asked directly either: {error}"
-        ))
-    })?;
-    message::tell(&format!("{silent}; the controller was asked directly"));
-    serde_json::to_value(reply).map_err(Failure::service)
-}
-
-pub(super) fn send(request: &Request, instance: &Instance) -> Result<Value, SocketError> {
-    // A supervisor that lives answers a stop sooner, whatever the controller does.
-    let urgent = matches!(request, Request::Verb { verb: Verb::Stop | Verb::Hold, .. });
-    let patience = if urgent { URGENT_PATIENCE } else { ANSWER_PATIENCE };
-    OperatorClient::connect(instance)?.request_within(&json!(request), patience)
 }
 
 /// Asks, and waits for the answer at most `patience`.

@@ -63,6 +63,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         &input.job_overrides,
     );
     request.offsets = input.source.offsets()?;
+    request.confined = arguments.confined;
     refuse_contradictions(arguments, &input.machine)?;
     let counts = arguments.pulses.is_some() || arguments.pulse_path.is_some();
     let started = Instant::now();

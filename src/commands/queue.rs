@@ -25,15 +25,27 @@ pub fn run(command: &QueueCommand) -> Result<Exit, Failure> {
             show(&Request::Move { job: it.number, place: it.place }, &it.instance)
         }
         QueueCommand::Repeat(job) => repeat(job.number, &job.instance),
-        QueueCommand::Hold(arguments) => show(&Request::HoldQueue, arguments),
+        QueueCommand::Hold(arguments) => hold(arguments),
         QueueCommand::Start(arguments) => show(&Request::StartQueue, arguments),
     }
 }
 
 fn show(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure> {
-    let queue: Queue = ask(request, arguments)?;
+    tell(&ask(request, arguments)?, arguments)
+}
+
+fn hold(arguments: &InstanceArguments) -> Result<Exit, Failure> {
+    let queue: Queue = ask(&Request::HoldQueue, arguments)?;
+    let exit = tell(&queue, arguments)?;
+    if queue.held.is_none() && !arguments.json {
+        say!("no job waits, so nothing is held: the next job that is submitted begins at once");
+    }
+    Ok(exit)
+}
+
+fn tell(queue: &Queue, arguments: &InstanceArguments) -> Result<Exit, Failure> {
     if arguments.json {
-        output::json(&queue)?;
+        output::json(queue)?;
         return Ok(Exit::Done);
     }
     let beyond = queue.ended.len().saturating_sub(ENDED_SHOWN);
@@ -61,8 +73,16 @@ fn repeat(job: u64, arguments: &InstanceArguments) -> Result<Exit, Failure> {
         output::json(&submitted)?;
     } else {
         say!("job {} is job {job} once more", submitted.number);
+        say_held(&submitted);
     }
     Ok(Exit::Done)
+}
+
+/// Says why a job that was submitted does not begin by itself, if so.
+pub(super) fn say_held(submitted: &Submitted) {
+    if let Some(why) = &submitted.held {
+        say!("the queue is held: {why}; `graver queue start` begins what waits");
+    }
 }
 
 /// Asks the pipeline; what it cannot do is a check that failed.

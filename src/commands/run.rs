@@ -10,7 +10,6 @@ use crate::pipeline::job_run::{JobRun, job_name};
 use crate::pipeline::queue::Entry;
 use crate::pipeline::{JobSource, POLL_INTERVAL, Pipeline, ServiceOwner};
 use crate::{inputs, notify, output};
-use monitor::recording::file::parts::Extent;
 use monitor::run_folder::RunFolder;
 use runtime::{Instance, message, signal};
 use std::path::{Path, PathBuf};
@@ -22,8 +21,9 @@ use std::time::Instant;
 /// Bad input, an instance in use, a service that does not start, a folder that cannot be written.
 pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let started = Instant::now();
-    let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
-    let input = inputs::machine(&arguments.machine)?.with(&arguments.options);
+    let shared = &arguments.pipeline;
+    let instance = Instance::new(&shared.instance.instance).map_err(Failure::bad_input)?;
+    let input = inputs::machine(&shared.machine)?.with(&arguments.options);
     let mut request = inputs::job_request(
         arguments.job.as_deref(),
         &input.machine,
@@ -33,17 +33,16 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     request.offsets = input.source.offsets()?;
     // Read here only to refuse early; the planner reads it again.
     let job = request.read(&input.machine)?;
-    let sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
+    let sources = Sources::new(shared.machine.machine.as_deref(), &job.files);
     sources.spare(arguments.out.as_deref())?;
-    let extent = Extent { level: arguments.record.level(), quota: arguments.quota.record_quota };
-    let configuration = Configuration::new(input.source, &arguments.drives, extent)?;
+    let configuration = Configuration::new(input.source, &shared.drives, shared.extent())?;
     // From here on a signal brings the machine to rest before it ends anything, and a terminal that closes does not end
     // the job.
     signal::outlive_terminal().map_err(Failure::service)?;
     signal::install().map_err(Failure::service)?;
     let mut pipeline =
         Pipeline::start(&instance, &configuration, ServiceOwner::Own, JobSource::Own)?;
-    pipeline.serve(&arguments.access)?;
+    pipeline.serve(&shared.access)?;
     let folder = run_folder(arguments.out.as_deref(), Path::new("."), &job.drawing.name)?;
     let claim = Claim::of(&folder)?;
     let request = request.absolute();
@@ -55,7 +54,7 @@ pub fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     }
     pipeline.shut_down();
     drop(claim);
-    Ok(output::summary(&summary?, arguments.instance.json))
+    Ok(output::summary(&summary?, shared.instance.json))
 }
 
 fn run_folder(out: Option<&Path>, below: &Path, job: &str) -> Result<RunFolder, Failure> {
@@ -72,21 +71,21 @@ fn run_folder(out: Option<&Path>, below: &Path, job: &str) -> Result<RunFolder, 
 /// # Errors
 /// Bad input, an instance in use, a channel that fails, a service of its own that has died.
 pub fn domain(arguments: &DomainArguments) -> Result<Exit, Failure> {
-    let instance = Instance::new(&arguments.instance.instance).map_err(Failure::bad_input)?;
-    let source = inputs::machine(&arguments.machine)?.source;
+    let shared = &arguments.pipeline;
+    let instance = Instance::new(&shared.instance.instance).map_err(Failure::bad_input)?;
+    let source = inputs::machine(&shared.machine)?.source;
     // A damaged file of offsets is told before anything starts, and again with each job.
     if let Some(file) = source.offsets()? {
         file.offsets()?;
     }
-    let extent = Extent { level: arguments.record.level(), quota: arguments.quota.record_quota };
     fleet::check(&arguments.publish, &instance)?;
-    let configuration = Configuration::new(source.clone(), &arguments.drives, extent)?;
+    let configuration = Configuration::new(source.clone(), &shared.drives, shared.extent())?;
     let configuration = configuration.publishing(&arguments.publish)?;
     signal::outlive_terminal().map_err(Failure::service)?;
     signal::install().map_err(Failure::service)?;
     let owner = if arguments.services { ServiceOwner::Own } else { ServiceOwner::Others };
     let mut pipeline = Pipeline::start(&instance, &configuration, owner, JobSource::Submitted)?;
-    pipeline.serve(&arguments.access)?;
+    pipeline.serve(&shared.access)?;
     let awaited = if arguments.services { "jobs" } else { "its services and jobs" };
     let waits = format!("instance {} waits for {awaited}", instance.name());
     message::tell(&waits);

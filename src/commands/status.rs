@@ -92,9 +92,18 @@ fn show(status: &Status) {
         let strokes =
             if status.strokes > 0 { format!(" of {}", status.strokes) } else { String::new() };
         say!("stroke     {}{strokes}{line}", status.stroke);
-        say!("rate       {:.0} %", status.rate * 100.0);
+        say!(
+            "rate       {:.0} %, override {:.0} %",
+            status.rate * 100.0,
+            status.rate_override * 100.0
+        );
         let light = if status.lit { "lit" } else { "dark" };
-        say!("tool       {:.3} m/s, {light}, power {:.0} %", status.speed, status.power * 100.0);
+        let power = status.power * 100.0;
+        let overridden = status.power_override * 100.0;
+        say!(
+            "tool       {:.3} m/s, {light}, power {power:.0} %, override {overridden:.0} %",
+            status.speed
+        );
     }
     say!("axes       {}", motion::places(&status.axes, &[]));
     show_active("inputs", &status.inputs, "none active");

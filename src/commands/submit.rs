@@ -1,6 +1,7 @@
 //! Hands a job to a running pipeline, and follows it if it shall.
 
-use super::operator::{checked, send};
+use super::operator::checked;
+use super::queue::say_held;
 use crate::arguments::SubmitArguments;
 use crate::exit::{Exit, Failure};
 use crate::output::progress::{JobProgress, ProgressLine};
@@ -8,7 +9,7 @@ use crate::output::{self, say};
 use monitor::summary::Summary;
 use operator::{Part, Request, Status, Submitted};
 use planner::request::JobRequest;
-use runtime::socket::{ANSWER_PATIENCE, OperatorClient};
+use runtime::socket::{ANSWER_PATIENCE, OperatorClient, SocketError};
 use runtime::{Instance, message, signal};
 use serde_json::{Value, json};
 use std::ops::ControlFlow;
@@ -31,19 +32,21 @@ pub fn run(arguments: &SubmitArguments) -> Result<Exit, Failure> {
     let changes = arguments.options.overrides();
     let changes = changes.iter().map(|change| format!("{}={}", change.key, change.value));
     let set = arguments.set.iter().cloned().chain(changes).collect();
-    let job = JobRequest { job: Some(whole(&arguments.job)), set, offsets: None };
+    let job = JobRequest { job: Some(whole(&arguments.job)), set, offsets: None, confined: false };
     let out = Some(run_folder(arguments)?);
     if arguments.detach {
         let request = Request::Submit { job, out, detached: true };
         let reply = client.request_within(&json!(request), ANSWER_PATIENCE);
         let reply = checked(reply.map_err(Failure::service)?)?;
-        let Submitted { number } = serde_json::from_value(reply).map_err(Failure::service)?;
+        let submitted: Submitted = serde_json::from_value(reply).map_err(Failure::service)?;
         if arguments.instance.json {
-            output::json(&Submitted { number })?;
+            output::json(&submitted)?;
         } else {
+            let number = submitted.number;
             say!(
                 "job {number} waits for its turn; `graver queue list` and `graver status` tell of it"
             );
+            say_held(&submitted);
         }
         return Ok(Exit::Done);
     }
@@ -124,7 +127,7 @@ impl Follower<'_> {
         if before > 0 {
             return ControlFlow::Break(format!("job {job} comes to rest without being waited for"));
         }
-        match send(&Request::Withdraw { job }, self.instance) {
+        match withdraw(job, self.instance) {
             Ok(_) => message::tell(&format!(
                 "stopping job {job}; another Ctrl-C leaves without waiting for it"
             )),
@@ -134,4 +137,11 @@ impl Follower<'_> {
         }
         ControlFlow::Continue(())
     }
+}
+
+/// Takes a job back.
+fn withdraw(job: u64, instance: &Instance) -> Result<(), SocketError> {
+    let request = json!(Request::Withdraw { job });
+    OperatorClient::connect(instance)?.request_within(&request, ANSWER_PATIENCE)?;
+    Ok(())
 }

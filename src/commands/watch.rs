@@ -1,8 +1,9 @@
-//! `graver watch`: a live view of a pipeline in the terminal, for those who come by SSH. It asks as every operator does, and
-//! costs the machine nothing.
+//! `graver watch`: a live view of a pipeline in the terminal, for those who come by SSH. It asks as every operator does and reads
+//! samples as the page does; the machine waits for neither.
 
 mod asking;
 mod keys;
+mod observing;
 mod panel;
 mod trail;
 mod view;
@@ -16,6 +17,8 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
 use runtime::{Instance, signal};
 use std::io::{self, IsTerminal};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 use view::View;
@@ -39,6 +42,12 @@ pub fn run(arguments: &WatchArguments) -> Result<Exit, Failure> {
     let view = View::new(instance.name(), has_colour);
     let (requests, asked) = channel();
     let (news, heard) = channel();
+    let is_over = Arc::new(AtomicBool::new(false));
+    let (observed, measured, ends) = (instance.clone(), news.clone(), is_over.clone());
+    let observing = std::thread::Builder::new()
+        .name("observing".to_owned())
+        .spawn(move || observing::observe(&observed, &measured, &ends))
+        .map_err(Failure::service)?;
     let client = Client::new(instance);
     std::thread::Builder::new()
         .name("asking".to_owned())
@@ -48,6 +57,9 @@ pub fn run(arguments: &WatchArguments) -> Result<Exit, Failure> {
     let terminal = ratatui::try_init().map_err(Failure::output)?;
     let shown = show(terminal, view, &heard, &requests);
     ratatui::restore();
+    is_over.store(true, Ordering::Relaxed);
+    // One that panicked has left the domain too.
+    let _ = observing.join();
     shown.map_err(Failure::output)
 }
 
@@ -69,7 +81,7 @@ fn show(
         if key.kind == KeyEventKind::Release {
             continue;
         }
-        match keys::action(&key, view.rate()) {
+        match keys::action(&key, view.overrides()) {
             Some(Action::Leave) => return Ok(Exit::Done),
             Some(Action::Help) => view.turn_help(),
             // Who asks lives as long as this view.

@@ -56,6 +56,9 @@ impl JobProgress {
         }
         if status.state == "running" {
             details.push(format!("rate {:.0} %", status.rate * 100.0));
+            if ![0.0, 1.0].contains(&status.power_override) {
+                details.push(format!("power override {:.0} %", status.power_override * 100.0));
+            }
         }
         Self {
             share: status.share,

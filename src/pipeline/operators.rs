@@ -58,7 +58,7 @@ impl Operators {
                     })
                 }
                 Request::Submit { job, out, detached: true } => {
-                    submitted(answers.queue.submit(&job, out.as_deref(), None))
+                    answers.submitted(answers.queue.submit(&job, out.as_deref(), None))
                 }
                 Request::Submit { job, out, detached: false } => {
                     let (events, follower) = unbounded();
@@ -67,7 +67,7 @@ impl Operators {
                         Err(error) => json!({ "error": error }),
                     }
                 }
-                Request::Repeat { job } => submitted(answers.queue.repeat(job)),
+                Request::Repeat { job } => answers.submitted(answers.queue.repeat(job)),
                 Request::Queue => json!(answers.queue.list()),
                 Request::Withdraw { job } => listed(answers.queue.withdraw(job, &answers.control)),
                 Request::Move { job, place } => listed(answers.queue.move_to(job, place)),
@@ -84,14 +84,6 @@ impl Operators {
         };
         let server = OperatorServer::bind(domain, answer).map_err(Failure::service)?;
         Ok(Self { _server: server })
-    }
-}
-
-/// The answer to a job that nobody follows.
-fn submitted(number: Result<u64, String>) -> Value {
-    match number {
-        Ok(number) => json!(Submitted { number }),
-        Err(error) => json!({ "error": error }),
     }
 }
 
@@ -152,6 +144,14 @@ impl Answers {
         inputs: Option<Arc<AtomicU64>>,
     ) -> Self {
         Self { link, board, control, queue, machine: machine.clone(), inputs }
+    }
+
+    /// The answer to a job that nobody follows.
+    fn submitted(&self, number: Result<u64, String>) -> Value {
+        match number {
+            Ok(number) => json!(Submitted { number, held: self.queue.held() }),
+            Err(error) => json!({ "error": error }),
+        }
     }
 
     /// Asks the controller for a verb about axes.

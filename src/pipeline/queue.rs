@@ -54,7 +54,7 @@ impl Entry {
     /// The job as the planner is asked for it, without the offsets of its turn.
     pub fn request(&self) -> JobRequest {
         let job = self.job.file.as_ref().map(PathBuf::from);
-        JobRequest { job, set: self.job.set.clone(), offsets: None }
+        JobRequest { job, set: self.job.set.clone(), offsets: None, confined: self.job.confined }
     }
 }
 
@@ -214,12 +214,13 @@ impl JobQueue {
         let Some(job) = state.contents.find(number) else {
             return Err(format!("there is no job {number}: `graver queue list` names them"));
         };
-        let QueuedJob { name, file, set, out, .. } = job.clone();
+        let QueuedJob { name, file, set, confined, out, .. } = job.clone();
         // Beside the folder of the run before, which is kept.
         let runs = out.as_deref().map(Path::new).and_then(Path::parent);
         let runs = runs.filter(|runs| runs.file_name().is_some_and(|name| name == "runs"));
         let below = runs.and_then(Path::parent).map(Path::to_owned);
-        let job = QueuedJob { name, file, set, submitted: now(), ..QueuedJob::default() };
+        let submitted = now();
+        let job = QueuedJob { name, file, set, confined, submitted, ..QueuedJob::default() };
         let number = state.add(Entry { job, below })?;
         state.save();
         Ok(number)
@@ -370,6 +371,7 @@ fn described(job: &JobRequest, out: Option<&Path>) -> QueuedJob {
         name: super::job_run::job_name(job),
         file: job.job.as_deref().map(whole),
         set: job.set.clone(),
+        confined: job.confined,
         out: out.map(whole),
         submitted: now(),
         ..QueuedJob::default()

@@ -28,6 +28,9 @@ pub(super) fn words(reply: &OperatorReply, verb: Verb, machine: &Machine) -> Opt
         Refusal::TooLarge if unit.is_some() => {
             format!("{name} is moved by hand at {} at most, not {}", speed(limit), speed(found))
         }
+        Refusal::TooLarge if matches!(verb, Verb::Override | Verb::Power) => {
+            format!("an override is from 10 % to 200 %, not {} %", short(found * 100.0))
+        }
         Refusal::TooLarge => format!("{found} is too much: at most {limit}"),
         Refusal::TooSmall => format!("a speed of {} leads nowhere", speed(found)),
         Refusal::NotANumber => "a way or speed of 0, or none, leads nowhere".to_owned(),

@@ -110,6 +110,8 @@ impl StatusBoard {
         status.lit = progress.lit == 1;
         status.held = state == ControllerState::Holding;
         status.rate = progress.rate;
+        (status.rate_override, status.power_override) =
+            (progress.override_rate, progress.power_override);
         status.tool = progress.tool;
         let fault = progress.fault;
         // A controller that has died says nothing more: drives has stopped the machine, and says why.

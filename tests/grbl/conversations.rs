@@ -49,6 +49,31 @@ fn every_question_has_its_answer() {
 }
 
 #[test]
+fn places_are_kept_and_told_and_gone_to() {
+    let mut bench = Bench::new();
+    let kept = |bench: &mut Bench| -> Vec<String> {
+        let places = bench.ask("$#\n");
+        places.into_iter().filter(|it| it.starts_with("[G28") || it.starts_with("[G30")).collect()
+    };
+    assert_eq!(kept(&mut bench), ["[G28:100.000,100.000,0.000]", "[G30:100.000,100.000,0.000]"]);
+    for line in ["G21 G90\n", "G53 G0 X10 Y20\n", "G28.1\n", "G53 G0 X30 Y40\n", "G30.1\n"] {
+        assert_eq!(bench.ask(line), ["ok"], "{line}");
+    }
+    let expect = ["[G28:10.000,20.000,0.000]", "[G30:30.000,40.000,0.000]"];
+    assert_eq!(kept(&mut bench), expect);
+    for line in ["G28\n", "G91 G30 X0\n"] {
+        assert_eq!(bench.ask(line), ["ok"], "{line}");
+    }
+    // A reset of the controller does not lose them, a reset of the parameters does.
+    bench.pass(5.0);
+    bench.send("\x18");
+    bench.pass(1.0);
+    assert_eq!(kept(&mut bench), expect);
+    bench.ask("$RST=#\n");
+    assert_eq!(kept(&mut bench), ["[G28:100.000,100.000,0.000]", "[G30:100.000,100.000,0.000]"]);
+}
+
+#[test]
 fn a_report_tells_the_offset_first_and_then_the_overrides() {
     let mut bench = Bench::new();
     let first = bench.ask("?");

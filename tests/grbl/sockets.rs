@@ -109,6 +109,39 @@ impl<S: Read + Write> Talk<S> {
 }
 
 #[test]
+fn whoever_only_watches_stops_the_machine_all_the_same() {
+    let served = Served::new();
+    let asked = |verb: Verb| {
+        let started = Instant::now();
+        while !served.cell.0.lock().unwrap().asked.contains(&Ask::Verb { verb, value: 0.0 }) {
+            assert!(started.elapsed() < PATIENCE, "{verb:?}");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    };
+    let mut first = served.connect();
+    first.until("Grbl 1.1h");
+    first.send("G21\n");
+    first.until("ok");
+    let mut second = served.connect();
+    second.until("[MSG:another client operates");
+    second.send("!");
+    asked(Verb::Hold);
+    first.until("[MSG:another client holds the machine]");
+    // In the middle of a line of the one that operates.
+    first.send("G0 X");
+    second.send("\x18");
+    asked(Verb::Stop);
+    first.until("[MSG:another client has reset the machine]");
+    first.until("Grbl 1.1h");
+    second.until("Grbl 1.1h");
+    // It operates no more than before.
+    second.send("G0 X1\n");
+    second.until("error:9");
+    first.send("\nG21\n");
+    first.until("ok");
+}
+
+#[test]
 fn one_client_operates_and_others_watch_until_they_take_over() {
     let served = Served::new();
     let mut first = served.connect();
@@ -123,10 +156,10 @@ fn one_client_operates_and_others_watch_until_they_take_over() {
     second.until("ok");
     second.send("G0 X1\n");
     second.until("error:9");
-    second.send("!\x18");
+    second.send([0x91, b'~']);
     second.send("$G\n");
     second.until("ok");
-    assert!(served.cell.0.lock().unwrap().asked.is_empty(), "who watches stops nothing");
+    assert!(served.cell.0.lock().unwrap().asked.is_empty(), "who watches moves nothing");
     second.send("$TAKE\n");
     second.until("Grbl 1.1h");
     first.until("[MSG:another client has taken over");

@@ -223,6 +223,26 @@ fn overrides_go_to_the_machine_within_their_range() {
 }
 
 #[test]
+fn overrides_are_told_as_they_are_in_force_whoever_asked_for_them() {
+    let mut bench = Bench::new();
+    let told = |bench: &mut Bench| {
+        bench.pass(0.1);
+        // Now and then a report has the offsets instead.
+        let reports: Vec<String> = (0..30).flat_map(|_| bench.ask("?")).collect();
+        let with = reports.iter().rev().find(|report| report.contains("|Ov:")).unwrap();
+        with.split("|Ov:").nth(1).unwrap().trim_end_matches('>').to_owned()
+    };
+    bench.send([0x9B, 0x92]);
+    (bench.machine.status.rate_override, bench.machine.status.power_override) = (0.9, 0.9);
+    assert!(told(&mut bench).starts_with("90,100,90"));
+    // The job is over, and another client has asked for a rate.
+    (bench.machine.status.rate_override, bench.machine.status.power_override) = (0.55, 1.0);
+    assert!(told(&mut bench).starts_with("55,100,100"));
+    bench.send([0x93]);
+    assert_eq!(bench.machine.asked.last(), Some(&Ask::Verb { verb: Verb::Override, value: 0.56 }));
+}
+
+#[test]
 fn a_fault_is_an_alarm_that_only_a_person_clears() {
     let mut bench = Bench::new();
     bench.send(JOB);

@@ -11,7 +11,7 @@ fn contender(file: &str, height: &str) -> Contender {
     let path = format!("{}/../machines/{file}.toml", env!("CARGO_MANIFEST_DIR"));
     let machine = Machine::load(path.as_ref(), &[]).unwrap();
     let set = ["letters.text=N".to_owned(), format!("letters.height={height}")];
-    let jobs = vec![JobRequest { job: None, set: set.into(), offsets: None }];
+    let jobs = vec![JobRequest { job: None, set: set.into(), offsets: None, confined: false }];
     Contender { file: Some(file.to_owned()), plant: machine.clone(), machine, jobs }
 }
 

@@ -58,7 +58,8 @@ fn errors(machine: &Machine, plant: &Machine) -> Result<BTreeMap<u64, f64>, Simu
         std::fs::write(&path, LINES).unwrap();
         path
     });
-    let request = JobRequest { job: Some(PROGRAM.clone()), set: Vec::new(), offsets: None };
+    let request =
+        JobRequest { job: Some(PROGRAM.clone()), set: Vec::new(), offsets: None, confined: false };
     let plan = request.plan(machine).unwrap();
     let mut errors = BTreeMap::new();
     let simulated = simulate(machine, plant, &plan, PlantOptions::default(), |records| {

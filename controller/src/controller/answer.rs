@@ -178,6 +178,7 @@ impl Controller {
             finished_stream: self.intake.finished(),
             rate: command.rate,
             override_rate: self.player.asked_rate(),
+            power_override: self.player.power_override(),
             tool: command.tool,
             speed,
             power: power.fold(0.0, f64::max),

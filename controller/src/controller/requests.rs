@@ -61,6 +61,7 @@ impl Controller {
             found,
             limit,
             value: self.player.asked_rate(),
+            power: self.player.power_override(),
         }
     }
 

@@ -233,6 +233,7 @@ impl Controller {
         self.completed = completed;
         self.intake.finish();
         self.player.rewind();
+        self.player.end_power_override();
         self.light.rewind();
         self.ended = Some(self.statistics.finish(completed, self.fault));
     }

@@ -224,7 +224,13 @@ impl Watcher {
                     shared.pump(&mut core);
                     true
                 }
-                Unit::Realtime(_) => true,
+                Unit::Realtime(realtime) => {
+                    if core.session.stop_by_watcher(realtime, shared.now()) {
+                        shared.pump(&mut core);
+                    }
+                    let is_reset = realtime == Realtime::Reset;
+                    !is_reset || client.sink.send(format!("\r\n{GREETING}\r\n").into_bytes())
+                }
                 Unit::TooLong => client.sink.line("error:11"),
                 Unit::Line(line) => self.line(&line, number, client, shared, &mut core),
             };

@@ -1,6 +1,6 @@
 //! Realtime commands: single bytes that are taken out of whatever they stand in, and carried out at once.
 
-use operator::Verb;
+use operator::{Status, Verb};
 
 use super::{Overrides, Purpose, Session, Waiting};
 use crate::codes::Alarm;
@@ -180,16 +180,32 @@ impl Session {
             Realtime::JogCancel => self.cancel_jog(),
             Realtime::Rate(change) => {
                 self.overrides.rate = changed(self.overrides.rate, change);
-                self.ask_verb(Verb::Override, f64::from(self.overrides.rate) / 100.0);
+                self.ask_override(Verb::Override, self.overrides.rate);
             }
             Realtime::Power(change) => {
                 self.overrides.power = changed(self.overrides.power, change);
-                self.ask_verb(Verb::Power, f64::from(self.overrides.power) / 100.0);
+                self.ask_override(Verb::Power, self.overrides.power);
             }
             // A rapid is as fast as the machine may, and a hold is dark anyway.
             Realtime::Rapid | Realtime::LaserStop => {}
             Realtime::Air => self.toggle_air(),
         }
+    }
+
+    /// What stops the machine, from a client that only watches: everybody may stop it. Other commands are not for
+    /// it, and whether this one was.
+    pub fn stop_by_watcher(&mut self, realtime: Realtime, now: f64) -> bool {
+        let words = match realtime {
+            Realtime::Hold | Realtime::Door => "another client holds the machine",
+            Realtime::Reset => "another client has reset the machine",
+            Realtime::JogCancel => "another client has cancelled the jog",
+            _ => return false,
+        };
+        self.now = now;
+        self.message(words);
+        self.realtime(realtime);
+        self.go_on();
+        true
     }
 
     /// Feed hold: of a job, or of what will be one; a jog is given up.
@@ -226,11 +242,34 @@ impl Session {
         }
         if self.overrides != Overrides::NONE {
             self.overrides = Overrides::NONE;
-            self.ask_quietly(Verb::Override, 1.0);
-            self.ask_quietly(Verb::Power, 1.0);
+            self.ask_override(Verb::Override, 100);
+            self.ask_override(Verb::Power, 100);
         }
         self.reader.reset();
         self.greet();
+    }
+
+    fn ask_override(&mut self, verb: Verb, percent: u8) {
+        let ask = Ask::Verb { verb, value: f64::from(percent) / 100.0 };
+        self.ask(ask, Purpose::Override);
+    }
+
+    /// Takes over what is in force: others ask for overrides too, and that of the power ends with the job.
+    pub(super) fn follow_overrides(&mut self, status: &Status) {
+        let is_asked = self.purposes.iter().any(|(_, purpose)| *purpose == Purpose::Override);
+        // What the machine has accepted shows in a status that counts it.
+        let is_shown = status.requests.wrapping_sub(self.override_number) < u32::MAX / 2;
+        if is_asked || !is_shown {
+            return;
+        }
+        let percent = |value: f64, before: u8| match (value * 100.0).round() {
+            percent if percent >= f64::from(RANGE.0) => percent.min(f64::from(RANGE.1)) as u8,
+            _ => before,
+        };
+        self.overrides = Overrides {
+            rate: percent(status.rate_override, self.overrides.rate),
+            power: percent(status.power_override, self.overrides.power),
+        };
     }
 
     /// What was asked for `purpose` and is not answered yet is to be stopped if it begins all the same.

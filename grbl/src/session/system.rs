@@ -57,7 +57,7 @@ impl Session {
                 format!("[OPT:VL,{BLOCKS},{WINDOW}]"),
             ],
             "G" => vec![report::modes(&self.reader, &self.settings)],
-            "#" => report::places(&self.reader, &self.settings, self.machine.home, self.probed),
+            "#" => report::places(&self.reader, &self.settings, self.probed),
             "N" => vec!["$N0=".to_owned(), "$N1=".to_owned()],
             _ => return None,
         })
@@ -111,6 +111,7 @@ impl Session {
         if what != "$" {
             self.reader.set_origins(self.machine.gcode.origins);
             self.reader.clear_shift();
+            self.reader.forget_kept();
         }
         self.message("Restoring defaults");
         self.ok();

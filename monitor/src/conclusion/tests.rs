@@ -246,13 +246,18 @@ fn a_job_that_was_stopped_is_judged_by_what_it_had_come_to_and_says_where_to_go_
     assert_eq!((marks.missing, marks.strokes_lost, marks.double), (0.0, 0, 0.0), "{marks:?}");
     assert!((marks.length + left.length - 2.0 * LENGTH).abs() < 1e-12, "{left:?}");
     assert_eq!((left.strokes_done, left.strokes, left.from_stroke), (6, 8, 7));
-    assert!((left.begun - marks.length).abs() < 1e-9 && left.begun > 0.01, "{left:?}");
-    let place = left.place.unwrap();
-    assert_eq!((place.stroke, place.line, place.upper), (7, Some(1), [LENGTH, 0.0, 0.0]));
-    assert!((place.position[0] - left.begun).abs() < 1e-12, "{place:?}");
+    assert!((left.along - marks.length).abs() < 1e-9 && left.along > 0.01, "{left:?}");
+    let place = summary.place.as_ref().unwrap();
+    assert_eq!((place.stroke, place.line), (7, Some(1)));
+    assert_eq!(place.bounds, Some([[0.0; 3], [LENGTH, 0.0, 0.0]]));
+    assert!((place.tool.unwrap()[0] - left.along).abs() < 1e-12, "{place:?}");
     let text = summary.text();
     assert!(text.contains("left              6 of 8 strokes done, 10."), "{text}");
-    assert!(text.contains("go on with --set marking.from_stroke=7"), "{text}");
+    assert!(
+        text.contains("go on with --set marking.from_stroke=7 --set marking.from_along=\"10."),
+        "{text}"
+    );
+    assert!(text.contains("ended at          line 1, stroke 7, drawn in x 0.0 µm to"), "{text}");
     // One that was played to its end has nothing left.
     let whole = examined(FIRST..=LAST + LIGHT_LAG);
     assert_eq!(summary_of(&ended(report()), Some(&whole)).left, None);

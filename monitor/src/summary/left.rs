@@ -1,10 +1,13 @@
 //! What a job that was not played to its end has left, and where to go on.
 
 use super::text::length;
-use crate::marks::{DrawnPlace, MarkEvaluation};
+use crate::marks::MarkEvaluation;
 use messages::plan::PlanFacts;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// A shorter beginning of a stroke is none [m].
+const NOTHING: f64 = 1e-7;
 
 /// What was not due yet when a job ended. Strokes are counted as the whole job has them, those included that it was
 /// told to pass over (`marking.from_stroke`).
@@ -22,52 +25,8 @@ pub struct LeftSummary {
     pub is_whole: bool,
     /// The stroke to go on with, from 1: the first that is not done. `--set marking.from_stroke=N` begins there.
     pub from_stroke: u64,
-    /// How much of that stroke is marked already [m]: it is marked again where the job goes on with it.
-    pub begun: f64,
-    /// Where in the drawing the job ended; null where nothing more was planned.
-    pub place: Option<PlaceSummary>,
-}
-
-/// A place in the drawing, machine frame.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PlaceSummary {
-    /// The stroke, from 1, as the whole job counts them.
-    pub stroke: u64,
-    /// Line of the job file that it comes from; null where it has none.
-    pub line: Option<u64>,
-    /// The place on it [m].
-    pub position: [f64; 3],
-    /// The lower corner of the box around the stroke [m].
-    pub lower: [f64; 3],
-    /// The upper corner [m].
-    pub upper: [f64; 3],
-}
-
-impl PlaceSummary {
-    fn of(place: DrawnPlace, stroke: u64) -> Self {
-        let DrawnPlace { line, position, bounds: [lower, upper] } = place;
-        Self { stroke, line: (line > 0).then_some(line), position, lower, upper }
-    }
-}
-
-impl core::fmt::Display for PlaceSummary {
-    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let Self { stroke, line, position, lower, upper } = self;
-        let millimetres = |value: f64| format!("{:.3}", value * 1e3);
-        write!(formatter, "stroke {stroke}")?;
-        if let Some(line) = line {
-            write!(formatter, " of line {line}")?;
-        }
-        let flat = position[2] == 0.0 && lower[2] == 0.0 && upper[2] == 0.0;
-        let axes = if flat { 2 } else { 3 };
-        let named = || ["x", "y", "z"].into_iter().take(axes).enumerate();
-        let at = named().map(|(axis, name)| format!("{name} {}", millimetres(position[axis])));
-        let within = named().map(|(axis, name)| {
-            format!("{name} {} to {}", millimetres(lower[axis]), millimetres(upper[axis]))
-        });
-        let [at, within] = [at.collect::<Vec<_>>(), within.collect()].map(|parts| parts.join(", "));
-        write!(formatter, ", at {at} mm; it lies within {within} mm")
-    }
+    /// How much of that stroke is marked already [m]: `--set marking.from_along=…` goes on behind it.
+    pub along: f64,
 }
 
 impl LeftSummary {
@@ -85,15 +44,15 @@ impl LeftSummary {
             strokes,
             is_whole: plan.is_whole,
             from_stroke: done + 1,
-            begun: left.begun,
-            place: left.place.map(|place| PlaceSummary::of(place, done + 1)),
+            // Of the first stroke a part may have been marked in a run before this.
+            along: left.begun + if left.stroke == 1 { plan.passed_along } else { 0.0 },
         })
     }
 }
 
 impl core::fmt::Display for LeftSummary {
     fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let Self { marked, strokes_done, strokes, from_stroke, begun, is_whole, .. } = self;
+        let Self { marked, strokes_done, strokes, from_stroke, along, is_whole, .. } = self;
         let marked = length(*marked);
         // Of a job that was not planned to its end nobody knows the whole.
         if *is_whole {
@@ -106,8 +65,8 @@ impl core::fmt::Display for LeftSummary {
             write!(formatter, "{strokes_done} strokes done, {marked} marked")?;
         }
         write!(formatter, "; go on with --set marking.from_stroke={from_stroke}")?;
-        if *begun > 0.0 {
-            write!(formatter, " (its first {} are marked)", length(*begun))?;
+        if *along > NOTHING {
+            write!(formatter, " --set marking.from_along=\"{:.4} mm\"", along * 1e3)?;
         }
         Ok(())
     }
@@ -140,18 +99,20 @@ mod tests {
 
     #[test]
     fn a_job_that_went_on_from_a_stroke_counts_those_before_it_as_done() {
-        let bounds = [[0.01, 0.02, 0.0], [0.05, 0.03, 0.0]];
-        let place = DrawnPlace { line: 42, position: [0.0123, 0.02, 0.0], bounds };
-        let left = Left { stroke: 5, begun: 0.0032, place: Some(place), length: 40.5 };
+        let left = Left { stroke: 5, begun: 0.0032, place: None, length: 40.5 };
         let plan =
             PlanFacts { strokes: 240, passed_over: 100, is_whole: true, ..PlanFacts::default() };
         let told = LeftSummary::of(&evaluation(Some(left)), &plan).unwrap();
         let expect = "104 of 340 strokes done, 1200.000 mm marked, 40500.000 mm left; go on with --set \
-                      marking.from_stroke=105 (its first 3.200 mm are marked)";
+                      marking.from_stroke=105 --set marking.from_along=\"3.2000 mm\"";
         assert_eq!(told.to_string(), expect);
-        let expect = "stroke 105 of line 42, at x 12.300, y 20.000 mm; it lies within x 10.000 to 50.000, \
-                      y 20.000 to 30.000 mm";
-        assert_eq!(told.place.unwrap().to_string(), expect);
+        // One that is stopped again in the stroke that it goes on with.
+        let plan = PlanFacts { passed_along: 0.0032, ..plan };
+        let again = |stroke| {
+            let left = Left { stroke, begun: 0.0001, ..left };
+            LeftSummary::of(&evaluation(Some(left)), &plan).unwrap().along
+        };
+        assert_eq!((again(1), again(2)), (0.0001 + 0.0032, 0.0001));
         let done = Left { stroke: 241, ..Left::default() };
         assert_eq!(LeftSummary::of(&evaluation(Some(done)), &plan), None);
         assert_eq!(LeftSummary::of(&evaluation(None), &plan), None);

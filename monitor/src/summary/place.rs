@@ -12,9 +12,10 @@ pub struct JobPlace {
     pub file: Option<String>,
     /// Its line, from 1; null where the job has none.
     pub line: Option<u64>,
-    /// The stroke that was marked last, from 1; 0 before the first.
+    /// The stroke that was marked last, from 1, as the whole job counts them; 0 before the first.
     pub stroke: u64,
-    /// Where the plan had the tool, machine frame; null of a job that did not move [m].
+    /// Where on the drawing it ended, as far as the marks tell it, else where the plan had the tool; machine frame, null
+    /// of a job that did not move [m].
     pub tool: Option<[f64; 3]>,
     /// The box around what the line, or the stroke, draws: its lower and its upper corner, machine frame; null where that is
     /// not known [m].

@@ -40,6 +40,7 @@ pub fn rows(summary: &Summary) -> Vec<(String, String)> {
     rows.run_outcome(summary);
     rows.job(summary);
     rows.times(summary);
+    rows.power_override(summary.power_override);
     rows.binding(&summary.binding);
     rows.marks(summary.marks.as_ref());
     rows.add("left", summary.left.map(|left| left.to_string()).unwrap_or_default());
@@ -70,11 +71,8 @@ impl Rows {
         if let Some(error) = &summary.error {
             self.add("error", error.to_string());
         }
-        // The marks tell it more exactly than what was last heard of the job.
-        match (summary.left.and_then(|left| left.place), &summary.place) {
-            (Some(place), _) => self.add("ended in", place.to_string()),
-            (None, Some(place)) => self.add("ended at", place.to_string()),
-            (None, None) => {}
+        if let Some(place) = &summary.place {
+            self.add("ended at", place.to_string());
         }
     }
 
@@ -114,6 +112,14 @@ impl Rows {
             "wall time",
             format!("{wall:.3} s, planning {plan_time:.3} s, report {report_time:.3} s"),
         );
+    }
+
+    fn power_override(&mut self, [least, most]: [f64; 2]) {
+        let [least, most] = [least, most].map(|share| (share * 100.0).round());
+        let range = if least == most { format!("{least}") } else { format!("{least} to {most}") };
+        if [least, most] != [100.0; 2] {
+            self.add("power override", format!("{range} %, 100 % again after the job"));
+        }
     }
 
     fn marks(&mut self, marks: Option<&Marks>) {

@@ -45,6 +45,17 @@ pub(crate) struct Demand {
     pub(crate) line: u64,
 }
 
+/// A stretch of a contour that is lit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Light {
+    /// Where it begins, by the contour's parameter [m].
+    pub(crate) from: f64,
+    /// Where it ends [m].
+    pub(crate) to: f64,
+    /// Line of the job file where it begins, 0 for none.
+    pub(crate) line: u64,
+}
+
 /// How the next curve may be joined to a contour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Joining {
@@ -222,14 +233,20 @@ impl Contour {
         self.is_lit
     }
 
-    /// What is asked for where each stretch of light begins in it; the first goes on from the contour before
-    /// if that `was_lit` at its end.
-    pub(crate) fn strokes(&self, mut was_lit: bool) -> impl Iterator<Item = &Demand> {
-        self.demands.iter().filter(move |demand| {
+    /// Its stretches of light, each from dark to dark, in order.
+    pub(crate) fn lights(&self) -> Vec<Light> {
+        let mut lights: Vec<Light> = Vec::new();
+        let mut was_lit = false;
+        for (demand, to) in self.stretches() {
             let is_lit = demand.power > 0.0;
-            let was_lit = core::mem::replace(&mut was_lit, is_lit);
-            is_lit && !was_lit
-        })
+            match lights.last_mut() {
+                Some(last) if is_lit && was_lit => last.to = to,
+                _ if is_lit => lights.push(Light { from: demand.from, to, line: demand.line }),
+                _ => {}
+            }
+            was_lit = is_lit;
+        }
+        lights
     }
 
     /// Whether it is lit at its end.

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 
 use super::cloud::{self, Cloud, Glass, Height};
 use super::file::Reading;
+use super::files::JobFiles;
 use super::whole::whole;
 use super::{Job, JobError, frequency};
 use crate::drawing::Drawing;
@@ -73,9 +74,9 @@ table! {
 /// The job that marks a cloud.
 pub(super) fn read(table: &CloudTable, mut reading: Reading<'_>) -> Result<Job, JobError> {
     let power = reading.beside.marking.level();
-    let (folder, machine) = (reading.folder, reading.machine);
-    let drawing = draw(table, folder, power, &mut reading.diagnostics, machine)?;
-    let files = table.file.iter().map(|file| folder.join(&file.value)).collect();
+    let (files, machine) = (reading.files, reading.machine);
+    let drawing = draw(table, files, power, &mut reading.diagnostics, machine)?;
+    let files = table.file.iter().map(|file| files.path(&file.value)).collect();
     let mut job = Job { files, ..reading.job_of(drawing) };
     if let Some(frequency) = pulse_rate(table, &mut reading) {
         job.marking.frequency = Some(frequency);
@@ -99,13 +100,13 @@ fn pulse_rate(table: &CloudTable, reading: &mut Reading<'_>) -> Option<f64> {
 /// The drawing of a cloud; what is wrong with the table goes to `diagnostics`.
 fn draw(
     table: &CloudTable,
-    folder: &Path,
+    files: &JobFiles,
     power: f64,
     diagnostics: &mut Diagnostics,
     machine: &Machine,
 ) -> Result<Drawing, DocumentError> {
     let line = diagnostics.position(table.span).map_or(0, |(line, _)| line as u64);
-    let mut points = points(table, folder, diagnostics);
+    let mut points = points(table, files, diagnostics);
     let glass = glass(table, diagnostics);
     if let (Some(glass), Height::Apparent) = (&glass, table.z.value) {
         points.iter_mut().for_each(|point| point.z = glass.true_height(point.z));
@@ -137,13 +138,18 @@ const MOST_POINTS: u64 = 10_000_000;
 /// The largest seed: what a number in TOML holds without rounding, 2⁵³.
 const LARGEST_SEED: u64 = 1 << 53;
 
-fn points(table: &CloudTable, folder: &Path, diagnostics: &mut Diagnostics) -> Vec<Vector3<f64>> {
+fn points(
+    table: &CloudTable,
+    files: &JobFiles,
+    diagnostics: &mut Diagnostics,
+) -> Vec<Vector3<f64>> {
     let at = table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
     match (&table.file, &table.sphere) {
         (Some(file), None) => {
-            let path = folder.join(&file.value);
+            let path = files.path(&file.value);
             let unit = table.unit.as_ref().map(|unit| unit.value);
-            let points = std::fs::read(&path)
+            let points = files
+                .read(&file.value)
                 .map_err(|error| {
                     (error.to_string(), "a path is relative to the job file's folder".to_owned())
                 })

@@ -37,6 +37,8 @@ pub struct Composition {
     frequency: f64,
     /// How often all of it is marked, at least 1.
     repeat: u32,
+    /// Whether it shows where the drawings lie instead of marking them.
+    pub(crate) is_frame: bool,
 }
 
 /// What is marked in one way, in order.

@@ -9,7 +9,8 @@ use nalgebra::Vector3;
 use super::composition::tables::{DrawingTable, FrameTable, LayerTable, OrderTable};
 use super::composition::{Composed, Defaults, Part, Parts, compose};
 use super::file::Reading;
-use super::marking_table::MarkingTable;
+use super::files::JobFiles;
+use super::marking_table::{MarkingTable, check_frame_power};
 use super::workpiece_table::{self, AttitudeTable, SurfaceTable};
 use super::{Job, JobError, frequency, gcode};
 use crate::drawing::{Drawing, Power};
@@ -54,7 +55,7 @@ fn of_tables<'a>(
     reading: Reading<'a>,
 ) -> Result<Job, JobError> {
     let name = reading.stem("drawing");
-    let Reading { beside, diagnostics, folder, machine, .. } = reading;
+    let Reading { beside, diagnostics, files, machine, .. } = reading;
     let parts = Parts {
         drawings: tables.map(|table| Part { table, file: None }).collect(),
         layers: beside.layers.as_ref(),
@@ -62,12 +63,13 @@ fn of_tables<'a>(
         frame: beside.frame.as_ref(),
         defaults: defaults(&beside.marking, machine),
     };
-    of_drawings(&parts, &name, &beside.marking, diagnostics, folder, machine)
+    of_drawings(&parts, &name, &beside.marking, diagnostics, files, machine)
 }
 
 /// Reads the drawing at `path` as a job of its own, with `overrides` of its tables.
 pub(super) fn drawing(
     path: &Path,
+    files: &JobFiles,
     overrides: &[Override],
     machine: &Machine,
 ) -> Result<Job, JobError> {
@@ -81,15 +83,14 @@ pub(super) fn drawing(
         table.surface.and_then(|table| workpiece_table::surface(&table, &mut diagnostics));
     let on_surface = workpiece_table::flat(machine, surface.as_ref());
     let parts = Parts {
-        drawings: vec![Part { table: &table.drawing, file: Some(path) }],
+        drawings: vec![Part { table: &table.drawing, file: Some(JobFiles::own_name(path)) }],
         layers: table.layers.as_ref(),
         order: table.order.as_ref(),
         frame: table.frame.as_ref(),
         defaults: defaults(&table.marking, machine),
     };
     let name = gcode::name(&path.display().to_string());
-    let folder = Path::new("");
-    let job = of_drawings(&parts, &name, &table.marking, diagnostics, folder, &on_surface)?;
+    let job = of_drawings(&parts, &name, &table.marking, diagnostics, files, &on_surface)?;
     Ok(workpiece_table::place(job, surface, table.attitude.as_ref(), home))
 }
 
@@ -114,14 +115,17 @@ fn of_drawings(
     name: &str,
     marking: &MarkingTable,
     mut diagnostics: Diagnostics,
-    folder: &Path,
+    files: &JobFiles,
     machine: &Machine,
 ) -> Result<Job, JobError> {
     if let (Some(frame), true) = (parts.frame, marking.frame.value) {
         let text = "[frame] and `marking.frame` both show where the drawing lies".to_owned();
         diagnostics.contradict(frame.span, text, "keep one of them");
     }
-    let Composed { composition, notes, files } = compose(parts, folder, machine, &mut diagnostics)?;
+    if let Some(power) = parts.frame.and_then(|frame| frame.power.as_ref()) {
+        check_frame_power(power, machine, &mut diagnostics);
+    }
+    let Composed { composition, notes, files } = compose(parts, files, machine, &mut diagnostics)?;
     let start = Vector3::from(machine.home);
     let drawing = Drawing { name: name.to_owned(), start, steps: Vec::new(), notes };
     let mut job = Job {

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 use super::cloud_table::{self, CloudTable};
 use super::composition::tables::{DrawingTable, FrameTable, LayerTable, OrderTable};
 use super::drawing_table;
+use super::files::JobFiles;
 use super::letters_table::{self, LettersTable};
 use super::marking_table::MarkingTable;
 use super::path_table::{self, PathTable};
@@ -89,8 +90,8 @@ pub(super) struct Reading<'a> {
     pub(super) beside: &'a JobTable,
     /// Where what is wrong goes.
     pub(super) diagnostics: Diagnostics,
-    /// Where relative paths start.
-    pub(super) folder: &'a Path,
+    /// The files that it may read.
+    pub(super) files: &'a JobFiles,
     /// The steps of a program with more lines stay in its file.
     pub(super) most: u64,
     /// For which machine; its home is the middle of the surface where there is one.
@@ -125,11 +126,10 @@ pub fn schema() -> String {
     schema_text::<JobTable>("Graver job file")
 }
 
-/// Reads a job file whose text is in `document`; `folder` is where its relative paths start. The steps
-/// of a program with more than `most` lines stay in its file.
+/// Reads a job file whose text is in `document`, with its `files`. The steps of a program with more than `most` lines stay in its file.
 pub(super) fn job(
     document: Document,
-    folder: &Path,
+    files: &JobFiles,
     machine: &Machine,
     most: u64,
 ) -> Result<Job, JobError> {
@@ -143,7 +143,7 @@ pub(super) fn job(
     others.for_each(|place| {
         diagnostics.contradict(place, "a job marks one thing".to_owned(), &one_of("keep"));
     });
-    let reading = Reading { beside: &table, diagnostics, folder, most, machine: &machine };
+    let reading = Reading { beside: &table, diagnostics, files, most, machine: &machine };
     let job = match table.places().len() {
         0 | 1 => read(reading)?,
         _ => reading.diagnostics.fail()?,

@@ -33,7 +33,8 @@ impl Job {
         let top = self.marking.max_speed.unwrap_or(machine.path.speed);
         let steps = steps(&bounds, &frame, [rapid, top]);
         let drawing = Drawing { steps, notes, ..self.drawing };
-        let marking = Marking { speed: None, policy: None, from_stroke: 1, ..self.marking };
+        let marking =
+            Marking { speed: None, policy: None, from_stroke: 1, from_along: 0.0, ..self.marking };
         Ok(Self {
             marking,
             rapid: self.rapid,

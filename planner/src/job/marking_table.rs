@@ -32,6 +32,8 @@ table! {
         pub policy: Option<Spanned<Policy>>,
         /// The stroke to begin with, from 1, as after a job that was stopped.
         pub from_stroke: Number<Positive> = 1.0,
+        /// The place on that stroke to begin with, from its beginning: what is marked already.
+        pub from_along: Option<Quantity<Length, Positive>>,
         /// The line of a G-code program to begin with, from 1: with all that the lines before it leave in
         /// force, and by a free move to the place where it begins.
         pub from_line: Option<Number<Positive>>,
@@ -73,6 +75,10 @@ impl MarkingTable {
         self.check_frame(machine, diagnostics);
         let Some(line) = &self.from_line else { return };
         whole(line, 1..=MOST, "from_line", diagnostics);
+        if let Some(along) = &self.from_along {
+            let text = "`from_line` and `from_along` both say where to begin".to_owned();
+            diagnostics.contradict(along.span, text, "keep one of them");
+        }
         if self.from_stroke.value > 1.0 {
             let text = "`from_line` and `from_stroke` both say where to begin".to_owned();
             diagnostics.contradict(line.span, text, "keep one of them");
@@ -85,23 +91,7 @@ impl MarkingTable {
             let text = "`frame_power` is for the frame, and none is shown".to_owned();
             diagnostics.contradict(power.span, text, "write `frame = true`, or leave it out");
         }
-        let percent = |share: f64| format!("{} %", (share * 1e5).round() / 1e3);
-        let (most, least) = (machine.operating.safety.frame_power, machine.laser.min_power);
-        let found = percent(power.value);
-        let (text, help) = if power.value > most {
-            let most = percent(most);
-            let help = format!(
-                "write at most {most}, or allow more by `safety.frame_power` of the machine file"
-            );
-            (format!("a frame is shown with {most} of full power at most, not {found}"), help)
-        } else if power.value < least {
-            let least = percent(least);
-            let help = format!("write at least {least}, or leave it out: the frame is dark then");
-            (format!("the laser gives no less than {least} (`laser.min_power`), not {found}"), help)
-        } else {
-            return;
-        };
-        diagnostics.refuse(ProblemKind::OutOfRange, power.span, text, Some(help));
+        check_frame_power(power, machine, diagnostics);
     }
 
     /// The frame that is shown instead of marking, if one is.
@@ -138,6 +128,7 @@ impl MarkingTable {
             turns: Turns::default(),
             frequency: self.frequency.as_ref().map(frequency::of),
             from_stroke: self.from_stroke.value as u64,
+            from_along: self.from_along.as_ref().map_or(0.0, |along| along.value),
             is_dry: self.dry_run.value,
             frame: self.frame(),
         }
@@ -147,4 +138,29 @@ impl MarkingTable {
     pub(super) fn level(&self) -> f64 {
         self.power.as_ref().map_or(1.0, |power| power.value)
     }
+}
+
+/// Refuses a power of a frame beyond what the machine allows, and one that its source does not give.
+pub(super) fn check_frame_power(
+    power: &Fraction<Positive>,
+    machine: &Machine,
+    diagnostics: &mut Diagnostics,
+) {
+    let percent = |share: f64| format!("{} %", (share * 1e5).round() / 1e3);
+    let (most, least) = (machine.operating.safety.frame_power, machine.laser.min_power);
+    let found = percent(power.value);
+    let (text, help) = if power.value > most {
+        let most = percent(most);
+        let help = format!(
+            "write at most {most}, or allow more by `safety.frame_power` of the machine file"
+        );
+        (format!("a frame is shown with {most} of full power at most, not {found}"), help)
+    } else if power.value < least {
+        let least = percent(least);
+        let help = format!("write at least {least}, or leave it out: the frame is dark then");
+        (format!("the laser gives no less than {least} (`laser.min_power`), not {found}"), help)
+    } else {
+        return;
+    };
+    diagnostics.refuse(ProblemKind::OutOfRange, power.span, text, Some(help));
 }

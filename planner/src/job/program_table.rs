@@ -8,6 +8,7 @@ use machine::{Machine, Override, table};
 use nalgebra::Vector3;
 
 use super::file::Reading;
+use super::files::JobFiles;
 use super::marking_table::MarkingTable;
 use super::{Job, JobError, gcode};
 use crate::drawing::{Drawing, Note};
@@ -38,16 +39,17 @@ table! {
 
 /// The job that is a program.
 pub(super) fn read(table: &GcodeTable, reading: Reading<'_>) -> Result<Job, JobError> {
-    let Reading { beside, diagnostics, folder, most, machine } = reading;
-    let path = folder.join(&table.file.value);
+    let Reading { beside, diagnostics, files, most, machine } = reading;
     let words = table.over(machine.gcode.words);
-    of_program(&path, words, &beside.marking, diagnostics, machine, most)
+    let name = Path::new(&table.file.value);
+    of_program((files, name), words, &beside.marking, diagnostics, machine, most)
 }
 
 /// Reads the G-code program at `path` as a job of its own, with `overrides` of `[marking]`; the steps of
 /// one with more than `most` lines stay in the file.
 pub(super) fn program(
     path: &Path,
+    files: &JobFiles,
     overrides: &[Override],
     machine: &Machine,
     most: u64,
@@ -56,11 +58,12 @@ pub(super) fn program(
     let (table, mut diagnostics) = empty.override_with(overrides, "")?.decode::<ProgramTable>()?;
     table.marking.check(machine, &mut diagnostics);
     let words = table.gcode.over(machine.gcode.words);
-    of_program(path, words, &table.marking, diagnostics, machine, most)
+    let own = JobFiles::own_name(path);
+    of_program((files, own), words, &table.marking, diagnostics, machine, most)
 }
 
 fn of_program(
-    path: &Path,
+    (files, file): (&JobFiles, &Path),
     words: WordMeanings,
     marking: &MarkingTable,
     mut diagnostics: Diagnostics,
@@ -76,7 +79,8 @@ fn of_program(
     }
     diagnostics.finish(())?;
     let from_line = marking.first_line();
-    let (program, steps) = gcode::ProgramFile::open(path, words, from_line, machine, most)?;
+    let (program, steps) = gcode::ProgramFile::open(files, file, words, from_line, machine, most)?;
+    let path = files.path(file);
     let survey = program.survey.clone();
     let begins = from_line.map(|line| Note {
         line,
@@ -94,7 +98,7 @@ fn of_program(
         program: Some(survey.facts),
         survey: Some(survey),
         rest,
-        files: vec![path.to_owned()],
+        files: vec![path],
         marking: marking.marking(),
         ..Job::of(drawing)
     })

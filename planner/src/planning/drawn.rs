@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::account::widen;
 use super::{Draft, Planning};
-use crate::geometry::contour::Contour;
+use crate::geometry::contour::{Contour, Light};
 
 /// How far a chord may lie from the curve in the artwork [m]: a little less than promised, for
 /// rounding.
@@ -33,23 +33,9 @@ pub(super) fn dot(at: &Vector3<f64>, line: u64) -> ArtworkLine {
 /// The lines that a contour marks, each from light to dark; the first goes on from the contour before if
 /// that `was_lit` at its end.
 fn strokes(contour: &Contour, was_lit: bool) -> Vec<ArtworkLine> {
-    let mut strokes = Vec::new();
-    let mut open: Option<(f64, f64, u64)> = None;
-    let mut close = |(from, to, line): (f64, f64, u64)| {
+    let line = |Light { from, to, line }: Light| {
         let stroke = Stroke { points: contour.points(from, to, CHORD), line };
-        strokes.push(ArtworkLine { goes_on: was_lit && from == 0.0, stroke });
+        ArtworkLine { goes_on: was_lit && from == 0.0, stroke }
     };
-    for (demand, to) in contour.stretches() {
-        open = match (open, demand.power > 0.0) {
-            (Some((from, _, line)), true) => Some((from, to, line)),
-            (None, true) => Some((demand.from, to, demand.line)),
-            (Some(line), false) => {
-                close(line);
-                None
-            }
-            (None, false) => None,
-        };
-    }
-    open.into_iter().for_each(&mut close);
-    strokes
+    contour.lights().into_iter().map(line).collect()
 }

@@ -8,10 +8,11 @@ use machine::PathLimits;
 
 use crate::drawing::{Note, Step};
 use crate::error::{Place, PlanError};
-use crate::geometry::contour::{Contour, GAP};
+use crate::geometry::contour::Contour;
 use crate::geometry::operation::{OffSurface, Operation, OperationKind};
 use crate::geometry::operations::Operations;
 use crate::job::JobError;
+use crate::planning::passing::{Passed, PassedOver, Passing};
 
 /// Steps of a job in order; the last may be an error.
 pub(crate) type Steps<'a> = Box<dyn Iterator<Item = Result<Step, JobError>> + 'a>;
@@ -26,31 +27,30 @@ pub(crate) struct OperationQueue<'a> {
     is_read: bool,
     /// What is passed over, until the stroke to begin with comes.
     passes: Option<Passing>,
-    /// Strokes that were passed over before it.
-    passed: u64,
-}
-
-/// Passes over what comes before a stroke.
-struct Passing {
-    /// The stroke to begin with, from 1, and how many have been passed over.
-    begins: u64,
-    passed: u64,
-    /// Whether the last path was lit at its end.
-    was_lit: bool,
-    limits: PathLimits,
+    /// What was passed over before it.
+    passed: PassedOver,
 }
 
 impl<'a> OperationQueue<'a> {
     /// Of `steps`, which `operations` takes.
     pub(crate) fn new(steps: Steps<'a>, operations: Operations<'a>) -> Self {
         let made = VecDeque::new();
-        Self { steps, operations, made, first: 0, is_read: false, passes: None, passed: 0 }
+        Self {
+            steps,
+            operations,
+            made,
+            first: 0,
+            is_read: false,
+            passes: None,
+            passed: PassedOver::default(),
+        }
     }
 
-    /// Begins with this stroke, from 1; what is marked before is left out. `limits` are those of paths.
-    pub(crate) fn beginning_with(self, begins: u64, limits: &PathLimits) -> Self {
-        let passes = Passing { begins, passed: 0, was_lit: false, limits: *limits };
-        Self { passes: (begins > 1).then_some(passes), ..self }
+    /// Begins with this stroke, from 1, and `along` it [m]; what is marked before is left out. `limits` are those of
+    /// paths.
+    pub(crate) fn beginning_with(self, begins: u64, along: f64, limits: &PathLimits) -> Self {
+        let is_begun = begins > 1 || along > 0.0;
+        Self { passes: is_begun.then(|| Passing::new(begins, along, limits)), ..self }
     }
 
     /// The operation with this number, from 0; `None` behind the last.
@@ -86,9 +86,9 @@ impl<'a> OperationQueue<'a> {
         self.first += count;
     }
 
-    /// Strokes that were passed over before the first.
-    pub(crate) fn passed(&self) -> u64 {
-        self.passes.as_ref().map_or(self.passed, |passing| passing.passed)
+    /// What was passed over before the first stroke.
+    pub(crate) fn passed(&self) -> PassedOver {
+        self.passes.as_ref().map_or(self.passed, Passing::passed)
     }
 
     /// What a person should know of what has been made so far.
@@ -101,11 +101,11 @@ impl<'a> OperationQueue<'a> {
             if let Some(operation) = self.operations.next() {
                 match &mut self.passes {
                     None => return Ok(Some(operation)),
-                    Some(passing) => match passing.pass(operation) {
+                    Some(passing) => match passing.pass(operation)? {
                         Passed::Over => continue,
                         Passed::On(operation) => return Ok(Some(operation)),
                         Passed::Begun(operation) => {
-                            self.passed = passing.passed;
+                            self.passed = passing.passed();
                             self.passes = None;
                             return Ok(Some(operation));
                         }
@@ -113,11 +113,9 @@ impl<'a> OperationQueue<'a> {
                 }
             }
             if self.is_read {
-                return match &self.passes {
+                return match &mut self.passes {
                     None => Ok(None),
-                    Some(Passing { begins, passed, .. }) => {
-                        Err(PlanError::NoStroke { asked: *begins, strokes: *passed })
-                    }
+                    Some(passing) => Err(passing.not_found()),
                 };
             }
             match self.steps.next() {
@@ -128,51 +126,6 @@ impl<'a> OperationQueue<'a> {
                 None => {
                     self.is_read = true;
                     self.operations.finish().map_err(off_surface)?;
-                }
-            }
-        }
-    }
-}
-
-/// What comes of an operation before the stroke to begin with.
-enum Passed {
-    /// It is left out.
-    Over,
-    /// It is done all the same.
-    On(Operation),
-    /// It begins with the stroke.
-    Begun(Operation),
-}
-
-impl Passing {
-    fn pass(&mut self, operation: Operation) -> Passed {
-        let line = operation.line;
-        match &operation.kind {
-            OperationKind::Output { .. } | OperationKind::Frequency(_) => Passed::On(operation),
-            OperationKind::Rapid(_) | OperationKind::Rest(_) | OperationKind::Pause => Passed::Over,
-            OperationKind::Dot(_) => {
-                self.passed += 1;
-                if self.passed == self.begins { Passed::Begun(operation) } else { Passed::Over }
-            }
-            OperationKind::Path(contour) => {
-                let was_lit = self.was_lit && contour.goes_on_from_before();
-                self.was_lit = contour.ends_lit();
-                let before = (self.begins - self.passed - 1) as usize;
-                let Some(demand) = contour.strokes(was_lit).nth(before) else {
-                    self.passed += contour.strokes(was_lit).count() as u64;
-                    return Passed::Over;
-                };
-                if demand.from <= GAP && !contour.goes_on_from_before() {
-                    return Passed::Begun(operation);
-                }
-                let line = if demand.line == 0 { line } else { demand.line };
-                match contour.rest_from(demand.from, &self.limits) {
-                    Some(rest) => {
-                        let kind = OperationKind::Path(Arc::new(rest));
-                        Passed::Begun(Operation { kind, line })
-                    }
-                    // Shorter than anything that is marked.
-                    None => Passed::Over,
                 }
             }
         }

@@ -66,11 +66,17 @@ pub(crate) fn plan_windows(
         frequency: job.marking.frequency.unwrap_or(0.0),
         estimate,
         is_dry: job.marking.is_dry,
+        is_frame: job.shows_frame(),
         start: drawing.start,
     };
     let source = operations(machine, job, &limits)?;
-    if job.marking.from_stroke > 1 {
-        let text = format!("begins with stroke {}, as the job says", job.marking.from_stroke);
+    let (stroke, along) = (job.marking.from_stroke, job.marking.from_along);
+    if stroke > 1 || along > 0.0 {
+        let along = match along {
+            0.0 => String::new(),
+            along => format!(", {:.4} mm along it", along * 1e3),
+        };
+        let text = format!("begins with stroke {stroke}{along}, as the job says");
         notes.push(Note { line: 0, text });
     }
     if job.marking.is_dry {
@@ -109,7 +115,7 @@ pub(crate) fn operations<'a>(
         |error: JobError| PlanError::Unreadable { line: 0, message: error.to_string() };
     let steps: Steps<'a> = Box::new(job.steps().map_err(unreadable)?);
     let queue = OperationQueue::new(steps, of_steps(machine, job, limits));
-    Ok(queue.beginning_with(job.marking.from_stroke, limits))
+    Ok(queue.beginning_with(job.marking.from_stroke, job.marking.from_along, limits))
 }
 
 /// What makes operations of the steps of `job`.
@@ -141,7 +147,8 @@ impl Facts<'_> {
         PlanFacts {
             name: self.name.to_owned(),
             strokes: account.strokes as usize,
-            passed_over: planning.passed_over(),
+            passed_over: planning.passed_over().strokes,
+            passed_along: planning.passed_over().along,
             is_whole: planning.is_complete(),
             length: account.length,
             duration: planning.duration(),

@@ -204,6 +204,11 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         self.told_ahead = time / SETPOINT_TIME;
     }
 
+    /// Says of each sample whether what is lit shows where a job lies.
+    pub(crate) fn show_frame(&mut self, is_frame: bool) {
+        self.blank.flags = if is_frame { flags::FRAME } else { 0 };
+    }
+
     /// Goes on with `more`, which begins where the motion known so far ends; `is_last` says that nothing
     /// comes after it.
     pub(crate) fn extend(&mut self, more: &Trajectory, is_last: bool) {

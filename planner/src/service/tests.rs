@@ -73,7 +73,7 @@ impl Bench {
     /// Offers the built-in job with settings, small enough to be planned at once.
     fn offer(&mut self, stream: u64, set: &[&str]) {
         let set = set.iter().map(ToString::to_string).collect();
-        let request = JobRequest { job: None, set, offsets: None };
+        let request = JobRequest { job: None, set, offsets: None, confined: false };
         let path = self.folder.path().join(run_folder::REQUEST);
         std::fs::write(path, serde_json::to_vec(&request).unwrap()).unwrap();
         let folder = self.folder.path().to_str().unwrap();
@@ -100,7 +100,12 @@ impl Bench {
     fn offer_program(&mut self, stream: u64, text: &str) -> PathBuf {
         let program = self.folder.path().join("program.nc");
         std::fs::write(&program, text).unwrap();
-        let request = JobRequest { job: Some(program.clone()), set: Vec::new(), offsets: None };
+        let request = JobRequest {
+            job: Some(program.clone()),
+            set: Vec::new(),
+            offsets: None,
+            confined: false,
+        };
         let path = self.folder.path().join(run_folder::REQUEST);
         std::fs::write(path, serde_json::to_vec(&request).unwrap()).unwrap();
         let folder = self.folder.path().to_str().unwrap();

@@ -135,7 +135,7 @@ pub(crate) async fn submit(
     let Changes { set } = parse(&body)?;
     check_changes(&set).map_err(ApiError::bad)?;
     let path = context.spool.path(&id)?;
-    let job = JobRequest { job: Some(path), set, offsets: None };
+    let job = JobRequest { job: Some(path), set, offsets: None, confined: true };
     let reply = ask(&context, Request::Submit { job, out: None, detached: true }).await?;
     number(&reply)
 }

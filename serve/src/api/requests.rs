@@ -15,7 +15,7 @@ use serde::Deserialize;
 pub(crate) struct Arguments {
     /// Axes by name: of `home` any number, of `jog`, `jog-on`, `step` and `probe` one.
     pub axes: Vec<String>,
-    /// The first number: rate of `override`, speed of `jog` [m/s or rad/s], number of the reply to the jog that
+    /// The first number: rate of `override`, power of `power` as a multiple of what the job asks for, speed of `jog` [m/s or rad/s], number of the reply to the jog that
     /// `jog-on` goes on with, way of `step` and `probe` [m or rad], power of `test-pulse` (0 to 1).
     pub value: Option<f64>,
     /// The second number: speed of `step` and `probe` [m/s or rad/s], time of `test-pulse` [s].
@@ -45,7 +45,7 @@ pub(crate) enum Form {
 }
 
 /// All verbs by name.
-pub(crate) const VERBS: [(&str, Form); 15] = [
+pub(crate) const VERBS: [(&str, Form); 16] = [
     ("enable", Form::Plain(Verb::Enable)),
     ("disable", Form::Plain(Verb::Disable)),
     ("hold", Form::Plain(Verb::Hold)),
@@ -53,6 +53,7 @@ pub(crate) const VERBS: [(&str, Form); 15] = [
     ("stop", Form::Plain(Verb::Stop)),
     ("reset", Form::Plain(Verb::Reset)),
     ("override", Form::Value(Verb::Override)),
+    ("power", Form::Value(Verb::Power)),
     ("home", Form::Axes(Verb::Home)),
     ("jog", Form::Axis(Verb::Jog, 1)),
     ("jog-on", Form::Axis(Verb::JogOn, 1)),
@@ -142,6 +143,11 @@ mod tests {
                 json!({"request": "verb", "verb": "override", "value": 0.5}),
             ),
             (
+                "power",
+                json!({"value": 0.8}),
+                json!({"request": "verb", "verb": "power", "value": 0.8}),
+            ),
+            (
                 "step",
                 json!({"axes": ["x"], "value": 0.01, "second": 0.1, "unit": "m"}),
                 json!({"request": "operate", "verb": "step", "axes": ["x"], "value": 0.01, "second": 0.1, "unit": "m"}),
@@ -174,6 +180,7 @@ mod tests {
         }
         for (name, arguments, word) in [
             ("override", json!({}), "value"),
+            ("power", json!({}), "value"),
             ("jog", json!({"value": 1.0}), "axes"),
             ("jog", json!({"axes": ["x", "y"], "value": 1.0}), "not 2"),
             ("step", json!({"axes": ["x"], "value": 1.0}), "second"),

@@ -24,7 +24,7 @@ impl Operated {
         // What holds it afterwards only is a stop that this program must not undo.
         let held = self.queue()?.held;
         let request = Request::Submit { job, out: None, detached: true };
-        let Submitted { number } = self.client.ask_for(&request)?;
+        let Submitted { number, .. } = self.client.ask_for(&request)?;
         let queue = self.queue()?;
         let is_alone = queue.waiting.iter().all(|job| job.number == number);
         if queue.held.is_some() && queue.held == held && is_alone {
@@ -47,7 +47,7 @@ impl Operated {
             }
             Ask::Output { name, is_on } => self.verb(&Request::Output { name, is_on }),
             Ask::Submit { file, set } => {
-                self.submit(JobRequest { job: Some(file), set, offsets: None })
+                self.submit(JobRequest { job: Some(file), set, offsets: None, confined: true })
             }
             Ask::Withdraw { job } => {
                 self.client.ask(&Request::Withdraw { job })?;

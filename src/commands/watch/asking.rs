@@ -1,6 +1,8 @@
 //! The thread that asks: the status ten times a second, and what keys ask for as soon as they are pressed.
 
+use monitor::latency::HopLatency;
 use operator::{Client, ClientError, Queue, Request, Status, VerbReply};
+use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::Duration;
 
@@ -17,6 +19,8 @@ pub(super) enum News {
     Status(Box<Status>),
     /// The jobs that wait.
     Jobs(Box<Queue>),
+    /// The latencies of the hops since they are measured.
+    Latencies(BTreeMap<String, HopLatency>),
     /// No pipeline, or one that does not answer.
     Silence(String),
     /// What became of a key's request.

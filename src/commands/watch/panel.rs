@@ -1,8 +1,10 @@
 //! What is said in words, line by line; the gravest first, because a small terminal shows the first only.
 
+use monitor::latency::HopLatency;
 use monitor::run_folder::local_time;
 use monitor::summary::text::duration;
 use operator::{Queue, Status};
+use std::collections::BTreeMap;
 
 /// Past faults that are shown.
 const FAULTS: usize = 3;
@@ -43,8 +45,39 @@ pub(super) fn state(status: &Status) -> Line {
     line("state", text, tone)
 }
 
+/// A latency in three digits [ns].
+fn short(latency: u64) -> String {
+    let latency = latency as f64;
+    let (value, unit) = match latency {
+        ..999.5e3 => (latency / 1e3, "µs"),
+        999.5e3..999.5e6 => (latency / 1e6, "ms"),
+        _ => (latency / 1e9, "s"),
+    };
+    let digits = if value < 9.995 { 2 } else { usize::from(value < 99.95) };
+    format!("{value:.digits$}{unit}")
+}
+
+/// Median, 99 of 100 and the longest of each hop.
+fn latency_lines(latencies: &BTreeMap<String, HopLatency>) -> Vec<Line> {
+    let row = |cells: [&str; 4]| {
+        let [hop, p50, p99, max] = cells;
+        line("latency", format!("{hop:<9}{p50:>7}{p99:>7}{max:>7}"), Tone::Plain)
+    };
+    let hops = latencies.iter().map(|(hop, it)| {
+        let [p50, p99, max] = [it.p50, it.p99, it.max].map(short);
+        row([hop, &p50, &p99, &max])
+    });
+    let hops: Vec<Line> = hops.collect();
+    let head = (!hops.is_empty()).then(|| row(["", "p50", "p99", "max"]));
+    head.into_iter().chain(hops).collect()
+}
+
 /// The rest.
-pub(super) fn lines(status: &Status, jobs: &Queue) -> Vec<Line> {
+pub(super) fn lines(
+    status: &Status,
+    jobs: &Queue,
+    latencies: &BTreeMap<String, HopLatency>,
+) -> Vec<Line> {
     let mut lines = Vec::new();
     if let Some(fault) = &status.fault {
         lines.push(line("fault", fault.clone(), Tone::Bad));
@@ -69,9 +102,19 @@ pub(super) fn lines(status: &Status, jobs: &Queue) -> Vec<Line> {
         let at = status.line.map_or(String::new(), |line| format!(", line {line}"));
         lines.push(line("stroke", format!("{}{of}{at}", status.stroke), Tone::Plain));
     }
-    lines.push(line("rate", format!("{:.0} %", status.rate * 100.0), Tone::Plain));
+    let overridden = |share: f64| match (share * 100.0).round() {
+        100.0 | 0.0 => String::new(),
+        percent => format!(", override {percent} %"),
+    };
+    let rate = format!("{:.0} %{}", status.rate * 100.0, overridden(status.rate_override));
+    lines.push(line("rate", rate, Tone::Plain));
     let light = if status.lit { "lit" } else { "dark" };
-    let laser = format!("{light}, {:.0} %, {:.1} mm/s", status.power * 100.0, status.speed * 1e3);
+    let laser = format!(
+        "{light}, {:.0} %{}, {:.1} mm/s",
+        status.power * 100.0,
+        overridden(status.power_override),
+        status.speed * 1e3
+    );
     lines.push(line("laser", laser, if status.lit { Tone::Busy } else { Tone::Plain }));
     if !jobs.waiting.is_empty() {
         let count = jobs.waiting.len();
@@ -89,6 +132,7 @@ pub(super) fn lines(status: &Status, jobs: &Queue) -> Vec<Line> {
     }
     let tone = if status.overruns > 0 { Tone::Busy } else { Tone::Plain };
     lines.push(line("cycles", format!("{}, {} overruns", status.cycles, status.overruns), tone));
+    lines.extend(latency_lines(latencies));
     let pids = status.services.iter().filter_map(|(name, pid)| Some(format!("{name} {}", (*pid)?)));
     lines.extend(pids.map(|text| line("service", text, Tone::Plain)));
     for fault in status.faults.iter().rev().take(FAULTS) {
@@ -137,18 +181,41 @@ mod tests {
             fault: Some("following error of x".to_owned()),
             services: [("drives".to_owned(), None), ("planner".to_owned(), Some(7))].into(),
             unhomed: vec!["x".to_owned()],
+            power_override: 0.8,
             ..Status::default()
         };
         let jobs = Queue {
             waiting: vec![QueuedJob { name: "badge".to_owned(), ..QueuedJob::default() }],
             ..Queue::default()
         };
-        let lines = lines(&status, &jobs);
+        let lines = lines(&status, &jobs, &BTreeMap::new());
         assert!(lines.iter().any(|line| line.text == "1: badge"));
+        assert!(lines.iter().any(|line| line.text == "dark, 0 %, override 80 %, 0.0 mm/s"));
         let names: Vec<_> = lines.iter().map(|line| line.name).collect();
         assert_eq!(names[..3], ["fault", "missing", "not homed"]);
         assert_eq!((lines[1].text.as_str(), lines[1].tone), ("drives", Tone::Bad));
         assert!(lines.iter().any(|line| line.text == "planner 7"));
+    }
+
+    #[test]
+    fn latencies_are_told_hop_by_hop_in_the_width_that_there_is() {
+        let of = |p50, p99, max| HopLatency { count: 9, min: 1, p50, p99, p999: p99, max };
+        let latencies = BTreeMap::from([
+            ("loop".to_owned(), of(1_000_400, 1_002_000, 12_345_678)),
+            ("setpoint".to_owned(), of(1_400_897_500, 999_499, 99_950)),
+            ("wake".to_owned(), of(3, 18_340, 129_600)),
+        ]);
+        let lines = lines(&Status::default(), &Queue::default(), &latencies);
+        let told: Vec<_> =
+            lines.iter().filter(|line| line.name == "latency").map(|line| &line.text).collect();
+        let expected = [
+            "             p50    p99    max",
+            "loop      1.00ms 1.00ms 12.3ms",
+            "setpoint   1.40s  999µs  100µs",
+            "wake      0.00µs 18.3µs  130µs",
+        ];
+        assert_eq!(told, expected);
+        assert!(told.iter().all(|text| text.chars().count() <= 30));
     }
 
     #[test]

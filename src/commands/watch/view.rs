@@ -4,6 +4,7 @@ use super::asking::News;
 use super::keys;
 use super::panel::{self, Tone};
 use super::trail::Trail;
+use monitor::latency::HopLatency;
 use operator::{Queue, Status};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -12,6 +13,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::canvas::{Canvas, Line as CanvasLine};
 use ratatui::widgets::{Block, Clear, Paragraph};
+use std::collections::BTreeMap;
 
 /// Narrower than this there is no room for the path beside the words.
 const WIDE: u16 = 60;
@@ -35,8 +37,8 @@ pub(super) struct View {
     /// What became of the last key.
     answer: String,
     trail: Trail,
-    /// The rate that the job is to be played at, also while it is held.
-    rate: f64,
+    /// Of the hops, by name.
+    latencies: BTreeMap<String, HopLatency>,
     has_help: bool,
 }
 
@@ -51,7 +53,7 @@ impl View {
             silence: Some("asking".to_owned()),
             answer: String::new(),
             trail: Trail::default(),
-            rate: 1.0,
+            latencies: BTreeMap::new(),
             has_help: false,
         }
     }
@@ -61,23 +63,20 @@ impl View {
         match news {
             News::Status(status) => {
                 self.trail.follow(&status);
-                // A rate on its way to a hold or back is none to go on from.
-                let before = self.status.as_ref().map_or(0.0, |status| status.rate);
-                if status.state == "running" && status.rate == before {
-                    self.rate = status.rate;
-                }
                 self.status = Some(*status);
                 self.silence = None;
             }
             News::Jobs(jobs) => self.jobs = *jobs,
+            News::Latencies(latencies) => self.latencies = latencies,
             News::Silence(why) => self.silence = Some(why),
             News::Answer(text) => self.answer = text,
         }
     }
 
-    /// The rate that the job is to be played at.
-    pub(super) fn rate(&self) -> f64 {
-        self.rate
+    /// The overrides of rate and power, also while the job is held.
+    pub(super) fn overrides(&self) -> [f64; 2] {
+        let overrides = |status: &Status| [status.rate_override, status.power_override];
+        self.status.as_ref().map_or([1.0; 2], overrides)
     }
 
     /// Shows the help, or hides it.
@@ -132,7 +131,7 @@ impl View {
     }
 
     fn draw_words(&self, frame: &mut Frame<'_>, area: Rect, status: &Status) {
-        let lines: Vec<_> = panel::lines(status, &self.jobs)
+        let lines: Vec<_> = panel::lines(status, &self.jobs, &self.latencies)
             .into_iter()
             .map(|line| {
                 let name = Span::styled(format!("{:10}", line.name), Modifier::DIM);

@@ -103,6 +103,7 @@ impl SeriesLetter {
                 format!("marking.speed={speed}"),
             ],
             offsets: None,
+            confined: false,
         }
     }
 }

@@ -32,7 +32,7 @@ fn shipped(name: &str) -> String {
 /// A short job.
 fn letters(machine: &Machine) -> Job {
     let set = vec!["letters.text=N".to_owned(), "letters.height=10 mm".to_owned()];
-    JobRequest { job: None, set, offsets: None }.read(machine).unwrap()
+    JobRequest { job: None, set, offsets: None, confined: false }.read(machine).unwrap()
 }
 
 fn sized(text: &str, catalogue: &Catalogue, options: &Options) -> (SizeReport, Option<String>) {

@@ -83,7 +83,7 @@ message! {
         1 stream plain "stream that it belongs to",
         2 sequence plain "position in the stream, from 0",
         3 published plain "when the planner published it [ns on the clock of the log time]",
-        4 flags plain "1 last, 2 pause",
+        4 flags plain "1 last, 2 pause, 4 lit for a frame",
         5 outputs plain "what the job has switched on, one bit each",
         6 stroke plain "stroke being marked from here on, from 1; 0 for none",
         7 tool plain "tool centre point in the machine frame [m]",

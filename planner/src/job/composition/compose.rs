@@ -18,6 +18,7 @@ use super::tables::{DrawingTable, FrameTable, LayerTable, OrderTable, OrderWord}
 use super::{Composition, Mark, MarkShape, Recipe, Section, frame, placement};
 use crate::drawing::{Note, Power};
 use crate::job::JobError;
+use crate::job::files::JobFiles;
 use crate::job::whole::whole;
 
 /// The most repetitions of a job.
@@ -35,7 +36,7 @@ pub(in crate::job) struct Parts<'a> {
 /// One drawing.
 pub(in crate::job) struct Part<'a> {
     pub(in crate::job) table: &'a DrawingTable,
-    /// Its file where that is the job itself, whose lines are told then.
+    /// The name of its file where that is the job itself, whose lines are told then.
     pub(in crate::job) file: Option<&'a Path>,
 }
 
@@ -47,14 +48,13 @@ pub(in crate::job) struct Composed {
     pub(in crate::job) files: Vec<PathBuf>,
 }
 
-/// Composes `parts`, whose files are found from `folder`; what is wrong with the tables goes to
-/// `diagnostics`.
+/// Composes `parts` with the files of the job; what is wrong with the tables goes to `diagnostics`.
 ///
 /// # Errors
 /// Where a file cannot be read.
 pub(in crate::job) fn compose(
     parts: &Parts<'_>,
-    folder: &Path,
+    job_files: &JobFiles,
     machine: &Machine,
     diagnostics: &mut Diagnostics,
 ) -> Result<Composed, JobError> {
@@ -67,12 +67,12 @@ pub(in crate::job) fn compose(
         let line = diagnostics.position(table.span).map_or(0, |(line, _)| line as u64);
         let layer = layer_of(table, &layers, diagnostics);
         let count = placement::count(table, diagnostics);
-        let Some(serial) = serial(table, folder, count, diagnostics) else { continue };
+        let Some(serial) = serial(table, job_files, count, diagnostics) else { continue };
         let csv = table.serial.as_ref().and_then(|serial| serial.csv.as_ref());
-        files.extend(csv.map(|file| folder.join(&file.value)));
-        let Some(source) = Source::of(part, folder, diagnostics) else { continue };
-        files.extend(source.file().map(Path::to_owned));
-        let first = source.graphic(&serial, 0, diagnostics)?;
+        files.extend(csv.map(|file| job_files.path(&file.value)));
+        let Some(source) = Source::of(part, job_files, diagnostics) else { continue };
+        files.extend(source.file().map(|name| job_files.path(name)));
+        let first = source.graphic(&serial, 0, job_files, diagnostics)?;
         notes.extend(first.notes.iter().map(|note| Note {
             line: if part.file.is_some() { note.line } else { line },
             text: source.note(&note.text),
@@ -87,7 +87,7 @@ pub(in crate::job) fn compose(
         let mut graphic = first;
         for (place, flat) in places.flat.iter().enumerate() {
             if place > 0 && source.changes() {
-                graphic = source.graphic(&serial, place, diagnostics)?;
+                graphic = source.graphic(&serial, place, job_files, diagnostics)?;
             }
             layers.add(&Placed {
                 graphic: &graphic,
@@ -146,6 +146,7 @@ pub(in crate::job) fn compose(
     }
     maker.note_saved();
     let composition = Composition {
+        is_frame: parts.frame.is_some(),
         sections: sections.into(),
         frequency: parts.defaults.frequency,
         repeat: repeat as u32,
@@ -175,12 +176,12 @@ fn layer_of(
 
 fn serial(
     table: &DrawingTable,
-    folder: &Path,
+    job_files: &JobFiles,
     places: usize,
     diagnostics: &mut Diagnostics,
 ) -> Option<Serial> {
     match &table.serial {
-        Some(serial) => Serial::new(serial, folder, places, diagnostics),
+        Some(serial) => Serial::new(serial, job_files, places, diagnostics),
         None => Some(Serial::plain()),
     }
 }

@@ -1,10 +1,9 @@
 //! What stands for {n} and {column} in texts and codes.
 
-use std::path::Path;
-
 use machine::document::{Diagnostics, Spanned};
 
 use super::tables::SerialTable;
+use crate::job::files::JobFiles;
 use crate::job::whole::whole;
 
 /// The largest number: what a number in TOML holds without rounding, 2⁵³.
@@ -29,7 +28,7 @@ impl Serial {
     /// Reads `table` for so many `places`; what is wrong with it goes to `diagnostics`.
     pub(super) fn new(
         table: &SerialTable,
-        folder: &Path,
+        files: &JobFiles,
         places: usize,
         diagnostics: &mut Diagnostics,
     ) -> Option<Self> {
@@ -46,7 +45,7 @@ impl Serial {
         };
         let first = row? as usize - 1;
         let Some(file) = &table.csv else { return Some(serial) };
-        let (columns, rows) = read(file, folder, diagnostics)?;
+        let (columns, rows) = read(file, files, diagnostics)?;
         if rows.len() < first + places {
             diagnostics.contradict(
                 file.span,
@@ -108,12 +107,13 @@ impl Serial {
 /// Columns and rows of a CSV file.
 fn read(
     file: &Spanned<String>,
-    folder: &Path,
+    files: &JobFiles,
     diagnostics: &mut Diagnostics,
 ) -> Option<(Vec<String>, Vec<Vec<String>>)> {
-    let path = folder.join(&file.value);
+    let path = files.path(&file.value);
     let read = || {
-        let mut reader = csv::ReaderBuilder::new().flexible(true).from_path(&path)?;
+        let mut reader =
+            csv::ReaderBuilder::new().flexible(true).from_reader(files.open(&file.value)?);
         let columns = reader.headers()?.iter().map(|name| name.trim().to_owned()).collect();
         let rows = reader
             .records()

@@ -12,6 +12,7 @@ use super::serial::Serial;
 use super::tables::{Align, BuiltInFont, CodeTable, Correction, TextTable};
 use crate::job::JobError;
 use crate::job::drawing_error::DrawingError;
+use crate::job::files::JobFiles;
 use crate::job::whole::whole;
 
 /// The widest quiet zone in modules.
@@ -19,8 +20,8 @@ const MOST_QUIET: u64 = 100;
 
 /// Where a drawing's shapes come from.
 pub(super) enum Source<'a> {
-    /// A file, read once.
-    File { path: PathBuf },
+    /// A file, read once, by its name in the job.
+    File { name: PathBuf },
     /// Text, in a font and its file if it has one, or in the single-line font.
     Text { table: &'a TextTable, font: Option<(Option<PathBuf>, Font)> },
     /// A code.
@@ -31,7 +32,7 @@ impl<'a> Source<'a> {
     /// Of one drawing; what is wrong with its table goes to `diagnostics`.
     pub(super) fn of(
         part: &Part<'a>,
-        folder: &Path,
+        files: &JobFiles,
         diagnostics: &mut Diagnostics,
     ) -> Option<Self> {
         const HELP: &str = "keep one of `file`, `text` and `code`";
@@ -47,18 +48,18 @@ impl<'a> Source<'a> {
             diagnostics.contradict(second, "a drawing draws one thing".to_owned(), HELP);
             return None;
         }
-        if let Some(path) = part.file {
-            return Some(Self::File { path: path.to_owned() });
+        if let Some(name) = part.file {
+            return Some(Self::File { name: name.to_owned() });
         }
         if let Some(file) = &table.file {
-            let path = folder.join(&file.value);
             // What cannot be opened is a fault of the job, what is in it one of the file.
-            let cause = match std::fs::File::open(&path).and_then(|opened| opened.metadata()) {
+            let cause = match files.open(&file.value).and_then(|opened| opened.metadata()) {
                 Err(error) => Some(error.to_string()),
                 Ok(data) => data.is_dir().then(|| "it is a folder".to_owned()),
             };
             if let Some(cause) = cause {
-                let text = format!("{}: cannot be read: {cause}", path.display());
+                let text =
+                    format!("{}: cannot be read: {cause}", files.path(&file.value).display());
                 diagnostics.contradict(
                     file.span,
                     text,
@@ -66,10 +67,10 @@ impl<'a> Source<'a> {
                 );
                 return None;
             }
-            return Some(Self::File { path });
+            return Some(Self::File { name: PathBuf::from(&file.value) });
         }
         if let Some(text) = &table.text {
-            return Self::of_text(text, folder, diagnostics);
+            return Self::of_text(text, files, diagnostics);
         }
         let Some(code) = &table.code else {
             let text = "there is nothing to draw".to_owned();
@@ -88,7 +89,11 @@ impl<'a> Source<'a> {
         Some(Self::Code { template, table: code, is_qr })
     }
 
-    fn of_text(table: &'a TextTable, folder: &Path, diagnostics: &mut Diagnostics) -> Option<Self> {
+    fn of_text(
+        table: &'a TextTable,
+        files: &JobFiles,
+        diagnostics: &mut Diagnostics,
+    ) -> Option<Self> {
         let font = match &table.font {
             Either::Word(word) => match word.value {
                 BuiltInFont::SingleLine => return Some(Self::Text { table, font: None }),
@@ -98,15 +103,15 @@ impl<'a> Source<'a> {
                 (None, Installed::here().font(&name.value))
             }
             Either::Value(file) => {
-                let path = folder.join(&file.value);
-                let font = std::fs::read(&path).map_err(|error| {
-                    let text = format!("{}: {error}", path.display());
+                let name = PathBuf::from(&file.value);
+                let font = files.read(&name).map_err(|error| {
+                    let text = format!("{}: {error}", files.path(&name).display());
                     ReadError::new(
                         text,
                         "give the path of a font file (.ttf, .otf), or a built-in font",
                     )
                 });
-                (Some(path), font.and_then(|bytes| Font::new(&bytes)))
+                (Some(name), font.and_then(|bytes| Font::new(&bytes)))
             }
         };
         match font {
@@ -122,10 +127,10 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The file that it reads.
+    /// The file that it reads, by its name in the job.
     pub(super) fn file(&self) -> Option<&Path> {
         match self {
-            Self::File { path } => Some(path),
+            Self::File { name } => Some(name),
             Self::Text { font, .. } => font.as_ref().and_then(|(path, _)| path.as_deref()),
             Self::Code { .. } => None,
         }
@@ -143,8 +148,8 @@ impl<'a> Source<'a> {
     /// A note of it, with its name.
     pub(super) fn note(&self, text: &str) -> String {
         match self {
-            Self::File { path } => {
-                let name = path.file_name().unwrap_or_default().to_string_lossy();
+            Self::File { name } => {
+                let name = name.file_name().unwrap_or_default().to_string_lossy();
                 format!("{name}: {text}")
             }
             Self::Text { .. } | Self::Code { .. } => text.to_owned(),
@@ -159,12 +164,13 @@ impl<'a> Source<'a> {
         &self,
         serial: &Serial,
         place: usize,
+        files: &JobFiles,
         diagnostics: &mut Diagnostics,
     ) -> Result<Graphic, JobError> {
         let (template, made) = match self {
-            Self::File { path } => {
-                return graphics::read::read_file(path)
-                    .map_err(|error| DrawingError::new(path.clone(), error).into());
+            Self::File { name } => {
+                let read = graphics::read::read_opened(files.open(name), name);
+                return read.map_err(|error| DrawingError::new(files.path(name), error).into());
             }
             Self::Text { table, font } => {
                 let content = &table.content;

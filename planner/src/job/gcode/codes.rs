@@ -27,8 +27,10 @@ pub(super) enum Once {
     Dwell,
     /// G10.
     SetOrigin,
-    /// G28.
-    Home,
+    /// G28, G30: to the first or the second place that is kept.
+    Kept(usize),
+    /// G28.1, G30.1: keeps the present place as that.
+    Keep(usize),
     /// G53.
     MachineFrame,
     /// G92.
@@ -183,7 +185,7 @@ pub(super) const INCH: f64 = 0.0254;
 /// Metres in a millimetre.
 pub(super) const MILLIMETRE: f64 = 1e-3;
 
-const SUPPORTED_G: &str = "G0 G1 G2 G3 G4 G10 G17 G18 G19 G20 G21 G28 G53 G54-G59 G59.1-G59.3 G61 \
+const SUPPORTED_G: &str = "G0 G1 G2 G3 G4 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G53 G54-G59 G59.1-G59.3 G61 \
                            G61.1 G64 G90 G91 G90.1 G91.1 G92 G92.1-G92.3 G93 G94, and without effect \
                            G15 G40 G40.1 G43 G49 G50 G50.1 G69 G80 G97 G98 G99";
 const SUPPORTED_M: &str = "M0 M1 M2 M3 M4 M5 M7 M8 M9 M30 M62-M65 M67 M68 M98 M99, and without effect M6 M17 M18 \
@@ -242,7 +244,10 @@ impl Codes {
             800 => choose(&mut self.cancelled, (), span, line, "canned cycle"),
             40 => choose(&mut self.once, Once::Dwell, span, line, "non-modal"),
             100 => choose(&mut self.once, Once::SetOrigin, span, line, "non-modal"),
-            280 => choose(&mut self.once, Once::Home, span, line, "non-modal"),
+            280 => choose(&mut self.once, Once::Kept(0), span, line, "non-modal"),
+            281 => choose(&mut self.once, Once::Keep(0), span, line, "non-modal"),
+            300 => choose(&mut self.once, Once::Kept(1), span, line, "non-modal"),
+            301 => choose(&mut self.once, Once::Keep(1), span, line, "non-modal"),
             530 => choose(&mut self.once, Once::MachineFrame, span, line, "non-modal"),
             920 => choose(&mut self.once, Once::Shift, span, line, "non-modal"),
             921 => choose(&mut self.once, Once::ClearShift, span, line, "non-modal"),
@@ -371,7 +376,6 @@ fn general_advice(tenths: u16) -> Option<&'static str> {
         70 | 80 => "a radius is R, and a diameter is no coordinate here: delete it",
         120..=139 => "circular pockets: let the post-processor write arcs",
         160 => "polar coordinates: let the post-processor write X and Y",
-        281 | 300 | 301 => "use G28, whose point is the machine file's home",
         330..=339 | 760 => "a marking machine does not cut threads",
         290..=292 | 382..=385 => "a marking machine has no probe",
         410..=421 => {

@@ -59,6 +59,8 @@ pub(super) struct Modal {
     /// Outputs that are on, a bit for each.
     pub(super) outputs: u64,
     pub(super) corners: Corners,
+    /// Places of G28 and G30, machine frame [m].
+    pub(super) kept: [[f64; 3]; 2],
 }
 
 impl Modal {
@@ -118,7 +120,6 @@ pub(super) struct Interpreter {
     tool_offset: Vector3<f64>,
     /// Digital outputs that there are; `None` where nobody has said.
     digital_outputs: Option<usize>,
-    home: Vector3<f64>,
     modal: Modal,
     said: u32,
     /// What the program has set.
@@ -136,7 +137,6 @@ impl Interpreter {
             has_air_assist: settings.gcode.air_assist,
             tool_offset: Vector3::from(settings.gcode.tool_offset),
             digital_outputs: settings.gcode.digital_outputs,
-            home: settings.home,
             modal: Modal {
                 motion: None,
                 plane: Plane::Xy,
@@ -155,6 +155,7 @@ impl Interpreter {
                 level: None,
                 outputs: 0,
                 corners: Corners::AsMachine,
+                kept: [settings.home.into(); 2],
             },
             said: 0,
             parameters: Store::new(),
@@ -340,7 +341,7 @@ impl Interpreter {
         })
     }
 
-    /// G28 and G92 to G92.3, which take the coordinates of their line.
+    /// G28, G30 and G92 to G92.3, which take the coordinates of their line.
     fn shift_or_home(
         &mut self,
         line: &[u8],
@@ -349,7 +350,7 @@ impl Interpreter {
         motion: Option<&Chosen<Motion>>,
     ) -> Result<(), Box<Refusal>> {
         let Some(Chosen { code, span }) = once else { return Ok(()) };
-        if !matches!(code, Once::Home | Once::Shift | Once::SetOrigin) {
+        if !matches!(code, Once::Kept(_) | Once::Shift | Once::SetOrigin) {
             match code {
                 Once::ClearShift => {
                     self.modal.shift = Vector3::zeros();
@@ -357,6 +358,7 @@ impl Interpreter {
                 }
                 Once::SuspendShift => self.modal.shift = Vector3::zeros(),
                 Once::RestoreShift => self.modal.shift = self.modal.kept_shift,
+                Once::Keep(place) => self.modal.kept[*place] = self.tracer.position.into(),
                 _ => {}
             }
             return Ok(());
@@ -379,18 +381,18 @@ impl Interpreter {
         if *code == Once::SetOrigin {
             return self.set_origin(block, span.clone());
         }
-        if *code == Once::Home {
+        if let Once::Kept(place) = *code {
             let through = self.target(block, false);
-            let mut home = self.home;
+            let mut kept = Vector3::from(self.modal.kept[place]);
             if given.contains(&true) {
                 for axis in (0..3).filter(|&axis| !given[axis]) {
-                    home[axis] = through[axis];
+                    kept[axis] = through[axis];
                 }
             }
             self.note_height(through);
             self.tracer.rapid(through);
-            self.note_height(home);
-            self.tracer.rapid(home);
+            self.note_height(kept);
+            self.tracer.rapid(kept);
             return Ok(());
         }
         if !given.contains(&true) {
@@ -422,7 +424,7 @@ impl Interpreter {
     ) -> Result<(), Box<Refusal>> {
         let frame = once.filter(|once| once.code == Once::MachineFrame);
         let taken = once
-            .is_some_and(|once| matches!(once.code, Once::Home | Once::Shift | Once::SetOrigin))
+            .is_some_and(|once| matches!(once.code, Once::Kept(_) | Once::Shift | Once::SetOrigin))
             || block.axes_taken;
         let now = self.modal.motion;
         if let Some(frame) = frame {

@@ -174,9 +174,9 @@ impl LineReader {
 
     /// What M2 and M30 put back: G1, G17, G54, G90, G94, M5, M9.
     fn end_program(&mut self) {
-        let (origins, shift) = {
+        let (origins, shift, kept) = {
             let modal = self.interpreter.modal();
-            (modal.origins, modal.shift)
+            (modal.origins, modal.shift, modal.kept)
         };
         let (unit, feed) = (self.interpreter.modal().unit, self.interpreter.modal().feed);
         let position = self.interpreter.tracer.position;
@@ -185,18 +185,18 @@ impl LineReader {
         modal.motion = Some(Motion::Line);
         (modal.unit, modal.feed) = (unit, feed);
         (modal.origins, modal.shift, modal.kept_shift) = (origins, shift, shift);
-        modal.origin = Vector3::from(origins[0]);
+        (modal.origin, modal.kept) = (Vector3::from(origins[0]), kept);
         self.interpreter.tracer.jump(position);
     }
 
-    /// Begins anew, as after a reset: what stays in force, but for the origins.
+    /// Begins anew, as after a reset: what stays in force, but for the origins and the places of G28 and G30.
     pub fn reset(&mut self) {
-        let origins = self.interpreter.modal().origins;
+        let (origins, kept) = (self.interpreter.modal().origins, self.interpreter.modal().kept);
         let position = self.interpreter.tracer.position;
         self.interpreter = Interpreter::new(&self.settings);
         let modal = self.interpreter.modal_mut();
         (modal.origins, modal.origin) = (origins, Vector3::from(origins[0]));
-        modal.motion = Some(Motion::Rapid);
+        (modal.motion, modal.kept) = (Some(Motion::Rapid), kept);
         self.interpreter.tracer.jump(position);
     }
 
@@ -256,6 +256,16 @@ impl LineReader {
     pub fn set_origins(&mut self, origins: [[f64; 3]; 9]) {
         let modal = self.interpreter.modal_mut();
         (modal.origins, modal.origin) = (origins, Vector3::from(origins[modal.system]));
+    }
+
+    /// Places of G28 and G30, machine frame [m].
+    pub fn kept(&self) -> [[f64; 3]; 2] {
+        self.interpreter.modal().kept
+    }
+
+    /// Puts the places of G28 and G30 back to the machine's home.
+    pub fn forget_kept(&mut self) {
+        self.interpreter.modal_mut().kept = [self.settings.home.into(); 2];
     }
 
     /// What G92 adds to the origin [m].
@@ -329,6 +339,13 @@ impl LineReader {
         for (index, (origin, own)) in modal.origins.iter().zip(own).enumerate() {
             if *origin != own {
                 line(format_args!("G10 L2 P{}{}", index + 1, place(origin)));
+            }
+        }
+        for (number, kept) in [5161, 5181].into_iter().zip(modal.kept) {
+            if Vector3::from(kept) != self.settings.home {
+                let [x, y, z] = kept.map(|value| value * 1e3);
+                let [second, third] = [number + 1, number + 2];
+                line(format_args!("#{number}={x:.6} #{second}={y:.6} #{third}={z:.6}"));
             }
         }
         let system = match modals.system {
@@ -415,8 +432,8 @@ mod tests {
     /// What a program comes to when it is cut in two and the second part begins with the preamble.
     #[test]
     fn a_program_goes_on_after_its_preamble_as_if_it_had_not_been_cut() {
-        let first = "G20 G91 G55 G10 L2 P2 X1 Y1\nG1 X1 F10\nG92 X0 Y0\nM3 S200\nG93\n";
-        let second = "G1 X0.5 Y0.25 F60\nG94 F20\nX0.25\nG90\nG2 X1 Y1 R2\n";
+        let first = "G20 G91 G55 G10 L2 P2 X1 Y1\nG1 X1 F10\nG28.1\nG1 Y1\nG30.1\nG92 X0 Y0\nM3 S200\nG93\n";
+        let second = "G1 X0.5 Y0.25 F60\nG94 F20\nX0.25\nG90\nG2 X1 Y1 R2\nM5 G28\nG30 X1\n";
         let machine = machine();
         let mut reader = LineReader::new(&machine);
         first.lines().for_each(|line| drop(reader.read(line.as_bytes()).unwrap()));
@@ -431,6 +448,18 @@ mod tests {
                 })
                 .collect::<Vec<_>>()
         };
+        let ends = |program: &crate::job::gcode::Program| {
+            let steps = program.drawing.steps.iter().rev();
+            let places = steps.filter_map(|step| match step.action {
+                Action::Rapid { to } => Some(to),
+                _ => None,
+            });
+            places.take(3).collect::<Vec<_>>()
+        };
+        for (one, other) in ends(&whole).iter().zip(ends(&rest)) {
+            assert!((one - other).norm() < 1e-8, "{one:?} {other:?}");
+        }
+        assert_eq!(ends(&whole).len(), 3);
         let (whole, rest) = (marks(&whole), marks(&rest));
         assert_eq!((whole.len(), rest.len()), (3, 3));
         for (one, other) in whole.iter().zip(&rest) {

@@ -147,6 +147,7 @@ impl Store {
 /// Why a program cannot set a parameter, `None` where it can.
 pub(super) fn refusal(target: &Target) -> Option<String> {
     match target {
+        Target::Numbered(5161..=5163 | 5181..=5183) => None,
         Target::Numbered(index) if *index > LAST => {
             Some(format!("#{index} is not set by a program: those are #1 to #{LAST}"))
         }

@@ -1,10 +1,10 @@
 //! Whether a file whose name does not say so is a G-code program.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 use super::encoding::Text;
+use crate::job::files::JobFiles;
 
 /// What is looked at of a file [bytes].
 const HEAD: u64 = 1 << 13;
@@ -15,12 +15,12 @@ const LINES: usize = 8;
 /// Whether the regular file at `path` begins as a G-code program does: its first lines, but for comments
 /// and tape marks, are letters each with a number, and the first of them is one that begins a line. A
 /// file that cannot be read is none.
-pub(in crate::job) fn is_program(path: &Path) -> bool {
+pub(in crate::job) fn is_program(path: &Path, files: &JobFiles) -> bool {
     // What can be read only once must not be looked into.
     if !path.metadata().is_ok_and(|data| data.is_file()) {
         return false;
     }
-    let Ok(file) = File::open(path) else { return false };
+    let Ok(file) = files.open(JobFiles::own_name(path)) else { return false };
     let mut head = Vec::new();
     Text::new(file).take(HEAD).read_to_end(&mut head).is_ok() && looks_like_words(&head)
 }

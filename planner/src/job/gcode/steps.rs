@@ -335,7 +335,7 @@ pub(super) fn gather(
     }
     block.check_gathered().map_err(Fault::Word)?;
     for (target, value) in block.settings.drain(..) {
-        if !interpreter.parameters.set(target, value) {
+        if !interpreter.set(target, value) {
             return Err(Fault::Word(Refusal::new(
                 0..line.len(),
                 "the program has too many parameters",

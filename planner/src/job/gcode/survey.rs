@@ -14,6 +14,7 @@ use super::settings::ReaderSettings;
 use super::steps::Steps;
 use crate::drawing::{Note, Step};
 use crate::job::JobError;
+use crate::job::files::JobFiles;
 
 /// Extent of a program in all three axes, before an ignored Z is left out.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, schemars::JsonSchema)]
@@ -80,14 +81,16 @@ pub struct Survey {
 /// Where it cannot be read; the first thing that is not G-code, not supported here, or contradicts
 /// itself, and with it what else is wrong further down.
 pub fn survey(path: &Path, machine: &Machine) -> Result<Survey, JobError> {
-    let (program, _) = ProgramFile::open(path, machine.gcode.words, None, machine, 0)?;
+    let (files, name) = (JobFiles::of(path, false), JobFiles::own_name(path));
+    let (program, _) = ProgramFile::open(&files, name, machine.gcode.words, None, machine, 0)?;
     Ok(program.survey)
 }
 
 /// A program in a file that was read through, and can be read again as a stream of steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProgramFile {
-    path: PathBuf,
+    files: JobFiles,
+    name: PathBuf,
     settings: ReaderSettings,
     stamp: Stamp,
     /// What the first reading found.
@@ -98,14 +101,15 @@ pub struct ProgramFile {
 pub type FileSteps = Steps<Watched>;
 
 impl ProgramFile {
-    /// Reads the program at `path` through, whose words mean what `words` say and of which no line is done
+    /// Reads the program that is called `name` among `files` through, whose words mean what `words` say and of which no line is done
     /// before `from_line`. Gives back its steps too if it has no more than `most` lines, and always if it is
     /// no regular file, which can be read only once.
     ///
     /// # Errors
     /// As of [`survey`].
     pub(in crate::job) fn open(
-        path: &Path,
+        files: &JobFiles,
+        name: &Path,
         words: WordMeanings,
         from_line: Option<u64>,
         machine: &Machine,
@@ -113,13 +117,14 @@ impl ProgramFile {
     ) -> Result<(Self, Option<Vec<Step>>), JobError> {
         let settings =
             ReaderSettings { from_line, ..ReaderSettings::of(machine).with_words(words) };
-        let watched = Watched::open(path)?;
+        let watched = Watched::open(files, name)?;
         let stamp = watched.stamp;
         let most = if stamp.is_some() { most } else { u64::MAX };
-        let steps = Steps::new(&path.display().to_string(), watched, &settings);
+        let steps = Steps::new(&files.path(name).display().to_string(), watched, &settings);
         let (survey, steps) = steps.read_through(most)?;
         let stamp = stamp.unwrap_or_default();
-        Ok((Self { path: path.to_owned(), settings, stamp, survey }, steps))
+        let (files, name) = (files.clone(), name.to_owned());
+        Ok((Self { files, name, settings, stamp, survey }, steps))
     }
 
     /// Its steps from the first on, read as they are asked for: memory does not depend on how many
@@ -131,8 +136,10 @@ impl ProgramFile {
     /// # Errors
     /// Where the file cannot be opened.
     pub fn steps(&self) -> Result<FileSteps, JobError> {
-        let watched = Watched { stamp: Some(self.stamp), ..Watched::open(&self.path)? };
-        Ok(Steps::new(&self.path.display().to_string(), watched, &self.settings))
+        let opened = Watched::open(&self.files, &self.name)?;
+        let watched = Watched { stamp: Some(self.stamp), ..opened };
+        let path = self.files.path(&self.name);
+        Ok(Steps::new(&path.display().to_string(), watched, &self.settings))
     }
 }
 
@@ -159,16 +166,16 @@ pub struct Watched {
 }
 
 impl Watched {
-    fn open(path: &Path) -> Result<Self, JobError> {
+    fn open(files: &JobFiles, name: &Path) -> Result<Self, JobError> {
         let open = || {
-            let file = File::open(path)?;
+            let file = files.open(name)?;
             if file.metadata()?.is_dir() {
                 return Err(io::ErrorKind::IsADirectory.into());
             }
             let stamp = Stamp::of(&file)?;
             Ok(Self { file, stamp })
         };
-        open().map_err(|cause| JobError::Unreadable { path: path.to_owned(), cause })
+        open().map_err(|cause| JobError::Unreadable { path: files.path(name), cause })
     }
 }
 

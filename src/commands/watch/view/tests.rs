@@ -17,6 +17,8 @@ fn running(tool: [f64; 3]) -> Status {
         stroke: 2,
         lit: true,
         rate: 1.0,
+        rate_override: 1.0,
+        power_override: 1.0,
         tool,
         cycles: 4711,
         services: [("drives".to_owned(), Some(12)), ("planner".to_owned(), Some(13))].into(),
@@ -135,13 +137,13 @@ fn what_became_of_a_key_is_told_and_the_help_lists_them_all() {
 }
 
 #[test]
-fn an_override_in_a_hold_goes_on_from_the_rate_before_it() {
+fn an_override_in_a_hold_goes_on_from_what_was_asked_for_before_it() {
     let mut view = view(true);
-    for (state, rate) in
-        [("running", 0.8), ("running", 0.8), ("running", 0.5), ("holding", 0.0), ("holding", 0.0)]
-    {
-        let status = Status { state: state.to_owned(), rate, ..running([0.1; 3]) };
+    for (state, rate) in [("running", 0.8), ("holding", 0.3), ("holding", 0.0)] {
+        let (state, asked) = (state.to_owned(), (0.8, 1.2));
+        let (rate_override, power_override) = asked;
+        let status = Status { state, rate, rate_override, power_override, ..running([0.1; 3]) };
         view.take(News::Status(Box::new(status)));
     }
-    assert_eq!(view.rate(), 0.8);
+    assert_eq!(view.overrides(), [0.8, 1.2]);
 }

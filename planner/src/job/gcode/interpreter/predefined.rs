@@ -3,7 +3,7 @@
 
 use super::{Interpreter, Modal};
 use crate::job::gcode::codes::{FeedMode, INCH, Motion, Plane, Reference};
-use crate::job::gcode::expression::Parameters;
+use crate::job::gcode::expression::{Parameters, Target};
 
 /// Seconds in a minute.
 const MINUTE: f64 = 60.0;
@@ -11,6 +11,8 @@ const MINUTE: f64 = 60.0;
 impl Parameters for Interpreter {
     fn numbered(&self, index: u32) -> Option<f64> {
         match index {
+            5161..=5163 => Some(self.kept(0, (index - 5161) as usize)),
+            5181..=5183 => Some(self.kept(1, (index - 5181) as usize)),
             5220 => Some(1.0 + self.modal.system as f64),
             5420..=5422 => Some(self.here((index - 5420) as usize)),
             5423..=5428 => Some(0.0),
@@ -62,6 +64,23 @@ impl Parameters for Interpreter {
 }
 
 impl Interpreter {
+    /// Sets a parameter that the program may set: its own, or a coordinate of the places of G28 and G30. Gives back
+    /// whether there was room for it.
+    pub(in crate::job::gcode) fn set(&mut self, target: Target, value: f64) -> bool {
+        let (place, axis) = match target {
+            Target::Numbered(index @ 5161..=5163) => (0, index - 5161),
+            Target::Numbered(index @ 5181..=5183) => (1, index - 5181),
+            target => return self.parameters.set(target, value),
+        };
+        self.modal.kept[place][axis as usize] = value * self.modal.unit;
+        true
+    }
+
+    /// A coordinate of the place of G28 or G30, in the machine's coordinates and the program's units.
+    fn kept(&self, place: usize, axis: usize) -> f64 {
+        self.modal.kept[place][axis] / self.modal.unit
+    }
+
     /// Where the program is along `axis`, in its own coordinates and units.
     fn here(&self, axis: usize) -> f64 {
         let (zero, unit) = (self.modal.zero(), self.modal.unit);

@@ -106,6 +106,38 @@ fn origins_shift_and_machine_frame() {
 }
 
 #[test]
+fn places_are_kept_and_gone_back_to() {
+    let mut machine = machine(ZMeaning::Ignored);
+    machine.home = [0.1, 0.1, 0.0];
+    let text = "G53 G0 X1 Y2\nG28.1\nG53 G0 X3 Y4\nG30.1\nG28\nG30\nG91 G28 X1\n\
+                G20\n#5181=1 #5182=[#5161*25.4]\nG90 G30";
+    let program = read("job.ngc", text, &machine).unwrap();
+    check_sound(&program, text);
+    let places: Vec<[f64; 2]> = program
+        .drawing
+        .steps
+        .iter()
+        .map(|step| {
+            let Action::Rapid { to } = step.action else { panic!("{step:?}") };
+            [to.x, to.y].map(|value| (value * 1e9).round() / 1e6)
+        })
+        .collect();
+    let expected = [
+        [1.0, 2.0],
+        [3.0, 4.0],
+        // G28, and G30, each from where the tool is.
+        [1.0, 2.0],
+        [3.0, 4.0],
+        // Through a point along x; y stays where that is.
+        [4.0, 4.0],
+        [1.0, 4.0],
+        // Set as parameters, in inches.
+        [25.4, 25.4],
+    ];
+    assert_eq!(places, expected);
+}
+
+#[test]
 fn a_line_without_motion_makes_no_step() {
     let program = flat("G0 X1\nX1\nG1 F60\nX1 Z5\nX1.0000000004\nZ0\nG4 P0\n\n(nothing)\nN7\n");
     assert_eq!(program.drawing.steps.len(), 1);
