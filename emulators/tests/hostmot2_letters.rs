@@ -2,37 +2,46 @@
 //! the encoders say of the marks, and what the board says of the light and the tool.
 
 mod board;
+mod job;
 
-use board::job::{Played, play};
-use emulators::hostmot2::Faults;
-use machine::{Machine, Override};
-use messages::artwork::{Artwork, Stroke, distance};
-use messages::{LaserCycle, Nanoseconds};
-use monitor::marks::{Marks, Source};
+use board::{BoardCable, FLIGHT, shipped};
+use emulators::hostmot2::{Emulator, Faults};
+use machine::Machine;
+use messages::Nanoseconds;
+use messages::artwork::Artwork;
+use messages::feedback::status;
+use monitor::marks::{Marks, Source, StreamEnd};
+use monitor::recording::CycleRecord;
+use monitor::run_analysis::{Clock, RunAnalysis};
 use planner::Plan;
-use planner::job::Job;
 
 /// How far a mark may be from its line, and its end from that of the stroke [m].
 const ERROR: f64 = 20e-6;
 
-/// A machine that ships, with these settings.
-fn machine(name: &str, settings: &[&str]) -> Machine {
-    let path = format!("{}/../machines/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    let settings: Result<Vec<Override>, _> = settings.iter().map(|it| it.parse()).collect();
-    Machine::load(path.as_ref(), &settings.expect("settings")).expect("the machine")
-}
+/// What a job on the board came to.
+type Played = job::Played<Emulator>;
 
-fn letters(machine: &Machine) -> Plan {
-    let job = Job::builtin(&[], machine).expect("the letters");
-    planner::plan(machine, &job).expect("a plan")
-}
-
-/// The marks as the summary of a run tells them.
-fn judged(played: &Played) -> Marks {
+fn play(machine: &Machine, plan: &Plan) -> Played {
+    let bench = board::open(machine.clone(), &Faults::default()).expect("an open port");
+    let played = job::play(bench, plan, None);
     assert_eq!((played.report.completed, played.report.fault.is_some()), (1, false));
-    let evaluation = played.results.marks.as_ref().expect("judged marks");
+    played
+}
+
+/// The marks as the summary of a run tells them: the board knows nothing of the tool.
+fn judged(played: &Played, machine: &Machine, plan: &Plan) -> Marks {
+    let analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, machine.realtime.period);
+    let mut analysis = analysis.with_fastest(plan.facts.speed).with_machine(machine);
+    for record in &played.records {
+        let mut seen = CycleRecord { ..*record };
+        seen.feedback.status &= !status::TOOL_KNOWN;
+        seen.feedback.tool = [0.0; 3];
+        analysis.push(&seen);
+    }
+    let results = analysis.finish(StreamEnd::Reported(&played.report));
+    let evaluation = results.marks.expect("judged marks");
     assert_eq!(evaluation.unknown, 0);
-    evaluation.marks.clone()
+    evaluation.marks
 }
 
 fn assert_marked(marks: &Marks) {
@@ -42,90 +51,32 @@ fn assert_marked(marks: &Marks) {
     assert!(all.iter().all(|error| *error <= ERROR), "{marks:#?}");
 }
 
-/// The times with light that `laser` asks for in a cycle of `period`, from its beginning.
-fn spans(laser: &LaserCycle, period: Nanoseconds) -> Vec<[i64; 2]> {
-    let (mut spans, mut since, mut gate) = (Vec::new(), 0, laser.gate);
-    let edges = laser.edges().iter().map(|edge| (i64::from(edge.offset), edge.gate));
-    for (offset, next) in edges.chain([(period.0, 0)]) {
-        if gate != 0 && offset > since {
-            spans.push([since, offset]);
-        }
-        (since, gate) = (offset, next);
-    }
-    spans
-}
-
-/// The light that was asked for, by the clock of the cable; what goes on through the end of a cycle is one.
-fn asked(played: &Played, machine: &Machine) -> Vec<[i64; 2]> {
-    let period = machine.realtime.period.time();
-    let later = board::FLIGHT.0 + machine.drives.gate_latency.0;
-    let mut asked: Vec<[i64; 2]> = Vec::new();
-    for record in &played.records {
-        // It acts in the cycle after the one that it answers.
-        let start = record.feedback.deadline.0 + period.0 + later;
-        for span in spans(&record.command.laser, period) {
-            let span = span.map(|at| start + at);
-            match asked.last_mut() {
-                Some(last) if last[1] == span[0] => last[1] = span[1],
-                _ => asked.push(span),
-            }
-        }
-    }
-    asked
-}
-
-fn to_line(stroke: &Stroke, place: &[f64; 3]) -> f64 {
-    let parts = stroke.points.windows(2).map(|ends| {
-        let [from, to] = [&ends[0], &ends[1]];
-        let (mut along, mut square) = (0.0, 0.0);
-        for axis in 0..3 {
-            along += (place[axis] - from[axis]) * (to[axis] - from[axis]);
-            square += (to[axis] - from[axis]) * (to[axis] - from[axis]);
-        }
-        let part = if square > 0.0 { (along / square).clamp(0.0, 1.0) } else { 0.0 };
-        let foot = core::array::from_fn(|axis| from[axis] + part * (to[axis] - from[axis]));
-        distance(place, &foot)
-    });
-    parts.fold(f64::MAX, f64::min)
-}
-
-/// The largest distance of the true tool from the stroke while the true light is on, and of either end of the
-/// light from the end of its stroke [m]. By the board alone, and the delays of the laser.
+/// How far the true marks are off [m], by the board alone and the delays of the laser.
 fn truth(played: &Played, machine: &Machine, artwork: &Artwork) -> f64 {
     let later = [machine.laser.on_delay, machine.laser.off_delay].map(Nanoseconds::from_seconds);
     let lit = played.cable.lit().into_iter();
     let lit: Vec<[i64; 2]> = lit.map(|[from, to]| [from + later[0].0, to + later[1].0]).collect();
-    assert_eq!(lit.len(), artwork.strokes.len());
-    let tool = |at: i64| {
-        let find = |world: &mut board::World| {
-            world.emulator.board().record().tool_at(Nanoseconds(at)).expect("a tool")
+    job::error(&lit, artwork, |at| {
+        let find = |emulator: &mut Emulator, _| {
+            emulator.board().record().tool_at(Nanoseconds(at)).expect("a tool")
         };
         played.cable.with(find)
-    };
-    let mut worst = 0.0_f64;
-    for ([from, to], stroke) in lit.iter().zip(&artwork.strokes) {
-        for part in 0..=2000 {
-            worst = worst.max(to_line(stroke, &tool(from + (to - from) * part / 2000)));
-        }
-        for (at, end) in [(from, stroke.points.first()), (to, stroke.points.last())] {
-            worst = worst.max(distance(&tool(*at), end.expect("a point")));
-        }
-    }
-    worst
+    })
 }
 
 #[test]
 fn steppers_mark_the_letters() {
-    let machine = machine("hostmot2_steppers", &[]);
-    let plan = letters(&machine);
-    let played = play(&machine, &plan, &Faults::default());
-    assert_marked(&judged(&played));
+    let machine = shipped("hostmot2_steppers", &[]);
+    let plan = job::letters(&machine);
+    let played = play(&machine, &plan);
+    assert_marked(&judged(&played, &machine, &plan));
     let truth = truth(&played, &machine, &plan.artwork);
     assert!(truth <= ERROR, "{truth} m by the board");
 
-    let (lit, asked) = (played.cable.lit(), asked(&played, &machine));
+    let later = FLIGHT.0 + machine.drives.gate_latency.0;
+    let (lit, asked) = (played.cable.lit(), job::asked(&played.records, &machine, later));
     assert_eq!(lit.len(), asked.len());
-    let most = played.resolution.0 / 2;
+    let most = played.resolution / 2;
     for (lit, asked) in lit.iter().flatten().zip(asked.iter().flatten()) {
         assert!((lit - asked).abs() <= most, "an edge at {lit} ns instead of {asked}");
     }
@@ -136,10 +87,10 @@ fn steppers_mark_the_letters() {
 
 #[test]
 fn a_scan_head_marks_the_letters() {
-    let machine = machine("hostmot2_galvo", &[]);
-    let plan = letters(&machine);
-    let played = play(&machine, &plan, &Faults::default());
-    assert_marked(&judged(&played));
+    let machine = shipped("hostmot2_galvo", &[]);
+    let plan = job::letters(&machine);
+    let played = play(&machine, &plan);
+    assert_marked(&judged(&played, &machine, &plan));
     let truth = truth(&played, &machine, &plan.artwork);
     assert!(truth <= ERROR, "{truth} m by the board");
 }
@@ -147,10 +98,10 @@ fn a_scan_head_marks_the_letters() {
 #[test]
 fn four_cycles_in_a_millisecond_are_no_less_accurate_than_one() {
     let errors = |settings: &[&str]| {
-        let machine = machine("hostmot2_steppers", settings);
-        let plan = letters(&machine);
-        let played = play(&machine, &plan, &Faults::default());
-        assert_marked(&judged(&played));
+        let machine = shipped("hostmot2_steppers", settings);
+        let plan = job::letters(&machine);
+        let played = play(&machine, &plan);
+        assert_marked(&judged(&played, &machine, &plan));
         truth(&played, &machine, &plan.artwork)
     };
     let slow = errors(&[]);

@@ -3,21 +3,23 @@
 
 mod board;
 
-use board::Cable;
+use board::{BoardCable, OnBoard};
 use drives::hostmot2::session::{Counters, Trouble};
 use drives::hostmot2::{Config, Connection, Hostmot2Port};
-use drives::{Actuation, Freshness, Measurement, Port};
+use drives::{Actuation, Port};
+use emulators::cable::Bench;
 use emulators::hostmot2::Faults;
 use machine::Machine;
-use messages::{CommandMode, GateEdge, LaserCycle, Nanoseconds};
+use messages::{GateEdge, LaserCycle, Nanoseconds};
 
 const PERIOD: i64 = 1_000_000;
 const LATENCY: i64 = 400_000;
 const FLIGHT: i64 = board::FLIGHT.0;
 
 fn machine() -> Machine {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../machines/cartesian_steppers.toml");
-    Machine::load(path.as_ref(), &[]).expect("the machine")
+    let mut machine = board::shipped("cartesian_steppers", &[]);
+    machine.drives.gate_latency = Nanoseconds(LATENCY);
+    machine
 }
 
 fn config(machine: &Machine) -> Config {
@@ -35,88 +37,52 @@ fn config(machine: &Machine) -> Config {
     }
 }
 
-/// A port at deadlines on a board with faults from one second on, so that it can be opened.
-struct Bench {
-    machine: Machine,
-    cable: Cable,
-    port: Hostmot2Port,
-    deadline: Nanoseconds,
-    measurement: Measurement,
-    home: f64,
+/// The bench of these tests: a port with a configuration of its own on a board with these faults.
+fn bench(faults: &Faults) -> OnBoard {
+    let machine = machine();
+    let cable = board::cable(&machine, faults);
+    let port = Hostmot2Port::new(&machine, config(&machine)).expect("a port");
+    let port = port.with_link(Box::new(cable.clone()));
+    Bench::open(machine, cable, port).expect("an open port")
 }
 
-impl Bench {
-    fn new(faults: &Faults) -> Self {
-        let machine = machine();
-        let cable = Cable::new(&machine, faults);
-        let port = Hostmot2Port::new(&machine, config(&machine)).expect("a port");
-        let mut port = port.with_link(Box::new(cable.clone()));
-        port.open().expect("an open port");
-        let start = cable.now().0 / PERIOD + 2;
-        let home = machine.home_joints[0] / machine.actuators[0].ratio;
-        let deadline = Nanoseconds(start * PERIOD);
-        Self { machine, cable, port, deadline, measurement: Measurement::default(), home }
-    }
+/// The angle from home [rad] and speed [rad/s] at the end of the cycle `index`: a slow swing.
+fn swing(index: u32) -> [f64; 2] {
+    let (turn, rate) = (2.0, core::f64::consts::TAU * 2.0);
+    let at = rate * 1e-3 * f64::from(index + 1);
+    [turn * (1.0 - messages::math::cos(at)), turn * rate * messages::math::sin(at)]
+}
 
-    /// One cycle; the deadline that it began at.
-    fn cycle(&mut self, actuation: &Actuation) -> i64 {
-        let at = self.deadline;
-        self.cable.until(at);
-        self.port.send(actuation);
-        self.port.receive(&mut self.measurement);
-        self.deadline = Nanoseconds(at.0 + PERIOD);
-        at.0
-    }
+/// How far the first motor was measured from home [rad].
+fn turned(bench: &OnBoard) -> f64 {
+    bench.measurement.position[0] - bench.home(0)
+}
 
-    /// What the motors shall do: all stand but the first, which turns from home by `angle` [rad] at `speed`.
-    fn driven(&self, angle: f64, speed: f64, laser: LaserCycle) -> Actuation {
-        let mut actuation = Actuation {
-            freshness: Freshness::Fresh,
-            mode: CommandMode::Driven,
-            laser,
-            ..Actuation::DISABLED
-        };
-        for (row, actuator) in self.machine.actuators.iter().enumerate() {
-            let home = self.machine.home_joints[actuator.axis] / actuator.ratio;
-            actuation.position[row] = home + if row == 0 { angle } else { 0.0 };
-        }
-        actuation.velocity[0] = speed;
-        actuation
-    }
+/// `cycles` at home in the dark: the port learns when its requests arrive.
+fn idle(bench: &mut OnBoard, cycles: u32) {
+    let standing = bench.driven(0.0, 0.0, LaserCycle::OFF);
+    bench.cycles(&standing, cycles);
+}
 
-    /// The angle from home [rad] and speed [rad/s] at the end of the cycle `index`: a slow swing.
-    fn swing(&self, index: u32) -> [f64; 2] {
-        let (turn, rate) = (2.0, core::f64::consts::TAU * 2.0);
-        let at = rate * 1e-3 * f64::from(index + 1);
-        [turn * (1.0 - messages::math::cos(at)), turn * rate * messages::math::sin(at)]
-    }
-
-    /// `cycles` at home in the dark: the port learns when its requests arrive.
-    fn idle(&mut self, cycles: u32) {
-        for _ in 0..cycles {
-            self.cycle(&self.driven(0.0, 0.0, LaserCycle::OFF));
-        }
-    }
-
-    /// `cycles` of the swing, with the light that `laser` has in each; what was asked to be lit.
-    fn run(&mut self, cycles: u32, laser: impl Fn(u32) -> LaserCycle) -> Vec<[i64; 2]> {
-        let mut asked = Vec::new();
-        for index in 0..cycles {
-            let [angle, speed] = self.swing(index);
-            let laser = laser(index);
-            let at = self.cycle(&self.driven(angle, speed, laser));
-            let (mut since, mut gate) = (0, laser.gate);
-            let end = GateEdge { offset: PERIOD as u32, gate: 0, power: 0.0 };
-            for edge in laser.edges().iter().chain([&end]) {
-                let offset = i64::from(edge.offset);
-                if gate != 0 && offset > since {
-                    asked.push([since, offset].map(|time| at + FLIGHT + LATENCY + time));
-                }
-                (since, gate) = (offset, edge.gate);
+/// `cycles` of the swing, with the light that `laser` has in each; what was asked to be lit.
+fn run(bench: &mut OnBoard, cycles: u32, laser: impl Fn(u32) -> LaserCycle) -> Vec<[i64; 2]> {
+    let mut asked = Vec::new();
+    for index in 0..cycles {
+        let [angle, speed] = swing(index);
+        let laser = laser(index);
+        let actuation = bench.driven(angle, speed, laser);
+        let at = bench.cycle(&actuation);
+        let (mut since, mut gate) = (0, laser.gate);
+        let end = GateEdge { offset: PERIOD as u32, gate: 0, power: 0.0 };
+        for edge in laser.edges().iter().chain([&end]) {
+            let offset = i64::from(edge.offset);
+            if gate != 0 && offset > since {
+                asked.push([since, offset].map(|time| at + FLIGHT + LATENCY + time));
             }
+            (since, gate) = (offset, edge.gate);
         }
-        merged(asked)
     }
+    merged(asked)
 }
 
 /// Spans that meet are one.
@@ -151,18 +117,19 @@ fn strokes(index: u32) -> LaserCycle {
 
 #[test]
 fn the_steps_are_where_they_are_asked_to_be() {
-    let mut bench = Bench::new(&Faults::default());
+    let mut bench = bench(&Faults::default());
     let per_radian = bench.machine.actuators[0].encoder.counts / core::f64::consts::TAU;
     let (mut worst, mut measured) = (0.0_f64, 0.0_f64);
     for index in 0..600 {
-        let [angle, speed] = bench.swing(index);
-        let before = if index == 0 { 0.0 } else { bench.swing(index - 1)[0] };
-        bench.cycle(&bench.driven(angle, speed, LaserCycle::OFF));
+        let [angle, speed] = swing(index);
+        let before = if index == 0 { 0.0 } else { swing(index - 1)[0] };
+        let actuation = bench.driven(angle, speed, LaserCycle::OFF);
+        bench.cycle(&actuation);
         // The request arrived a flight after the deadline, where the path was.
-        let position = bench.measurement.position[0] - bench.home;
+        let position = turned(&bench);
         measured = measured.max((position - before).abs());
         // The next one leaves at its deadline. Until it arrives the rate stays.
-        bench.cable.until(bench.deadline);
+        bench.cable.go_to(bench.deadline);
         let arrived = bench.cable.delivered() + bench.cable.speed() * 1e-9 * FLIGHT as f64;
         worst = worst.max((arrived - angle * per_radian).abs());
     }
@@ -174,19 +141,20 @@ fn the_steps_are_where_they_are_asked_to_be() {
 
 #[test]
 fn missed_deadlines_are_gone_through_at_the_speed_before() {
-    let mut bench = Bench::new(&Faults::default());
+    let mut bench = bench(&Faults::default());
     let per_radian = bench.machine.actuators[0].encoder.counts / core::f64::consts::TAU;
     let (mut off, mut fastest) = (0.0, 0.0_f64);
     for index in 0..600 {
         // Three are missed every now and then, the last of them two cycles before the end.
         if index % 50 > 46 {
-            bench.port.pass(&bench.driven(0.0, 0.0, LaserCycle::OFF));
-            bench.deadline = Nanoseconds(bench.deadline.0 + PERIOD);
+            let standing = bench.driven(0.0, 0.0, LaserCycle::OFF);
+            bench.pass(&standing);
             continue;
         }
-        let [angle, speed] = bench.swing(index);
-        bench.cycle(&bench.driven(angle, speed, LaserCycle::OFF));
-        bench.cable.until(bench.deadline);
+        let [angle, speed] = swing(index);
+        let actuation = bench.driven(angle, speed, LaserCycle::OFF);
+        bench.cycle(&actuation);
+        bench.cable.go_to(bench.deadline);
         fastest = fastest.max(bench.cable.speed().abs());
         let arrived = bench.cable.delivered() + bench.cable.speed() * 1e-9 * FLIGHT as f64;
         if index % 50 > 0 {
@@ -199,10 +167,10 @@ fn missed_deadlines_are_gone_through_at_the_speed_before() {
 
 #[test]
 fn edges_fall_within_the_resolution_and_light_goes_on_through_cycles() {
-    let mut bench = Bench::new(&Faults::default());
-    bench.idle(70);
-    let asked = bench.run(300, strokes);
-    bench.idle(70);
+    let mut bench = bench(&Faults::default());
+    idle(&mut bench, 70);
+    let asked = run(&mut bench, 300, strokes);
+    idle(&mut bench, 70);
     let lit = bench.cable.lit();
     assert_eq!(lit.len(), asked.len());
     let most = bench.port.profile().gate_resolution.0 / 2;
@@ -215,16 +183,19 @@ fn edges_fall_within_the_resolution_and_light_goes_on_through_cycles() {
 
 #[test]
 fn what_is_measured_of_the_light_is_what_was_lit() {
-    let mut bench = Bench::new(&Faults::default());
-    bench.idle(70);
+    let mut bench = bench(&Faults::default());
+    idle(&mut bench, 70);
     let mut laser = LaserCycle::OFF;
     assert!(laser.push(GateEdge { offset: 100_000, gate: 7, power: 0.5 }));
     assert!(laser.push(GateEdge { offset: 900_000, gate: 0, power: 0.0 }));
-    bench.cycle(&bench.driven(0.0, 0.0, laser));
-    bench.cycle(&bench.driven(0.0, 0.0, LaserCycle::OFF));
+    let actuation = bench.driven(0.0, 0.0, laser);
+    bench.cycle(&actuation);
+    let actuation = bench.driven(0.0, 0.0, LaserCycle::OFF);
+    bench.cycle(&actuation);
     let edges = bench.measurement.laser.edges().to_vec();
     assert_eq!(edges, [GateEdge { offset: 500_000, gate: 7, power: 0.5 }]);
-    bench.cycle(&bench.driven(0.0, 0.0, LaserCycle::OFF));
+    let actuation = bench.driven(0.0, 0.0, LaserCycle::OFF);
+    bench.cycle(&actuation);
     assert_eq!(bench.measurement.laser.gate, 7);
     let edges = bench.measurement.laser.edges().to_vec();
     assert_eq!(edges, [GateEdge { offset: 300_000, gate: 0, power: 0.0 }]);
@@ -241,12 +212,13 @@ fn lost_late_doubled_and_damaged_frames_give_no_wrong_light() {
             seed,
             ..Faults::default()
         };
-        let mut bench = Bench::new(&faults);
-        bench.idle(70);
-        let asked = bench.run(3000, strokes);
-        let [angle, _] = bench.swing(2999);
+        let mut bench = bench(&faults);
+        idle(&mut bench, 70);
+        let asked = run(&mut bench, 3000, strokes);
+        let [angle, _] = swing(2999);
         for _ in 0..50 {
-            bench.cycle(&bench.driven(angle, 0.0, LaserCycle::OFF));
+            let actuation = bench.driven(angle, 0.0, LaserCycle::OFF);
+            bench.cycle(&actuation);
         }
         for [from, to] in bench.cable.lit() {
             let inside = asked.iter().any(|asked| from + 600 >= asked[0] && to <= asked[1] + 600);
@@ -259,7 +231,7 @@ fn lost_late_doubled_and_damaged_frames_give_no_wrong_light() {
         assert_eq!(sent, 3120);
         assert!(lost > 60 && late > 20 && duplicated > 10, "seed {seed}");
         assert!(!bench.measurement.fault.is_some(), "seed {seed}: {:?}", bench.measurement.fault);
-        let position = bench.measurement.position[0] - bench.home;
+        let position = turned(&bench);
         assert!((position - angle).abs() < 0.02, "seed {seed}: {position} instead of {angle} rad");
         assert!(bench.cable.bites().is_empty());
     }
@@ -267,18 +239,18 @@ fn lost_late_doubled_and_damaged_frames_give_no_wrong_light() {
 
 #[test]
 fn a_bridge_that_dies_leaves_it_dark_and_the_watchdog_lets_the_axes_go() {
-    let mut bench = Bench::new(&Faults::default());
-    bench.idle(70);
-    bench.run(50, |_| LaserCycle { gate: 1, power: 1.0, ..LaserCycle::OFF });
+    let mut bench = bench(&Faults::default());
+    idle(&mut bench, 70);
+    run(&mut bench, 50, |_| LaserCycle { gate: 1, power: 1.0, ..LaserCycle::OFF });
     let last = bench.deadline.0;
-    bench.cable.until(Nanoseconds(last + 100 * PERIOD));
+    bench.cable.go_to(Nanoseconds(last + 100 * PERIOD));
     let end = bench.cable.lit().last().map_or(0, |span| span[1]);
     assert!((end - (last + FLIGHT + LATENCY)).abs() <= 1000, "{end} ns, {last} ns");
     let bites = bench.cable.bites();
     assert_eq!(bites.len(), 1);
     assert!((bites[0].0 - (last - PERIOD + FLIGHT + 5_000_000)).abs() < 1000, "{bites:?}");
     let stopped = bench.cable.delivered();
-    bench.cable.until(Nanoseconds(last + 200 * PERIOD));
+    bench.cable.go_to(Nanoseconds(last + 200 * PERIOD));
     assert_eq!(bench.cable.delivered(), stopped);
 }
 
@@ -288,28 +260,28 @@ fn a_cut_cable_and_a_silent_board_are_a_fault_and_dark() {
     let cut = Faults { cut: Some([at, Nanoseconds(at.0 + 50 * PERIOD)]), ..Faults::default() };
     let silent = Faults { silent_from: Some(at), ..Faults::default() };
     for (faults, returns) in [(cut, true), (silent, false)] {
-        let mut bench = Bench::new(&faults);
+        let mut bench = bench(&faults);
         let cycles = (at.0 - bench.deadline.0) / PERIOD + 20;
-        bench.run(cycles as u32, strokes);
+        run(&mut bench, cycles as u32, strokes);
         assert_eq!(bench.port.trouble(), Some(Trouble::Silent));
         assert!(bench.measurement.fault.is_some());
         let end = bench.cable.lit().last().map_or(0, |span| span[1]);
         assert!(end <= at.0 + PERIOD + LATENCY + FLIGHT, "{end}: light after the cut");
         assert_eq!(bench.cable.bites().len(), 1);
-        bench.run(100, |_| LaserCycle::OFF);
+        run(&mut bench, 100, |_| LaserCycle::OFF);
         // The same fault until a person resets it, and then the board's own where it answers again.
         assert!(bench.measurement.fault.is_some());
         for _ in 0..5 {
             bench.cycle(&Actuation::DISABLED);
         }
-        bench.run(20, |_| LaserCycle::OFF);
+        run(&mut bench, 20, |_| LaserCycle::OFF);
         assert_eq!(bench.measurement.fault.is_some(), !returns);
     }
 }
 
 #[test]
 fn a_module_that_the_board_lacks_is_named() {
-    let mut bench = Bench::new(&Faults::default());
+    let mut bench = bench(&Faults::default());
     let mut wrong = config(&bench.machine);
     wrong.actuators[0].0 = Connection::Stepgen { stepgen: 9, encoder: None };
     let port = Hostmot2Port::new(&bench.machine, wrong).expect("a port");

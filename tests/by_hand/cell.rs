@@ -1,53 +1,23 @@
 //! A machine with switches, as services in a place of its own.
 
-use crate::support::{Ended, Place, Running, TERMINATE, source};
+#[path = "../support/switches.rs"]
+mod switches;
+
+use crate::support::{Ended, Place, Running, TERMINATE};
 use serde_json::Value;
+use switches::Switches;
 
-/// Switches next to where the machine stands at first, so that homing is short; a probe, a door, an interlock, an
-/// emergency stop.
-const SWITCHES: &str = r#"
-[inputs.x_home]
-function = "home"
-axis = "x"
-at = "90 mm"
-[inputs.x_max]
-function = "limit"
-axis = "x"
-side = "upper"
-at = "206 mm"
-[inputs.y_home]
-function = "home"
-axis = "y"
-side = "upper"
-at = "110 mm"
-[inputs.estop]
-function = "estop"
-active = "low"
-[inputs.door]
-function = "door"
-[inputs.chiller]
-function = "interlock"
-[inputs.probe]
-function = "probe"
-axis = "x"
-side = "upper"
-at = "105 mm"
-[axis.x.homing]
-position = "90 mm"
-speed = "100 mm/s"
-latch_speed = "10 mm/s"
-[axis.y.homing]
-direction = "upper"
-position = "110 mm"
-speed = "100 mm/s"
-latch_speed = "10 mm/s"
-order = 1
-"#;
-
-/// The machine file with the switches, and `more`.
+/// The machine file with switches next to where the machine stands at first, so that homing is short, and `more`.
 pub(crate) fn machine(more: &str) -> String {
-    let machine = std::fs::read_to_string(source("machines/cartesian.toml")).unwrap();
-    format!("{machine}{SWITCHES}{more}")
+    let switches = Switches {
+        x_home: "90 mm",
+        y_home: "110 mm",
+        y_method: "switch",
+        y_reference: "110 mm",
+        probe: "105 mm",
+        speeds: ["100 mm/s", "10 mm/s"],
+    };
+    switches.machine() + more
 }
 
 /// A domain with its services, all running.

@@ -1,99 +1,67 @@
-//! The cable between port and board in virtual time, whose two ends have one clock.
+//! The HostMot2 port on the emulated board, in virtual time.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
+#![allow(unreachable_pub)]
 
-pub(crate) mod job;
-
-use std::sync::{Arc, Mutex, PoisonError};
-
-use drives::link::Link;
+use drives::PortError;
+use drives::hostmot2::Hostmot2Port;
+use emulators::cable::{Bench, Cable};
 use emulators::hostmot2::record::Record;
 use emulators::hostmot2::rig::Rig;
 use emulators::hostmot2::spaces::Identity;
 use emulators::hostmot2::wiring::Wiring;
 use emulators::hostmot2::{Board, Emulator, Faults};
-use machine::Machine;
+use machine::{Machine, Override};
 use messages::Nanoseconds;
 
 /// How long a frame takes each way.
-pub(crate) const FLIGHT: Nanoseconds = Nanoseconds(30_000);
+pub const FLIGHT: Nanoseconds = Nanoseconds(30_000);
 
-pub(crate) struct World {
-    pub(crate) emulator: Emulator,
-    pub(crate) now: Nanoseconds,
+/// The port, the cable and the board.
+pub type OnBoard = Bench<Hostmot2Port, Emulator>;
+
+/// A machine file that ships, with these settings.
+pub fn shipped(name: &str, settings: &[&str]) -> Machine {
+    let path = format!("{}/../machines/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let settings: Result<Vec<Override>, _> = settings.iter().map(|it| it.parse()).collect();
+    Machine::load(path.as_ref(), &settings.expect("settings")).expect("the machine")
 }
 
-/// The cable between port and board, whose time is that of the test.
-#[derive(Clone)]
-pub(crate) struct Cable(Arc<Mutex<World>>);
-
-impl Cable {
-    /// To the board of `machine`, with these faults on the way.
-    pub(crate) fn new(machine: &Machine, faults: &Faults) -> Self {
-        let wiring = Wiring::of(machine);
-        let rig = Rig::new(machine, &wiring).expect("a rig");
-        let board = Board::new(Identity::default()).with_machine(rig, &wiring, Record::with_way());
-        let emulator = Emulator::new(board, faults, FLIGHT);
-        Self(Arc::new(Mutex::new(World { emulator, now: Nanoseconds(0) })))
-    }
-
-    pub(crate) fn with<T>(&self, look: impl FnOnce(&mut World) -> T) -> T {
-        look(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    pub(crate) fn now(&self) -> Nanoseconds {
-        self.with(|world| world.now)
-    }
-
-    pub(crate) fn until(&self, at: Nanoseconds) {
-        self.with(|world| {
-            world.now = world.now.max(at);
-            world.emulator.advance(world.now);
-        });
-    }
-
-    pub(crate) fn lit(&self) -> Vec<[i64; 2]> {
-        self.with(|world| {
-            let record = world.emulator.board().record();
-            record.lit(world.now).into_iter().map(|span| span.map(|at| at.0)).collect()
-        })
-    }
-
-    pub(crate) fn delivered(&self) -> f64 {
-        self.with(|world| world.emulator.board().modules().stepgens.delivered(0))
-    }
-
-    /// Steps per second of the first step generator.
-    pub(crate) fn speed(&self) -> f64 {
-        self.with(|world| world.emulator.board().modules().stepgens.speed(0))
-    }
-
-    pub(crate) fn bites(&self) -> Vec<Nanoseconds> {
-        self.with(|world| world.emulator.board().record().bites.clone())
-    }
+/// The board of `machine` at the end of a cable, with these faults on the way.
+pub fn cable(machine: &Machine, faults: &Faults) -> Cable<Emulator> {
+    let wiring = Wiring::of(machine);
+    let rig = Rig::new(machine, &wiring).expect("a rig");
+    let board = Board::new(Identity::default()).with_machine(rig, &wiring, Record::with_way());
+    Cable::new(Emulator::new(board, faults, FLIGHT))
 }
 
-impl Link for Cable {
-    fn send(&mut self, datagram: &[u8]) {
-        self.with(|world| world.emulator.send(world.now, datagram));
+/// The same with the port that the machine file asks for, open.
+pub fn open(machine: Machine, faults: &Faults) -> Result<OnBoard, PortError> {
+    let cable = cable(&machine, faults);
+    let port = Hostmot2Port::of(&machine)?.with_link(Box::new(cable.clone()));
+    Bench::open(machine, cable, port)
+}
+
+/// What a board tells of itself beyond what all hardware does.
+pub trait BoardCable {
+    /// Steps of the first step generator so far.
+    fn delivered(&self) -> f64;
+    /// Its steps per second.
+    fn speed(&self) -> f64;
+    /// When the watchdog has bitten.
+    fn bites(&self) -> Vec<Nanoseconds>;
+}
+
+impl BoardCable for Cable<Emulator> {
+    fn delivered(&self) -> f64 {
+        self.with(|emulator, _| emulator.board().modules().stepgens.delivered(0))
     }
 
-    fn receive(&mut self, buffer: &mut [u8], until: Nanoseconds) -> Option<usize> {
-        self.with(|world| {
-            loop {
-                if let Some(frame) = world.emulator.receive(world.now) {
-                    let length = frame.len().min(buffer.len());
-                    buffer[..length].copy_from_slice(&frame[..length]);
-                    return Some(length);
-                }
-                let next = world.emulator.next().filter(|next| *next <= until);
-                world.now = world.now.max(next.unwrap_or(until));
-                next?;
-            }
-        })
+    fn speed(&self) -> f64 {
+        self.with(|emulator, _| emulator.board().modules().stepgens.speed(0))
     }
 
-    fn now(&self) -> Nanoseconds {
-        Cable::now(self)
+    fn bites(&self) -> Vec<Nanoseconds> {
+        self.with(|emulator, _| emulator.board().record().bites.clone())
     }
 }

@@ -195,18 +195,24 @@ impl<H> Played<H> {
     /// The largest distance of the true tool from the stroke while the true light was on, one span of `lit` for each,
     /// and of either end of the light from the end of its stroke [m].
     pub fn error(&self, lit: &[[i64; 2]], artwork: &Artwork) -> f64 {
-        assert_eq!(lit.len(), artwork.strokes.len());
-        let mut worst = 0.0_f64;
-        for ([from, to], stroke) in lit.iter().zip(&artwork.strokes) {
-            for part in 0..=1000 {
-                worst = worst.max(to_line(stroke, &self.tool_at(from + (to - from) * part / 1000)));
-            }
-            for (at, end) in [(from, stroke.points.first()), (to, stroke.points.last())] {
-                worst = worst.max(distance(&self.tool_at(*at), end.expect("a point")));
-            }
-        }
-        worst
+        error(lit, artwork, |at| self.tool_at(at))
     }
+}
+
+/// The largest distance of the `tool`, as it is at a time [ns], from the stroke while the light was on, one span of `lit`
+/// for each, and of either end of the light from the end of its stroke [m].
+pub fn error(lit: &[[i64; 2]], artwork: &Artwork, tool: impl Fn(i64) -> [f64; 3]) -> f64 {
+    assert_eq!(lit.len(), artwork.strokes.len());
+    let mut worst = 0.0_f64;
+    for ([from, to], stroke) in lit.iter().zip(&artwork.strokes) {
+        for part in 0..=1000 {
+            worst = worst.max(to_line(stroke, &tool(from + (to - from) * part / 1000)));
+        }
+        for (at, end) in [(from, stroke.points.first()), (to, stroke.points.last())] {
+            worst = worst.max(distance(&tool(*at), end.expect("a point")));
+        }
+    }
+    worst
 }
 
 /// The distance of `place` from the line of `stroke` [m].

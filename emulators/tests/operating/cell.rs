@@ -1,5 +1,8 @@
 //! A machine that is operated: controller, drives and plant in one process, with switches.
 
+#[path = "../../../tests/support/switches.rs"]
+mod switches;
+
 use controller::{Controller, Inputs, Outputs, Peers};
 use drives::bridge::BridgeOptions;
 use drives::port::Port;
@@ -10,58 +13,7 @@ use messages::{
     Command, ControllerState, Feedback, MotionEnd, Nanoseconds, OperatorReply, OperatorRequest,
     OperatorVerb, Progress, Refusal,
 };
-
-const CARTESIAN: &str = include_str!("../../../machines/cartesian.toml");
-
-/// Switches at both ends, an index on y, a probe at 150 mm of x, a door, an interlock and an emergency stop.
-const SWITCHES: &str = r#"
-[inputs.x_home]
-function = "home"
-axis = "x"
-at = "-2 mm"
-[inputs.x_min]
-function = "limit"
-axis = "x"
-side = "lower"
-at = "-6 mm"
-[inputs.x_max]
-function = "limit"
-axis = "x"
-side = "upper"
-at = "206 mm"
-[inputs.y_home]
-function = "home"
-axis = "y"
-side = "upper"
-at = "198 mm"
-[inputs.y_index]
-function = "index"
-axis = "y"
-at = "0 mm"
-[inputs.estop]
-function = "estop"
-active = "low"
-[inputs.door]
-function = "door"
-[inputs.chiller]
-function = "interlock"
-[inputs.probe]
-function = "probe"
-axis = "x"
-side = "upper"
-at = "150 mm"
-[axis.x.homing]
-position = "-2 mm"
-speed = "50 mm/s"
-latch_speed = "2 mm/s"
-[axis.y.homing]
-method = "index"
-direction = "upper"
-position = "200 mm"
-speed = "50 mm/s"
-latch_speed = "2 mm/s"
-order = 1
-"#;
+use switches::Switches;
 
 pub const X: u32 = 1;
 pub const Y: u32 = 2;
@@ -69,9 +21,17 @@ pub const ESTOP: u64 = 1 << 5;
 pub const DOOR: u64 = 1 << 6;
 pub const CHILLER: u64 = 1 << 7;
 
-/// The operated machine, with `more` in its file.
+/// The operated machine, with switches at both ends and an index on y, and `more` in its file.
 pub fn machine(more: &str) -> Machine {
-    Machine::parse("cell.toml", &format!("{CARTESIAN}{SWITCHES}{more}"), &[]).unwrap()
+    let switches = Switches {
+        x_home: "-2 mm",
+        y_home: "198 mm",
+        y_method: "index",
+        y_reference: "200 mm",
+        probe: "150 mm",
+        speeds: ["50 mm/s", "2 mm/s"],
+    };
+    Machine::parse("cell.toml", &(switches.machine() + more), &[]).unwrap()
 }
 
 pub struct Cell {
