@@ -133,10 +133,10 @@ impl Switched {
             let Some(cycles) = &mut self.homing[index] else { continue };
             *cycles += 1;
             // Found in the middle of its time: places change while it follows no target.
-            if *cycles == self.looking / 2 {
-                if let Some(zero) = &mut self.zero {
-                    zero[index] = 0.0;
-                }
+            if *cycles == self.looking / 2
+                && let Some(zero) = &mut self.zero
+            {
+                zero[index] = 0.0;
             }
             if *cycles < self.looking {
                 away |= 1 << index;
