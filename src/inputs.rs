@@ -3,7 +3,7 @@
 use crate::arguments::{JobOptions, MachineArguments};
 use crate::exit::Failure;
 use machine::Machine;
-use machine::document::{Document, Override};
+use machine::document::{Attachment, Attachments, Document, Override};
 use machine::machine::{BUILTIN, BUILTIN_NAME};
 use planner::request::{JobRequest, OffsetsFile};
 use serde::{Deserialize, Serialize};
@@ -17,6 +17,9 @@ pub struct MachineSource {
     file: Option<MachineText>,
     /// The values of `--set`.
     set: Vec<String>,
+    /// The files that the machine file names.
+    #[serde(default)]
+    files: Vec<NamedText>,
 }
 
 /// A machine file as it was read.
@@ -26,8 +29,26 @@ struct MachineText {
     text: String,
 }
 
+/// A file that the machine file names, as it was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct NamedText {
+    /// As the machine file names it.
+    name: String,
+    path: PathBuf,
+    /// Why there is none, where it could not be read.
+    text: Result<String, String>,
+}
+
+impl NamedText {
+    /// Reads the file called `name` in `folder`.
+    fn read(name: String, folder: &Path) -> Self {
+        let Attachment { path, text } = Attachment::read(folder.join(&name));
+        Self { name, path, text }
+    }
+}
+
 impl MachineSource {
-    /// Reads the machine file, if one is named.
+    /// Reads the machine file, if one is named, and the files that it names.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -36,7 +57,23 @@ impl MachineSource {
             Ok::<_, Failure>(MachineText { path: path.clone(), text: Document::text(path)? })
         };
         let file = arguments.machine.as_ref().map(read).transpose()?;
-        Ok(Self { file, set: arguments.set.clone() })
+        let mut source = Self { file, set: arguments.set.clone(), files: Vec::new() };
+        source.files = source.files_now();
+        Ok(source)
+    }
+
+    /// The files that the machine file names, for the machine and for the plant, as they are now.
+    fn files_now(&self) -> Vec<NamedText> {
+        // Settings that cannot be read are refused where the machine is built.
+        let Ok(sorted) = Overrides::sort(&self.set) else { return Vec::new() };
+        let text = self.file.as_ref().map(|file| file.text.as_str());
+        let mut names = Machine::files_named(text, &sorted.machine, &[]);
+        names.extend(Machine::files_named(text, &sorted.machine, &sorted.plant));
+        names.sort();
+        names.dedup();
+        let folder = self.file.as_ref().and_then(|file| file.path.parent());
+        let folder = folder.unwrap_or_else(|| Path::new(""));
+        names.into_iter().map(|name| NamedText::read(name, folder)).collect()
     }
 
     /// The machine that is planned for and controlled.
@@ -77,9 +114,9 @@ impl MachineSource {
     pub fn arguments(&self) -> Result<Vec<OsString>, Failure> {
         let mut arguments = Vec::new();
         if let (Some(file), Some(path)) = (&self.file, self.path()) {
-            if Document::text(&path)? != file.text {
+            if Document::text(&path)? != file.text || self.files_now() != self.files {
                 return Err(Failure::bad_input(format!(
-                    "{} was changed after the pipeline had been started: start it again",
+                    "{} or a file that it names was changed after the pipeline had been started: start it again",
                     path.display()
                 )));
             }
@@ -104,7 +141,12 @@ impl MachineSource {
     fn build(&self, machine: &[Override], plant: &[Override]) -> Result<Machine, Failure> {
         let name = self.file.as_ref().map(|file| file.path.display().to_string());
         let text = self.file.as_ref().map(|file| file.text.as_str());
-        Ok(Machine::simulated(name.as_deref().zip(text), machine, plant)?)
+        let files = self.files.iter().map(|file| {
+            let attachment = Attachment { path: file.path.clone(), text: file.text.clone() };
+            (file.name.clone(), attachment)
+        });
+        let files = Attachments::Read(files.collect());
+        Ok(Machine::simulated(name.as_deref().zip(text), files, machine, plant)?)
     }
 }
 
@@ -228,6 +270,44 @@ mod tests {
         let sent: MachineSource =
             serde_json::from_slice(&serde_json::to_vec(&source).unwrap()).unwrap();
         assert_eq!((sent.machine().unwrap(), sent.plant().unwrap()), (before.clone(), before));
+    }
+
+    #[test]
+    fn a_mesh_is_read_with_the_machine_file_and_only_then() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, mesh) = (folder.path().join("mine.toml"), folder.path().join("mesh.csv"));
+        let text = std::fs::read_to_string(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/machines/cartesian.toml"
+        ))
+        .unwrap();
+        std::fs::write(&path, format!("{text}\n[frame.mesh]\nfile = \"mesh.csv\"\n")).unwrap();
+        let missing = source(Some(path.clone()), &[]).machine().unwrap_err().refusal;
+        assert_eq!(missing.file.as_deref(), path.to_str());
+        assert!(missing.message.contains("mesh.csv cannot be read"), "{missing:?}");
+        let points = |middle: &str| {
+            let at = |x: f64, y: f64| {
+                format!("{x},{y},{}\n", if [x, y] == [0.0, 0.0] { middle } else { "0" })
+            };
+            let rows = [-200.0, 0.0, 200.0];
+            let all: String = rows.iter().flat_map(|y| rows.map(|x| at(x, *y))).collect();
+            format!("x [mm],y [mm],dx [um]\n{all}")
+        };
+        std::fs::write(&mesh, points("25")).unwrap();
+        let source = source(Some(path.clone()), &[]);
+        let before = source.machine().unwrap();
+        assert!(source.arguments().is_ok());
+        std::fs::write(&mesh, points("nothing")).unwrap();
+        assert_eq!(source.machine().unwrap(), before);
+        let text = source.arguments().unwrap_err().refusal.text;
+        assert!(text.contains("was changed"), "{text}");
+        let sent: MachineSource =
+            serde_json::from_slice(&serde_json::to_vec(&source).unwrap()).unwrap();
+        assert_eq!(sent.machine().unwrap(), before);
+        let read = MachineSource::read(&MachineArguments { machine: Some(path), set: Vec::new() });
+        let wrong = read.unwrap().machine().unwrap_err().refusal;
+        assert_eq!((wrong.file.as_deref(), wrong.line), (mesh.to_str(), Some(6)), "{wrong:?}");
+        assert!(wrong.message.starts_with("`nothing` is no number"), "{wrong:?}");
     }
 
     #[test]

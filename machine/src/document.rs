@@ -24,6 +24,7 @@
 //! assert_eq!(error.message(), "unknown key `hight`; did you mean `height`?");
 //! ```
 
+mod attachments;
 mod bounds;
 mod decode;
 mod diagnostics;
@@ -38,6 +39,8 @@ mod table;
 use std::path::Path;
 use std::sync::Arc;
 
+pub(crate) use attachments::Attached;
+pub use attachments::{Attachment, Attachments};
 pub use bounds::{Bounds, Measured};
 pub use decode::{Decode, Spanned};
 pub use diagnostics::{Concern, Diagnostics, Warning};
@@ -109,6 +112,18 @@ impl Document {
             Some(root) => Ok(Self { root, diagnostics }),
             None => Err(diagnostics.into_error()),
         }
+    }
+
+    /// Finds the files that the document names in `attachments`; without this it finds none.
+    #[must_use]
+    pub fn attach(mut self, attachments: Attachments) -> Self {
+        self.diagnostics.attach(attachments);
+        self
+    }
+
+    /// The text that stands at the dotted `key`, such as `frame.mesh.file`.
+    pub(crate) fn text_at(&self, key: &str) -> Option<&str> {
+        self.root.text_at(key)
     }
 
     /// Lays `overrides` over the document, the later over the earlier. `prefix` is what stands

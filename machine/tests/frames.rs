@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-use machine::document::Override;
+use std::path::PathBuf;
+
+use machine::document::{Attachment, Attachments, Override, Problem};
 use machine::kinematics::Joints;
 use machine::{Machine, Mechanism, MechanismKind, MechanismVisitor, Pose};
 use nalgebra::Vector3;
@@ -114,6 +116,94 @@ fn a_mesh_is_measured_over_the_area() {
         let told = mesh(range, &values).unwrap_err();
         assert!(told.starts_with(expected), "{told}");
     }
+}
+
+/// File, line and text of what is wrong.
+type Told = (String, Option<usize>, String);
+
+/// A machine file with a mesh in a file beside it that says `csv`, and with `more` keys of it.
+fn with_file(csv: &str, more: &str) -> Result<Machine, Vec<Told>> {
+    let text = format!("{CARTESIAN}\n[frame.mesh]\nfile = \"mesh.csv\"\n{more}\n");
+    let file = Attachment { path: PathBuf::from("mesh.csv"), text: Ok(csv.to_owned()) };
+    let files = Attachments::Read([("mesh.csv".to_owned(), file)].into());
+    Machine::simulated(Some(("m.toml", &text)), files, &[], &[]).map_err(|error| {
+        let told = |problem: &Problem| {
+            (error.file_of(problem).to_owned(), problem.line(), problem.message())
+        };
+        error.problems().map(told).collect()
+    })
+}
+
+#[test]
+fn a_mesh_may_stand_in_a_file_of_its_own() {
+    let row = "[\"10 um\", \"-20 um\", \"30 um\"]";
+    let over = "x = [\"0 mm\", \"200 mm\"]\ny = [\"0 mm\", \"200 mm\"]";
+    let zero = "[\"0 um\", \"1 um\", \"0 um\"]";
+    let inside =
+        format!("[frame.mesh]\n{over}\ndx = [{row}, {row}, {row}]\ndy = [{zero}, {zero}, {zero}]");
+    let expected = with(CARTESIAN, &inside).unwrap().mechanism;
+    // In any order of points and columns, with remarks, in the units that the first line names.
+    let mut points: Vec<String> = Vec::new();
+    for y in [0.0, 10.0, 20.0] {
+        for (x, dx, dy) in [(0.0, 10.0, 0.0), (100.0, -20.0, 0.001), (200.0, 30.0, 0.0)] {
+            points.push(format!("{dy}; {y};{dx} ;{x}"));
+        }
+    }
+    points.reverse();
+    let head = "# measured on a glass scale\n\ndy [mm];y [cm];dX [um];x [mm]";
+    let found = with_file(&format!("\u{feff}{head}\r\n{}\r\n", points.join("\r\n")), "").unwrap();
+    let joints = |mechanism: &MechanismKind| {
+        [[0.0, 0.0], [0.1, 0.05], [0.2, 0.2], [0.013, 0.177]]
+            .map(|[x, y]| mechanism.visit(JointsAt([x, y, 0.0])))
+    };
+    for (found, expected) in joints(&found.mechanism).iter().zip(joints(&expected)) {
+        close(found, &expected);
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_mesh_file_is_told_at_its_line() {
+    let head = "x [mm],y [mm],dx [um]";
+    let points = |skip: usize, more: &str| {
+        let at = |index: usize| format!("{},{},1\n", 100 * (index % 3), 100 * (index / 3));
+        let lines: String = (0..9).filter(|index| *index != skip).map(at).collect();
+        format!("{head}\n{lines}{more}")
+    };
+    assert!(with_file(&points(9, ""), "").is_ok());
+    for (csv, line, expected) in [
+        (String::new(), 1, "the file of the mesh is empty"),
+        ("x [mm],y [mm],dz [um]\n".to_owned(), 1, "a mesh has no column `dz [um]`"),
+        ("x [mm],y,dx [um]\n".to_owned(), 1, "the column `y` has no unit of length"),
+        ("x [mm],x [mm],dx [um]\n".to_owned(), 1, "the column `x` stands twice"),
+        ("x [mm],y [mm]\n".to_owned(), 1, "a mesh needs the columns x and y"),
+        (format!("{head}\n0,0,1\n0,100\n"), 3, "the line has 2 values, and the first line 3"),
+        (format!("{head}\n0,0,nan\n"), 2, "`nan` is no number"),
+        (format!("{head}\n0,0,1 mm\n"), 2, "`1 mm` is no number"),
+        (format!("{head}\n0,0,2e7\n"), 2, "`dx` cannot be `2e7`"),
+        (format!("{head}\n0,0,1\n"), 1, "the points of the mesh stand at 1 values of x"),
+        (points(4, ""), 9, "the point x = 0.1 m, y = 0.1 m of the grid is missing"),
+        (points(9, "100,0,1\n"), 11, "the point x = 0.1 m, y = 0 m stands twice"),
+        (points(9, "130,0,1\n"), 3, "x = 0.1 m is on no line of the grid"),
+    ] {
+        let told = with_file(&csv, "").unwrap_err();
+        let (file, found, message) = &told[0];
+        assert_eq!((file.as_str(), *found), ("mesh.csv", Some(line)), "{csv}: {told:?}");
+        assert!(message.starts_with(expected), "{csv}: {told:?}");
+    }
+    // What the machine file says wrongly of it stands there.
+    let narrow = points(9, "").replace("200,", "150,").replace("100,", "75,");
+    let told = with_file(&narrow, "").unwrap_err();
+    assert!(told[0].0 == "m.toml" && told[0].2.starts_with("the mesh reaches from"), "{told:?}");
+    let told = with_file(&points(9, ""), "x = [\"0 mm\", \"200 mm\"]").unwrap_err();
+    assert!(told[0].0 == "m.toml" && told[0].2.contains("or in a file"), "{told:?}");
+    // What is unusual is a warning that names the line.
+    let far = points(9, "").replace("100,100,1", "100,100,1.2e4");
+    let told = with_file(&far, "").unwrap_err();
+    assert!(told[0].2.starts_with("the deviations of the mesh change by"), "{told:?}");
+    let wide = points(9, "").replace(",1\n", ",1.2e4\n");
+    let warnings = with_file(&wide, "").unwrap().warnings;
+    let warned = warnings.iter().filter(|it| it.text.starts_with("mesh.csv:2: `dx` of 1.2e4 is"));
+    assert_eq!(warned.count(), 1, "{warnings:?}");
 }
 
 #[test]

@@ -222,7 +222,7 @@ fn message_of(diagnostic: &dyn Diagnostic) -> String {
 /// All that is wrong with a document but the first.
 fn others_of_document(error: &DocumentError) -> Box<[Problem]> {
     let others = error.problems().skip(1).map(|problem| Problem {
-        file: Some(error.file().to_owned()),
+        file: Some(error.file_of(problem).to_owned()),
         line: problem.line().map(|line| line as u64),
         column: problem.column().map(|column| column as u64),
         message: problem.message(),

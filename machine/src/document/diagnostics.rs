@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
-use super::bounds::Bounds;
-use super::error::{DocumentError, Problem, ProblemKind, Source};
+use super::attachments::{Attached, Attachments};
+use super::bounds::{self, Bounds, Measured};
+use super::decode::Spanned;
+use super::error::{DocumentError, Problem, ProblemKind, Source, SourceKind};
 use super::node::Span;
 
 /// Problems and warnings so far, and the texts that they point into.
@@ -13,6 +15,7 @@ pub struct Diagnostics {
     problems: Vec<Problem>,
     warnings: Vec<Warning>,
     bounds: &'static [Bounds],
+    attachments: Attachments,
 }
 
 /// What can be true but should be looked at.
@@ -37,12 +40,47 @@ pub enum Concern {
 
 impl Diagnostics {
     pub(super) fn new(file: Arc<Source>) -> Self {
-        Self { sources: vec![file], problems: Vec::new(), warnings: Vec::new(), bounds: &[] }
+        Self {
+            sources: vec![file],
+            problems: Vec::new(),
+            warnings: Vec::new(),
+            bounds: &[],
+            attachments: Attachments::default(),
+        }
     }
 
     /// Holds the numbers that are decoded from now on to `bounds`.
     pub(super) fn hold_to(&mut self, bounds: &'static [Bounds]) {
         self.bounds = bounds;
+    }
+
+    /// Finds the files that the document names in `attachments`.
+    pub(super) fn attach(&mut self, attachments: Attachments) {
+        self.attachments = attachments;
+    }
+
+    /// The file that the document names by `name`; refuses the name where it cannot be read.
+    pub(crate) fn attached(&mut self, name: &Spanned<String>) -> Option<Attached> {
+        match self.attachments.read(&name.value) {
+            Ok((path, text)) => {
+                let source = Source::attachment(&path, text);
+                self.sources.push(source.clone());
+                Some(Attached::new(source, self.sources.len() - 1))
+            }
+            Err(message) => {
+                let help = "a path is relative to the folder of the file that names it";
+                self.contradict(name.span, message, help);
+                None
+            }
+        }
+    }
+
+    /// Holds a number that stands in an attached file to the bounds of `key` in the table of type `table`. Says
+    /// whether it is possible.
+    pub(crate) fn hold(&mut self, table: &str, key: &str, number: &Measured) -> bool {
+        let before = self.problems.len();
+        bounds::check(table, key, number, self);
+        self.problems.len() == before
     }
 
     /// What numbers are held to.
@@ -65,9 +103,18 @@ impl Diagnostics {
         self.problems.is_empty()
     }
 
-    /// Line and column of `span` in the file, both from 1; `None` for an override.
+    /// Line and column of `span` in the file, both from 1; `None` for an override, and in a file that the
+    /// document names.
     pub fn position(&self, span: Span) -> Option<(usize, usize)> {
-        self.sources.get(span.source)?.position(span.start)
+        let source = self.sources.get(span.source)?;
+        if source.kind == SourceKind::File { source.position(span.start) } else { None }
+    }
+
+    /// The file that `span` is in where the document names it, with the line from 1.
+    pub(crate) fn attachment(&self, span: Span) -> Option<(&str, usize)> {
+        let source = self.sources.get(span.source)?;
+        let (line, _) = source.position(span.start)?;
+        (source.kind == SourceKind::Attachment).then_some((source.name.as_str(), line))
     }
 
     /// What stands at `span`.
@@ -88,12 +135,10 @@ impl Diagnostics {
         }
     }
 
-    /// The override that `span` is in, as on the command line; `None` for the file.
+    /// The override that `span` is in, as on the command line; `None` for a file.
     pub fn override_text(&self, span: Span) -> Option<&str> {
-        if span.source == 0 {
-            return None;
-        }
-        self.sources.get(span.source).map(|source| source.text.as_str())
+        let source = self.sources.get(span.source)?;
+        (source.kind == SourceKind::CommandLine).then_some(source.text.as_str())
     }
 
     /// Notes that what stands at `span` is wrong, and what would be right.

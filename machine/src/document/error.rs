@@ -10,31 +10,46 @@ use super::node::Span;
 /// The name of a text that came with `--set`.
 pub(super) const COMMAND_LINE: &str = "--set";
 
-/// A text that values come from: the file, or one override.
+/// What a text that values come from is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SourceKind {
+    /// The document's file.
+    File,
+    /// A file that the document names.
+    Attachment,
+    /// One override.
+    CommandLine,
+}
+
+/// A text that values come from: the file, one that it names, or one override.
 #[derive(Debug)]
 pub(crate) struct Source {
     pub(crate) name: String,
     pub(crate) text: String,
-    is_file: bool,
+    pub(super) kind: SourceKind,
     code: NamedSource<String>,
 }
 
 impl Source {
     pub(crate) fn file(name: &str, text: &str) -> Arc<Self> {
-        Arc::new(Self::new(name, text.to_owned(), true))
+        Arc::new(Self::new(name, text.to_owned(), SourceKind::File))
+    }
+
+    pub(super) fn attachment(name: &str, text: String) -> Arc<Self> {
+        Arc::new(Self::new(name, text, SourceKind::Attachment))
     }
 
     pub(crate) fn command_line(text: String) -> Self {
-        Self::new(COMMAND_LINE, text, false)
+        Self::new(COMMAND_LINE, text, SourceKind::CommandLine)
     }
 
-    fn new(name: &str, text: String, is_file: bool) -> Self {
-        Self { name: name.to_owned(), is_file, code: NamedSource::new(name, text.clone()), text }
+    fn new(name: &str, text: String, kind: SourceKind) -> Self {
+        Self { name: name.to_owned(), kind, code: NamedSource::new(name, text.clone()), text }
     }
 
-    /// Line and column of byte `offset`, both from 1, the column in characters.
+    /// Line and column of byte `offset`, both from 1, the column in characters; `None` in an override.
     pub(crate) fn position(&self, offset: usize) -> Option<(usize, usize)> {
-        if !self.is_file {
+        if self.kind == SourceKind::CommandLine {
             return None;
         }
         let before = self.text.get(..offset).unwrap_or(&self.text);
@@ -102,6 +117,11 @@ impl Problem {
     /// Column in characters from 1; `None` for an override or an unreadable file.
     pub fn column(&self) -> Option<usize> {
         self.position().map(|(_, column)| column)
+    }
+
+    /// The file that it stands in where that is one that the document names.
+    fn attachment(&self) -> Option<&str> {
+        (self.source.kind == SourceKind::Attachment).then_some(self.source.name.as_str())
     }
 
     fn position(&self) -> Option<(usize, usize)> {
@@ -175,9 +195,14 @@ impl DocumentError {
         Self::new(file.to_owned(), first, Vec::new())
     }
 
-    /// The file as it was named.
+    /// The file of the first problem: the document as it was named, or one that it names.
     pub fn file(&self) -> &str {
-        &self.file
+        self.file_of(&self.first)
+    }
+
+    /// The file of one of its problems.
+    pub fn file_of<'a>(&'a self, problem: &'a Problem) -> &'a str {
+        problem.attachment().unwrap_or(&self.file)
     }
 
     /// Everything that is wrong.

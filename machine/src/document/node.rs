@@ -98,6 +98,20 @@ impl Node {
         Self { span, value: Value::Table(Vec::new()) }
     }
 
+    /// The text at the dotted `key` below it.
+    pub(super) fn text_at(&self, key: &str) -> Option<&str> {
+        let below = key.split('.').try_fold(self, |node, key| match &node.value {
+            Value::Table(entries) => {
+                entries.iter().find(|entry| entry.key == key).map(|entry| &entry.node)
+            }
+            _ => None,
+        })?;
+        match &below.value {
+            Value::Text(text) => Some(text),
+            _ => None,
+        }
+    }
+
     /// What it is, with its article, for error texts.
     pub(super) fn type_name(&self) -> &'static str {
         match self.value {

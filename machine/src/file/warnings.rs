@@ -99,9 +99,10 @@ pub(super) fn warnings(diagnostics: &mut Diagnostics) -> Vec<Warning> {
         .into_iter()
         .map(|document::Warning { span, text, concern }| {
             let (line, column) = diagnostics.position(span).unwrap_or((0, 0));
-            let text = match diagnostics.override_text(span) {
-                Some(setting) => format!("--set {setting}: {text}"),
-                None => text,
+            let text = match (diagnostics.override_text(span), diagnostics.attachment(span)) {
+                (Some(setting), _) => format!("--set {setting}: {text}"),
+                (None, Some((file, line))) => format!("{file}:{line}: {text}"),
+                (None, None) => text,
             };
             Warning { text, line, column, concern }
         })
