@@ -15,6 +15,7 @@ use graver::arguments::MachineArguments;
 use graver::exit::{Exit, Failure};
 use graver::inputs;
 use messages::random::SplitMix64;
+use messages::time::SETPOINT_TIME;
 use support::{Place, assert_valid, source};
 
 /// What becomes of an input.
@@ -31,7 +32,10 @@ enum Stage {
     Plan,
 }
 
-/// Reads a machine and a job and plans it, as `check`, `plan`, `run` and `simulate` begin.
+/// How much of a plan is made [s]: a dwell or a speed may be wrong by so much that it takes days.
+const LONGEST: f64 = 60.0;
+
+/// Reads a machine and a job and plans the beginning of it, as `check`, `plan`, `run` and `simulate` begin.
 fn judge(machine: Option<&Path>, job: &Path, set: &[&str]) -> Verdict {
     let refused = |stage| move |failure| Verdict::Refused { stage, failure: Box::new(failure) };
     let arguments = MachineArguments {
@@ -47,7 +51,12 @@ fn judge(machine: Option<&Path>, job: &Path, set: &[&str]) -> Verdict {
         Ok(read) => read,
         Err(refusal) => return refused(Stage::Job)(refusal.into()),
     };
-    match planner::plan(&input.machine, &read) {
+    let mut setpoints = 0;
+    let planned = planner::plan_while(&input.machine, &read, |window| {
+        setpoints += window.len();
+        setpoints as f64 * SETPOINT_TIME <= LONGEST
+    });
+    match planned {
         Ok(_) => Verdict::Sound,
         Err(error) => refused(Stage::Plan)(request.refuse(&error).into()),
     }

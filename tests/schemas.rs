@@ -164,11 +164,15 @@ fn benchmarks_print_what_their_schemas_say() {
     let job = place.file("lines.ngc", &lines(1));
     let arguments = ["bench", "simulate", job.to_str().unwrap(), "--seconds", "0.05", "--json"];
     assert_valid("speed", &place.graver(&arguments).json(0));
-    for of in [vec![job.to_str().unwrap()], vec!["--lines", "5000"]] {
+    for (of, drawings) in [(vec![job.to_str().unwrap()], 0), (vec!["--lines", "5000"], 3)] {
         let planned = place.graver(&[vec!["bench", "plan", "--json"], of].concat()).json(0);
         assert_valid("planning", &planned);
         let programs = planned["programs"].as_array().unwrap();
         assert!(programs.iter().all(|it| it["setpoints"].as_u64().unwrap() > 100), "{planned:#}");
+        let found = planned["drawings"].as_array().unwrap();
+        assert_eq!(found.len(), drawings, "{planned:#}");
+        // The beginning of each: ten seconds of it.
+        assert!(found.iter().all(|it| it["setpoints"].as_u64().unwrap() >= 10_000), "{planned:#}");
     }
     let arguments = ["bench", "latency", "--seconds", "0.3", "--no-realtime", "--json"];
     let latency = place.graver(&arguments).json(0);

@@ -12,7 +12,8 @@
 //! - [`paper`]: a drawing by the speed profiles of the sources, for comparison.
 //! - [`service`]: the planner process. It alone waits, locks or reads a clock.
 //!
-//! [`plan()`] keeps the whole plan, [`plan_through`] hands it on window by window and keeps nothing.
+//! [`plan()`] keeps the whole plan; [`plan_through`] hands it on window by window and keeps nothing, [`plan_while`]
+//! as far as somebody wants it.
 
 pub mod drawing;
 pub mod error;
@@ -37,4 +38,4 @@ pub mod verify;
 
 pub use error::PlanError;
 pub use job::{Job, Marking, MarkingSpeed};
-pub use plan::{Plan, PlanFacts, plan, plan_ideal, plan_through};
+pub use plan::{Plan, PlanFacts, plan, plan_ideal, plan_telling, plan_through, plan_while};

@@ -1,5 +1,6 @@
 //! From a job to a checked stream of setpoints.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use machine::{Actuator, Axis, Machine, Mechanism, MechanismKind, MechanismVisitor};
@@ -47,7 +48,19 @@ pub(crate) fn plan_unless(
     job: &Job,
     abandoned: &dyn Fn() -> bool,
 ) -> Result<Plan, PlanError> {
-    plan_within(machine, job, Scope::Machine, abandoned)
+    plan_within(machine, job, Scope::Machine, abandoned, &mut |_| ())
+}
+
+/// Plans as [`plan`], and tells `told` each window's setpoints as soon as they are checked.
+///
+/// # Errors
+/// As [`plan`].
+pub fn plan_telling(
+    machine: &Machine,
+    job: &Job,
+    told: &mut dyn FnMut(&[Setpoint]),
+) -> Result<Plan, PlanError> {
+    plan_within(machine, job, Scope::Machine, &|| false, told)
 }
 
 /// Plans `job` and checks it against the limits of the path only: what the tool's motion would be
@@ -56,7 +69,7 @@ pub(crate) fn plan_unless(
 /// # Errors
 /// As [`plan`], without axes and area.
 pub fn plan_ideal(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
-    plan_within(machine, job, Scope::PathAlone, &|| false)
+    plan_within(machine, job, Scope::PathAlone, &|| false, &mut |_| ())
 }
 
 /// Plans `job` and hands its setpoints to `take`, checked, window by window, without keeping them: memory
@@ -69,18 +82,46 @@ pub fn plan_through(
     job: &Job,
     take: impl FnMut(&[Setpoint]),
 ) -> Result<PlanFacts, PlanError> {
-    plan_windows(machine, job, Scope::Machine, 1, &mut Through(take))
+    plan_windows(machine, job, Scope::Machine, 1, &mut Through { take, has_ended: None })
 }
 
-struct Through<F>(F);
+/// Plans `job` as [`plan_through`] for as long as `take` says that it wants more; `None` where it did not.
+///
+/// # Errors
+/// As [`plan`]; what came before it has been handed over.
+pub fn plan_while(
+    machine: &Machine,
+    job: &Job,
+    mut take: impl FnMut(&[Setpoint]) -> bool,
+) -> Result<Option<PlanFacts>, PlanError> {
+    let has_ended = Cell::new(false);
+    let mut through = Through {
+        take: |setpoints: &[Setpoint]| {
+            let goes_on = !has_ended.get() && take(setpoints);
+            has_ended.set(!goes_on);
+        },
+        has_ended: Some(&has_ended),
+    };
+    match plan_windows(machine, job, Scope::Machine, 1, &mut through) {
+        Err(PlanError::Abandoned) if has_ended.get() => Ok(None),
+        planned => planned.map(Some),
+    }
+}
 
-impl<F: FnMut(&[Setpoint])> Outlet for Through<F> {
+/// Hands setpoints on.
+struct Through<'a, F> {
+    take: F,
+    /// Whether no more are wanted.
+    has_ended: Option<&'a Cell<bool>>,
+}
+
+impl<F: FnMut(&[Setpoint])> Outlet for Through<'_, F> {
     fn is_abandoned(&self) -> bool {
-        false
+        self.has_ended.is_some_and(Cell::get)
     }
 
     fn take(&mut self, window: Box<Window>) -> Result<(), Box<Window>> {
-        (self.0)(&window.setpoints);
+        (self.take)(&window.setpoints);
         Ok(())
     }
 }
@@ -90,9 +131,11 @@ fn plan_within(
     job: &Job,
     scope: Scope,
     abandoned: &dyn Fn() -> bool,
+    told: &mut dyn FnMut(&[Setpoint]),
 ) -> Result<Plan, PlanError> {
     let mut whole = Whole::default();
-    let facts = plan_windows(machine, job, scope, 1, &mut Taking { whole: &mut whole, abandoned })?;
+    let mut taking = Taking { whole: &mut whole, abandoned, told };
+    let facts = plan_windows(machine, job, scope, 1, &mut taking)?;
     let Whole { trajectory, artwork } = whole;
     Ok(Plan {
         artwork,
@@ -115,6 +158,7 @@ struct Whole {
 struct Taking<'a> {
     whole: &'a mut Whole,
     abandoned: &'a dyn Fn() -> bool,
+    told: &'a mut dyn FnMut(&[Setpoint]),
 }
 
 impl Outlet for Taking<'_> {
@@ -123,6 +167,7 @@ impl Outlet for Taking<'_> {
     }
 
     fn take(&mut self, window: Box<Window>) -> Result<(), Box<Window>> {
+        (self.told)(&window.setpoints);
         self.whole.trajectory.attitude = window.trajectory.attitude;
         self.whole.trajectory.append(&window.trajectory);
         window.strokes.into_iter().for_each(|line| self.whole.artwork.add(line));

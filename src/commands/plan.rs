@@ -34,6 +34,9 @@ pub struct PlanReport {
     pub time: f64,
     /// Time that reading, planning and checking took [s].
     pub plan_time: f64,
+    /// Time from the beginning of reading until the first setpoint of a run could leave [s]: when the first window
+    /// was checked, or all of a job that is planned as a whole before anything moves. Null of a plan on paper.
+    pub first_setpoint: Option<f64>,
     /// What a G-code program asks for; null for other jobs.
     pub program: Option<planner::job::gcode::ProgramFacts>,
     /// With `--path-check`, how far the tool strays from all strokes; else null.
@@ -68,6 +71,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
     let counts = arguments.pulses.is_some() || arguments.pulse_path.is_some();
     let started = Instant::now();
     let job = request.open(&input.machine)?;
+    let leaves_early = job.is_surely_within_reach(&input.machine);
     let refuse = |error: PlanError| request.refuse(&error);
     let mut sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
     if let Some(path) = &arguments.preview {
@@ -77,14 +81,21 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         }
     }
     let is_listed = arguments.samples.is_some() || arguments.path_check.is_some() || counts;
+    let mut first = None;
+    let mut note_first = |_: &[Setpoint]| {
+        first.get_or_insert_with(|| started.elapsed().as_secs_f64());
+    };
     let planned = if arguments.ideal {
         Planned::Whole(Box::new(planner::plan_ideal(&input.machine, &job).map_err(refuse)?))
     } else if is_listed {
-        Planned::Whole(Box::new(planner::plan(&input.machine, &job).map_err(refuse)?))
+        let plan = planner::plan_telling(&input.machine, &job, &mut note_first).map_err(refuse)?;
+        Planned::Whole(Box::new(plan))
     } else {
-        let facts = planner::plan_through(&input.machine, &job, |_| ()).map_err(refuse)?;
+        let facts = planner::plan_through(&input.machine, &job, note_first).map_err(refuse)?;
         Planned::Facts(Box::new(facts))
     };
+    let all = started.elapsed().as_secs_f64();
+    let first_setpoint = first.map(|first| if leaves_early { first } else { all });
     let paper = arguments.profile.map(|profile| {
         planner::paper::on_paper(&input.machine, &job, profile.into()).map_err(refuse)
     });
@@ -136,6 +147,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         machine: input.machine.name.clone(),
         time: facts.duration,
         plan_time,
+        first_setpoint,
         program: job.program,
         path_check: checked,
         paper,
@@ -233,7 +245,10 @@ fn print_text(report: &PlanReport, machine: &Machine) {
     if let Some(pulses) = &report.pulses {
         print_pulses(pulses, machine);
     }
-    say!("planning  {:.1} ms", report.plan_time * 1e3);
+    let first = report
+        .first_setpoint
+        .map_or_else(String::new, |first| format!(", first setpoint after {:.1} ms", first * 1e3));
+    say!("planning  {:.1} ms{first}", report.plan_time * 1e3);
     for note in &facts.notes {
         match note.line {
             0 => say!("note      {}", note.text),

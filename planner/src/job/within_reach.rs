@@ -29,8 +29,9 @@ const LONG: f64 = 86_400.0;
 
 impl Job {
     /// Whether everything in it lies within the area and within the joints' travel, and no light is too
-    /// short for the source.
-    pub(crate) fn is_surely_within_reach(&self, machine: &Machine) -> bool {
+    /// short for the source: then a run sends its first setpoints while the rest is still being planned, else all of
+    /// it is planned before.
+    pub fn is_surely_within_reach(&self, machine: &Machine) -> bool {
         let is_plain = self.surface.is_none() && self.attitude == AttitudeLaw::Level;
         let laser = &machine.laser;
         let may_be_too_short = laser.off_delay > laser.on_delay;

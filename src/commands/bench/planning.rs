@@ -1,4 +1,9 @@
-//! `graver bench plan`: from a program in a file to checked setpoints, on programs that it makes itself.
+//! `graver bench plan`: from a program in a file to checked setpoints, on programs that it makes itself; and how
+//! soon a large drawing and a large image are under way.
+
+pub mod drawings;
+
+use self::drawings::PlannedDrawing;
 
 use crate::arguments::PlanBenchArguments;
 use crate::exit::{Exit, Failure};
@@ -22,7 +27,9 @@ pub struct PlanBenchReport {
     pub machine: String,
     /// The programs, in the order in which they were planned.
     pub programs: Vec<PlannedProgram>,
-    /// The largest memory that the process had at once [bytes]; null where the kernel does not say.
+    /// Drawings and images; none where a program is named.
+    pub drawings: Vec<PlannedDrawing>,
+    /// The largest memory that the process had at once for the programs [bytes]; null where the kernel does not say.
     pub memory: Option<u64>,
 }
 
@@ -113,14 +120,16 @@ pub fn run(arguments: &PlanBenchArguments) -> Result<Exit, Failure> {
     let input = inputs::machine(&arguments.machine)?;
     let machine = &input.machine;
     let mut programs = Vec::new();
+    let mut drawings = Vec::new();
+    let folder = tempfile::Builder::new().prefix("graver-bench-").tempdir();
+    let folder = folder
+        .map_err(|error| Failure::output(format!("{}: {error}", std::env::temp_dir().display())))?;
     if let Some(path) = &arguments.job {
         let name = path.display().to_string();
         programs.push(measured(&name, path, machine)?);
     } else {
-        let folder = tempfile::Builder::new().prefix("graver-bench-").tempdir();
-        let folder = folder.map_err(|error| {
-            Failure::output(format!("{}: {error}", std::env::temp_dir().display()))
-        })?;
+        drawings = drawings::all(folder.path(), machine)?;
+        reset_memory();
         let path = folder.path().join("program.nc");
         for program in &PROGRAMS {
             let lines = (arguments.lines / program.share).max(1);
@@ -130,7 +139,8 @@ pub fn run(arguments: &PlanBenchArguments) -> Result<Exit, Failure> {
             programs.push(measured(program.name, &path, machine)?);
         }
     }
-    let report = PlanBenchReport { machine: machine.name.clone(), programs, memory: memory() };
+    let report =
+        PlanBenchReport { machine: machine.name.clone(), programs, drawings, memory: memory() };
     if arguments.json {
         output::json(&report)?;
     } else {
@@ -176,6 +186,12 @@ fn measured(name: &str, path: &Path, machine: &Machine) -> Result<PlannedProgram
     })
 }
 
+/// Forgets the largest memory so far, where the kernel lets it.
+fn reset_memory() {
+    // Five: the peak of the resident set (man proc_pid_clear_refs).
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
 /// The largest memory that this process had at once [bytes].
 fn memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -208,4 +224,5 @@ fn print_text(report: &PlanBenchReport) {
     if let Some(memory) = report.memory {
         say!("memory     {:.0} MB at most", memory as f64 * 1e-6);
     }
+    drawings::print_text(&report.drawings);
 }
