@@ -17,6 +17,9 @@ pub(super) struct Sums {
     pub(super) beyond: Lanes,
     pub(super) side: [Lanes; 3],
     pub(super) priced: [Lanes; 3],
+    /// Σ price, and Σ price · top.
+    pub(super) prices: Lanes,
+    pub(super) worth: Lanes,
 }
 
 impl Sums {
@@ -35,6 +38,8 @@ impl Sums {
             group.off[lane] = off;
             group.ratio[lane] = ratio;
             self.complement[lane] += room * price;
+            self.prices[lane] += price;
+            self.worth[lane] += price * group.top[lane];
             self.off[lane] = max(self.off[lane], off.abs());
             let scaled = [ratio * weights[0], ratio * weights[1], ratio * weights[2]];
             self.squares[0][lane] += scaled[0] * weights[0];

@@ -145,21 +145,38 @@ impl Program {
         }
     }
 
-    /// The worst use of a row by `unknowns` beyond its top, in parts of the top, and its block.
-    pub(super) fn worst(&self, unknowns: &[f64]) -> (f64, usize) {
-        let mut worst = (f64::NEG_INFINITY, 0);
-        for (index, block) in self.blocks.iter().enumerate() {
-            let y = &unknowns[block.first..block.first + 3];
+    /// The most that the rows let each unknown be, all broken by `broken` of their tops: those of which all
+    /// weights are positive. `most` keeps what it is where none bounds an unknown.
+    pub(super) fn largest(&self, broken: f64, most: &mut [f64]) {
+        for block in &self.blocks {
+            let most = &mut most[block.first..block.first + 3];
             for group in &self.groups[block.groups.0..block.groups.1] {
                 for lane in 0..LANES {
-                    let used: f64 = (0..3).map(|k| group.weights[k][lane] * y[k]).sum();
-                    if used - group.top[lane] > worst.0 {
-                        worst = (used - group.top[lane], index);
+                    let weights = [0, 1, 2].map(|k| group.weights[k][lane]);
+                    if weights.iter().any(|weight| *weight < 0.0) {
+                        continue;
+                    }
+                    for (most, weight) in most.iter_mut().zip(weights) {
+                        // Of no weight it is no bound: what is divided by 0 is infinite.
+                        *most = most.min((group.top[lane] + broken).max(0.0) / weight);
                     }
                 }
             }
         }
-        worst
+    }
+
+    /// The block whose rows cost most where no answer was found: there they exclude each other, and their prices
+    /// grow without bound. Where they are broken most says less, as a step breaks one row for another.
+    pub(super) fn dearest(&self) -> usize {
+        let mut dearest = (f64::NEG_INFINITY, 0);
+        for (index, block) in self.blocks.iter().enumerate() {
+            let groups = &self.groups[block.groups.0..block.groups.1];
+            let prices: f64 = groups.iter().flat_map(|group| group.price).sum();
+            if prices > dearest.0 {
+                dearest = (prices, index);
+            }
+        }
+        dearest.1
     }
 
     /// The largest factor up to 1 by which `unknowns` can be multiplied to keep every row whose

@@ -48,6 +48,10 @@ pub(super) struct Solver {
     diagonal: Vec<f64>,
     beside: Vec<f64>,
     beyond: Vec<f64>,
+    /// What the rows cost of each unknown at their prices.
+    priced: Vec<f64>,
+    /// The most that the rows let each unknown be; empty where that was not asked yet.
+    most: Vec<f64>,
 }
 
 /// What a pass over the rows found.
@@ -62,6 +66,9 @@ struct Found {
     /// The largest slope of the time, and what is left of it against the prices.
     steepest: f64,
     slope: f64,
+    /// Σ price, and Σ price · top of the rows.
+    prices: f64,
+    worth: f64,
 }
 
 impl Solver {
@@ -85,6 +92,9 @@ impl Solver {
                 return Outcome::Solved;
             }
             if !(found.complement.is_finite() && found.off.is_finite()) {
+                return Outcome::Failed;
+            }
+            if self.is_empty(program, &found) {
                 return Outcome::Failed;
             }
             self.steps += 1;
@@ -121,10 +131,12 @@ impl Solver {
             &mut self.diagonal,
             &mut self.beside,
             &mut self.beyond,
+            &mut self.priced,
         ] {
             buffer.clear();
             buffer.resize(count, 0.0);
         }
+        self.most.clear();
         self.unit = 1.0;
         self.unit = unknowns.len() as f64 / self.time(program, unknowns).max(1e-300);
         for (price, y) in self.price.iter_mut().zip(unknowns) {
@@ -157,6 +169,7 @@ impl Solver {
             self.beyond[index] = 0.0;
             self.side[index] = 0.0;
             self.slope[index] = price;
+            self.priced[index] = 0.0;
         }
         found.time = self.time(program, unknowns);
         found.steepest = self.side.iter().fold(1e-300, |most, gain| gain.abs().max(most));
@@ -170,10 +183,14 @@ impl Solver {
             let total = |lanes: Lanes| lanes.iter().sum::<f64>();
             found.complement += total(sums.complement);
             found.off = sums.off.iter().fold(found.off, |most, off| most.max(*off));
+            found.prices += total(sums.prices);
+            found.worth += total(sums.worth);
             for k in 0..3 {
                 self.diagonal[first + k] += total(sums.squares[k]);
                 self.side[first + k] += total(sums.side[k]);
-                self.slope[first + k] -= total(sums.priced[k]);
+                let priced = total(sums.priced[k]);
+                self.slope[first + k] -= priced;
+                self.priced[first + k] += priced;
             }
             self.beside[first] += total(sums.beside[0]);
             self.beside[first + 1] += total(sums.beside[1]);
@@ -181,6 +198,27 @@ impl Solver {
         }
         found.slope = self.slope.iter().fold(0.0, |most, slope| slope.abs().max(most));
         found
+    }
+
+    /// Whether the prices prove that nothing is within the rows, not even within those broken by what an answer
+    /// may break them by (Farkas): of all y ≥ 0 within the rows the prices z make zᵀA·y ≤ zᵀb, and where zᵀA is
+    /// nowhere below 0 and zᵀb is, there is none. Where zᵀA is below 0, by a little, y is at its largest.
+    fn is_empty(&mut self, program: &Program, found: &Found) -> bool {
+        let mut worth = found.worth + NEARLY_KEPT * found.prices;
+        if worth >= 0.0 {
+            return false;
+        }
+        if self.most.is_empty() {
+            self.most.resize(self.priced.len(), f64::INFINITY);
+            program.largest(NEARLY_KEPT, &mut self.most);
+        }
+        for (priced, most) in self.priced.iter().zip(&self.most) {
+            if *priced < 0.0 {
+                worth -= priced * most;
+            }
+        }
+        // Rounding of the sums: a proof by less is none. Put this way neither is one that is no number.
+        worth < -1e-9 * found.prices
     }
 
     /// The time; adds its slope and its curvature.
@@ -366,12 +404,30 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_exclude_each_other_fail() {
-        let mut program = program();
-        program.row([1.0, 1.0, 1.0], 1.0);
-        program.row([-1.0, 0.0, 0.0], -2.0);
-        let mut unknowns = vec![0.3; 3];
-        let outcome = Solver::default().solve(&mut program, &mut unknowns, 0.1, 1e-8);
-        assert_eq!(outcome, Outcome::Failed);
+    fn rows_that_exclude_each_other_fail_soon() {
+        for excess in [1e-3, 0.1, 1.0, 1e3] {
+            let mut program = program();
+            program.row([1.0, 1.0, 1.0], 1.0);
+            program.row([-1.0, 0.0, 0.0], -1.0 - excess);
+            let mut unknowns = vec![0.3; 3];
+            let mut solver = Solver::default();
+            let outcome = solver.solve(&mut program, &mut unknowns, 0.1, 1e-8);
+            assert_eq!(outcome, Outcome::Failed, "{excess}");
+            assert!(solver.steps <= 20, "{excess}: {} steps", solver.steps);
+        }
+    }
+
+    /// Rows that leave a sliver, or all but leave one, are not given up.
+    #[test]
+    fn rows_that_barely_hold_are_met() {
+        for room in [1e-9, 1e-6, 1e-3] {
+            let mut program = program();
+            program.row([1.0, 1.0, 1.0], 1.0);
+            program.row([0.0, -1.0, 0.0], -0.5);
+            program.row([-1.0, 0.0, -1.0], -0.5 + room);
+            let mut unknowns = vec![0.3; 3];
+            let outcome = Solver::default().solve(&mut program, &mut unknowns, 0.1, 1e-8);
+            assert_ne!(outcome, Outcome::Failed, "{room}");
+        }
     }
 }

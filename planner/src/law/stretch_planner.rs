@@ -334,8 +334,7 @@ impl Planner {
                 return Ok(());
             }
         }
-        let (_, block) = self.program.worst(&self.unknowns);
-        let place = self.problem.spline.place(block, 0.5);
+        let place = self.problem.spline.place(self.program.dearest(), 0.5);
         let at_end = match stretch.ties {
             [Tie::Fixed(..), Tie::Fixed(..)] => place > stretch.length / 2.0,
             [_, Tie::Fixed(..)] => true,
