@@ -297,7 +297,26 @@ impl Contour {
     /// True points of the drawn line from `from` to `to` [m], no chord farther than `chord_error`
     /// from it [m].
     pub(crate) fn points(&self, from: f64, to: f64, chord_error: f64) -> Vec<[f64; 3]> {
-        let mut points = vec![self.at(from).point.into()];
+        let mut points = Vec::new();
+        self.visit(from, to, chord_error, &mut |point| {
+            points.push(point);
+            true
+        });
+        points
+    }
+
+    /// Hands the points of [`Self::points`] to `take` as long as it wants more: of a curve that bends much there
+    /// may be more than memory should hold.
+    pub(crate) fn visit(
+        &self,
+        from: f64,
+        to: f64,
+        chord_error: f64,
+        take: &mut dyn FnMut([f64; 3]) -> bool,
+    ) {
+        if !take(self.at(from).point.into()) {
+            return;
+        }
         let index = self.track_at(from);
         for (track, &start) in self.tracks.iter().zip(&self.starts).skip(index) {
             if start >= to - GAP {
@@ -305,10 +324,11 @@ impl Contour {
             }
             if start + track.length() > from + GAP {
                 let (first, last) = ((from - start).max(0.0), (to - start).min(track.length()));
-                track.part(first, last).sample(chord_error, &mut points);
+                if !track.part(first, last).visit(chord_error, take) {
+                    return;
+                }
             }
         }
-        points
     }
 
     /// The largest constant speed [m/s]: V²κ ≤ A, V³|p‴| ≤ J, smoothed joints included.

@@ -276,19 +276,26 @@ impl Track {
     /// Points on the curve from its start (left out) to its end such that no chord is farther
     /// than `chord_error` from it.
     pub(crate) fn sample(&self, chord_error: f64, points: &mut Vec<[f64; 3]>) {
+        self.visit(chord_error, &mut |point| {
+            points.push(point);
+            true
+        });
+    }
+
+    /// Hands the points of [`Self::sample`] to `take` as long as it wants more. Says whether it took all.
+    pub(crate) fn visit(&self, chord_error: f64, take: &mut dyn FnMut([f64; 3]) -> bool) -> bool {
         if let Self::Spline { vertices, .. } = self {
-            points.extend(vertices.iter().skip(1).map(|vertex| <[f64; 3]>::from(*vertex)));
-            return;
+            return vertices.iter().skip(1).all(|vertex| take(<[f64; 3]>::from(*vertex)));
         }
         let curvature = self.bend().curvature;
         // Sagitta of a chord of length c on curvature κ: κ·c²/8.
         let chord =
             if curvature > 0.0 { (8.0 * chord_error / curvature).sqrt() } else { f64::INFINITY };
         let count = ((self.length() / chord).ceil() as usize).max(1);
-        for index in 1..=count {
+        (1..=count).all(|index| {
             let point = self.at(self.length() * index as f64 / count as f64).point;
-            points.push([point.x, point.y, point.z]);
-        }
+            take([point.x, point.y, point.z])
+        })
     }
 }
 

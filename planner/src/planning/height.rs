@@ -14,9 +14,11 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         if !self.task.z_is_height {
             return;
         }
-        let points = contour.points(0.0, contour.length(), CHORD);
         let lowest = &mut self.front.lowest[1];
-        *lowest = points.iter().fold(*lowest, |lowest, point| lowest.min(point[2]));
+        contour.visit(0.0, contour.length(), CHORD, &mut |point| {
+            *lowest = lowest.min(point[2]);
+            true
+        });
         self.hold_height();
     }
 

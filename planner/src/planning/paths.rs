@@ -49,26 +49,20 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
             return Ok(());
         }
         let (lower, upper) = (&self.area.lower, &self.area.upper);
-        for point in contour.points(0.0, contour.length(), CHORD) {
-            for row in 0..3 {
+        let mut outside = None;
+        contour.visit(0.0, contour.length(), CHORD, &mut |point| {
+            outside = (0..3).find_map(|row| {
                 let limit = point[row].clamp(lower[row], upper[row]);
-                if (point[row] - limit).abs() > ROUNDING {
-                    let time = self.front.time;
-                    let place = Place { stroke: self.front.light.stroke + 1, time };
-                    let quantity = Quantity::ToolPosition(row);
-                    let value = point[row];
-                    let violation =
-                        LimitViolation { time, axis: None, quantity, value, limit, unit: "m" };
-                    return Err(PlanError::Limit {
-                        line: contour.line,
-                        place,
-                        violation,
-                        zero: None,
-                    });
-                }
-            }
-        }
-        Ok(())
+                ((point[row] - limit).abs() > ROUNDING).then_some((row, point[row], limit))
+            });
+            outside.is_none()
+        });
+        let Some((row, value, limit)) = outside else { return Ok(()) };
+        let time = self.front.time;
+        let place = Place { stroke: self.front.light.stroke + 1, time };
+        let quantity = Quantity::ToolPosition(row);
+        let violation = LimitViolation { time, axis: None, quantity, value, limit, unit: "m" };
+        Err(PlanError::Limit { line: contour.line, place, violation, zero: None })
     }
 
     /// A path from rest to rest.
