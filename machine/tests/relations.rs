@@ -191,3 +191,24 @@ fn a_stepper_whose_teeth_are_stronger_than_its_field_is_refused() {
     warned("cartesian_steppers", &[&format!("{detent}=0.2 N m")], &["50 % of the holding torque"]);
     sound("cartesian_steppers", &[&format!("{detent}=40 mN m")]);
 }
+
+#[test]
+fn a_stepper_that_friction_holds_off_its_pulses_is_warned_of() {
+    // 0.03 mN·m against 3 mN·m · 200/rad are 50 µrad, and the beam turns by twice as much: 25 µm at 250 mm.
+    warned(
+        "galvo",
+        &["axis.m1.motor.stepper.holding_torque=3 mN m"],
+        &[
+            "axis `m1`",
+            "off its pulses by 5.000e-5 rad",
+            "by 24.997 µm",
+            "tolerance is 10.000 µm (line 24)",
+        ],
+    );
+    sound("galvo", &["axis.m1.motor.stepper.holding_torque=9 mN m"]);
+    warned(
+        "cartesian_steppers",
+        &["axis.x.friction.coulomb=0.1 N m", "path.tolerance=1 um"],
+        &["axis `x`", "off its pulses"],
+    );
+}

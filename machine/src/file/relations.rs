@@ -197,7 +197,7 @@ pub(super) fn check(
         subject.weight(diagnostics);
         match &actuator.motor {
             Motor::Dc(motor) => subject.dc(motor, &table.path, diagnostics),
-            Motor::Stepper(motor) => subject.stepper(motor, diagnostics),
+            Motor::Stepper(motor) => subject.stepper(motor, &table.path, diagnostics),
         }
     }
     loops(driven, &standing, diagnostics);
@@ -514,7 +514,7 @@ impl Subject<'_> {
     }
 
     /// What the data of a stepper say of each other.
-    fn stepper(&self, motor: &StepperMotor, diagnostics: &mut Diagnostics) {
+    fn stepper(&self, motor: &StepperMotor, path: &PathTable, diagnostics: &mut Diagnostics) {
         let Some(data) = &self.table.motor.stepper else { return };
         let (detent, holding) = (motor.detent_torque, motor.holding_torque);
         if detent >= holding {
@@ -538,6 +538,36 @@ impl Subject<'_> {
             self.warn(data.detent_torque.span, &text, diagnostics);
         }
         self.friction(holding, diagnostics);
+        self.lag(motor, data.holding_torque.span, path, diagnostics);
+    }
+
+    /// How far friction holds a stepper off its pulses, whose holding torque is said at `span`: by so much it
+    /// stops short of its place from either side.
+    fn lag(
+        &self,
+        motor: &StepperMotor,
+        span: Span,
+        path: &PathTable,
+        diagnostics: &mut Diagnostics,
+    ) {
+        let Self { table, lever, actuator, .. } = self;
+        let coulomb = actuator.friction.coulomb;
+        // Friction of more than the holding torque is warned of already, and the field then holds it nowhere.
+        let angle = coulomb / motor.stiffness();
+        let lag = angle * actuator.ratio.abs() * lever;
+        if lag > path.tolerance.value {
+            let text = format!(
+                "a friction of {coulomb:.3e} N·m{} holds a motor of {:.3e} N·m of holding torque off its \
+                 pulses by {angle:.3e} rad, which moves the tool by {:.3} µm, and the path's tolerance is \
+                 {:.3} µm{}: give it a stronger motor or more gear, or the path more tolerance",
+                at_line(table.friction.coulomb.span, diagnostics),
+                motor.holding_torque,
+                lag * 1e6,
+                path.tolerance.value * 1e6,
+                at_line(path.tolerance.span, diagnostics)
+            );
+            self.warn(span, &text, diagnostics);
+        }
     }
 }
 
