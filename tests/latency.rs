@@ -116,3 +116,53 @@ fn places_that_were_measured_before_the_deadline_are_held_to_the_plan_of_that_in
         assert_accurate("servo_gantry", &modes, bound);
     }
 }
+
+/// A raster of dots as dense as the light can change, in proportion to the speed.
+fn raster() -> String {
+    let mut text = String::from("G21 G90\nF15000\nG0 X-10 Y0\nM4 S100\n");
+    for dot in 1..1200 {
+        let power = [0, 600, 300, 0, 900][dot % 5];
+        text += &format!("G1 X{:.4} S{power}\n", -10.0 + 0.013 * dot as f64);
+    }
+    text + "M5\nM2\n"
+}
+
+#[test]
+fn a_gate_that_is_late_by_a_part_of_a_cycle_has_room_for_every_change_of_a_dense_raster() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("raster.ngc");
+    std::fs::write(&program, raster()).unwrap();
+    let path = support::source("machines").join("corexy.toml");
+    for (period, latency) in
+        [("1 ms", "0.3 ms"), ("1 ms", "1.85 ms"), ("500 us", "0.2 ms"), ("1.5 ms", "0.4 ms")]
+    {
+        let changes = [
+            format!("realtime.period={period}"),
+            format!("drives.simulated.gate_latency={latency}"),
+            "laser.off_delay=45 us".to_owned(),
+        ];
+        let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+        let machine = Machine::load(&path, &overrides(&changes)).unwrap();
+        let job = Job::read(&program, &[], &machine).unwrap();
+        let plan = planner::plan(&machine, &job).unwrap();
+        let (mut times, mut last) = (Vec::new(), (0, 0.0));
+        for setpoint in plan.setpoints(1) {
+            let start = setpoint.sequence as i64 * 1_000_000;
+            let laser = &setpoint.laser;
+            if last != (laser.gate, laser.power) {
+                times.push(start);
+            }
+            times.extend(laser.edges().iter().map(|edge| start + i64::from(edge.offset)));
+            last = laser.last();
+        }
+        assert!(times.len() > 1000, "{} changes", times.len());
+        // Wherever a cycle begins, one more change than a sample holds is not in it.
+        let length = machine.realtime.period.time().0;
+        let closest =
+            times.windows(messages::MAX_EDGES + 1).map(|it| it[messages::MAX_EDGES] - it[0]);
+        assert!(closest.min() >= Some(length), "{period}, {latency}");
+        let simulated = simulate(&machine, &machine, &plan, PlantOptions::default(), |_| {});
+        let report = simulated.unwrap().controller;
+        assert_eq!((report.completed, report.fault.is_some()), (1, false), "{:?}", report.fault);
+    }
+}

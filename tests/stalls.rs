@@ -123,7 +123,7 @@ fn at_4_khz_tolerated_stalls_cost_no_mark_either() {
     for name in ["corexy.toml", "cartesian_steppers.toml"] {
         let mut machine = load(name);
         machine.realtime.period = Period::new(messages::Nanoseconds(250_000)).unwrap();
-        bear_stalls(name, &machine, 900, 0..4);
+        bear_stalls(name, &machine, 900, 0..12);
     }
 }
 

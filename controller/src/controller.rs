@@ -82,11 +82,12 @@ use transitions::Waits;
 /// Time between two reports.
 const REPORT_INTERVAL: Nanoseconds = Nanoseconds(1_000_000_000);
 
-/// Times in a row that light may be lost at one place before the machine is stopped.
+/// Times that light may be lost at one place before the machine is stopped.
 const MOST_LOSSES: u32 = 3;
 
-/// Light lost this soon after the place where it was lost before counts as lost at one place:
-/// about the length of a ramp [setpoints].
+/// Light lost this soon after the place where it was lost first counts as lost at one place: about the length of a ramp
+/// [setpoints]. Counted from the first loss and not from the one before, a job that gets on by less than that each time
+/// gets on all the same.
 const ONE_PLACE: StreamTime = StreamTime(128 * ONE);
 
 /// The controller of one machine. Everything is allocated in [`Controller::new`].
@@ -136,7 +137,7 @@ pub struct Controller {
     completed: bool,
     /// The final report of a stream that ended in this step.
     ended: Option<ControllerReport>,
-    /// Where light was lost last, and how often in a row about there.
+    /// Where light was lost first, and how often about there.
     lost_at: StreamTime,
     losses: u32,
     cycles: u64,
@@ -317,8 +318,8 @@ impl Controller {
     /// Holds, because marks from `from` on were not lit; the resume goes back to mark them.
     fn go_back_for_light(&mut self, from: StreamTime, now: Nanoseconds) {
         let same_place = self.losses > 0 && from < self.lost_at + ONE_PLACE;
-        self.losses = if same_place { self.losses + 1 } else { 1 };
-        self.lost_at = from;
+        (self.losses, self.lost_at) =
+            if same_place { (self.losses + 1, self.lost_at) } else { (1, from) };
         if self.losses > MOST_LOSSES {
             let (value, limit) = (f64::from(self.losses), f64::from(MOST_LOSSES));
             let fault = Fault::new(FaultCode::StaleCommand);

@@ -210,15 +210,28 @@ fn a_period_that_no_cycle_can_have_is_refused_and_a_stall_is_at_least_one() {
 }
 
 #[test]
-fn loops_that_swing_in_a_long_cycle_are_refused_and_defaults_follow_it() {
-    let swings = |place: &str| {
-        format!(
-            "{place}: a current loop of 349 rad/s swings without end in a control cycle of 4 ms; lower \
-             `loops.current`: 83 rad/s is safe; or shorten the period"
-        )
-    };
-    let long = "[realtime]\nperiod = \"4 ms\"\n[laser]";
-    refused("[laser]", long, &[&swings("68:11"), &swings("97:11")]);
+fn loops_that_would_swing_in_a_long_cycle_are_slower_and_so_are_defaults() {
+    // Written: as they are where the cycle bears them, and told of where they are slower.
+    for (period, slower) in [("1 ms", 1.0), ("1.25 ms", 1.0), ("2 ms", 2.0), ("4 ms", 4.0)] {
+        let table = format!("[realtime]\nperiod = \"{period}\"\n[laser]");
+        let text = COREXY.replacen("[laser]", &table, 1);
+        let machine = Machine::parse("machine.toml", &text, &[]).unwrap();
+        let gains = machine.actuators[0].gains;
+        let found = [gains.position, gains.velocity, gains.current].map(|it| it * slower);
+        assert_eq!(found, [40.0, 160.0, 349.0], "{period}");
+        let told = machine.warnings.iter().filter(|it| it.text.contains("would swing in one of"));
+        let lines: Vec<usize> = told.map(|warning| warning.line).collect();
+        assert_eq!(lines, if slower > 1.0 { vec![66, 95] } else { vec![] }, "{period}");
+    }
+    let long = "current = \"1000 rad/s\"";
+    refused(
+        "current = \"349 rad/s\"",
+        long,
+        &[
+            "68:11: a current loop of 1000 rad/s swings without end in a control cycle of 1 ms; lower \
+           `loops.current`: 333 rad/s is safe; or shorten the period",
+        ],
+    );
     let written =
         ["position = \"40 1/s\"\n", "velocity = \"160 rad/s\"\n", "current = \"349 rad/s\"\n"];
     let silent = written.iter().fold(COREXY.to_owned(), |text, line| text.replace(line, ""));

@@ -1,7 +1,7 @@
 //! From the axes' tables to [`Axis`] and [`Actuator`]: ratios, what the loops move, and the motors' own
 //! limits.
 
-use super::loops::{DeadTimes, gains};
+use super::loops::{DeadTimes, Driven, gains};
 use super::motors::{counts, mode, motor};
 use super::tables::{AxisActuatorTable, AxisTable, LimitsTable};
 use crate::actuator::{Actuator, Friction, HoldingBrake, LoopGains};
@@ -188,6 +188,7 @@ pub(super) fn axis(
         let inertia = motor.rotor_inertia() + ratio * ratio * (joint.load * share);
         let table = &drive.table;
         fastest = fastest.min(motor.largest_speed() * ratio.abs());
+        let follows = mode(table, &motor, diagnostics);
         let actuator = Actuator {
             name: drive.name.clone(),
             axis: index,
@@ -208,12 +209,15 @@ pub(super) fn axis(
             },
             encoder: counts(table, &motor, diagnostics)?,
             gains: match motor {
-                Motor::Dc(_) => gains(table, inertia, DeadTimes::at_once(period), diagnostics)?,
+                Motor::Dc(dc) => {
+                    let driven = Driven { motor: &dc, mode: follows, tells: true };
+                    gains(table, &driven, inertia, DeadTimes::at_once(period), diagnostics)?
+                }
                 Motor::Stepper(_) => {
                     LoopGains { position: 0.0, velocity: 0.0, current: 0.0, inertia }
                 }
             },
-            mode: mode(table, &motor, diagnostics),
+            mode: follows,
             latency: Nanoseconds(0),
             age: Nanoseconds(0),
             square: drive.square,

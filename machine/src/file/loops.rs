@@ -1,10 +1,12 @@
 //! The control loops of an actuator: how fast they may be.
 
+mod stability;
+
 use super::tables::{AxisTable, LoopsTable};
 use crate::actuator::{Actuator, LoopGains};
 use crate::document::{Decode, Diagnostics, Span, Spanned};
 use crate::drives::ActuatorMode;
-use crate::motor::Motor;
+use crate::motor::{DcMotor, Motor};
 use messages::Nanoseconds;
 use messages::time::Period;
 
@@ -73,8 +75,8 @@ pub(super) fn slow_down(
     period: Period,
     diagnostics: &mut Diagnostics,
 ) {
-    let is_stepper = matches!(actuator.motor, Motor::Stepper(_));
-    if actuator.latency + actuator.age == Nanoseconds(0) || is_stepper {
+    let Motor::Dc(motor) = actuator.motor else { return };
+    if actuator.latency + actuator.age == Nanoseconds(0) {
         return;
     }
     let by_drive = DeadTime::at_once(period);
@@ -86,16 +88,28 @@ pub(super) fn slow_down(
         ActuatorMode::Voltage => [here; 3],
     };
     let dead = DeadTimes { position, velocity, current };
-    if let Some(gains) = gains(table, actuator.gains.inertia, dead, diagnostics) {
+    // What the period makes of written loops has been told already.
+    let driven = Driven { motor: &motor, mode: actuator.mode, tells: false };
+    if let Some(gains) = gains(table, &driven, actuator.gains.inertia, dead, diagnostics) {
         actuator.gains = gains;
     }
 }
 
+/// What the loops close over.
+pub(super) struct Driven<'a> {
+    pub(super) motor: &'a DcMotor,
+    pub(super) mode: ActuatorMode,
+    /// Whether a warning tells of written loops that are slowed down.
+    pub(super) tells: bool,
+}
+
 /// The gains of the loops. Defaults suit 1 ms without latency; with a longer dead time they are slower by as
-/// much, with what is written of them as it is. A loop that answers within its dead time swings without end: it
-/// is refused.
+/// much. What is written stays as it is, unless the loops that are closed here would swing in a period of more than
+/// 1 ms: then it is slower in proportion to that, with a warning. A loop that answers within its dead time swings without
+/// end: it is refused.
 pub(super) fn gains(
     table: &AxisTable,
+    driven: &Driven<'_>,
     inertia: f64,
     dead: DeadTimes,
     diagnostics: &mut Diagnostics,
@@ -109,9 +123,14 @@ pub(super) fn gains(
         }
     };
     let usual = DeadTime::at_once(Period::OF_SETPOINTS).seconds();
+    let slower = slower_by_period(loops, driven, dead.velocity.period, diagnostics);
     // The place of a default is that of its table.
     let in_time = |value: f64, span: Span, dead: DeadTime| Spanned {
-        value: if span == loops.span { value * (usual / dead.seconds()).min(1.0) } else { value },
+        value: if span == loops.span {
+            value * (usual / dead.seconds()).min(1.0)
+        } else {
+            value * slower
+        },
         span,
     };
     let position = in_time(loops.position.value, loops.position.span, dead.position);
@@ -156,4 +175,42 @@ pub(super) fn gains(
         current: current.value,
         inertia,
     })
+}
+
+/// By what written loops are slower for a control cycle of `period`: 1 where those that are closed here bear it, a quarter
+/// of it longer too.
+fn slower_by_period(
+    loops: &LoopsTable,
+    driven: &Driven<'_>,
+    period: Period,
+    diagnostics: &mut Diagnostics,
+) -> f64 {
+    /// What must be left of the way to loops that swing: springs and friction take some of it.
+    const RESERVE: f64 = 1.25;
+    let LoopsTable { position, velocity, current, span } = loops;
+    let written = [position.span, velocity.span, current.span].into_iter().find(|it| it != span);
+    let is_closed_here = matches!(driven.mode, ActuatorMode::Voltage | ActuatorMode::Torque);
+    let (Some(written), true, true) = (written, is_closed_here, period > Period::OF_SETPOINTS)
+    else {
+        return 1.0;
+    };
+    let (usual, time) = (Period::OF_SETPOINTS.seconds(), period.seconds());
+    let all = [position.value, velocity.value, current.value];
+    let pole = driven.motor.resistance / driven.motor.inductance;
+    if stability::is_stable(all, pole, RESERVE * time) {
+        return 1.0;
+    }
+    let slower = usual / time;
+    if driven.tells {
+        let [position, velocity, current] = all.map(|it| it * slower);
+        diagnostics.warn(
+            written,
+            format!(
+                "these loops are made for a control cycle of 1 ms and would swing in one of {} ms: they are {position:.1}, \
+                 {velocity:.1} and {current:.1} rad/s in it; write loops that it bears, or leave them out",
+                time * 1e3
+            ),
+        );
+    }
+    slower
 }

@@ -305,8 +305,8 @@ table! {
 // and for the outer loops what a pilot of both machines found (100 1/s in the velocity loop and
 // 25 1/s in the position loop fail).
 table! {
-    /// Bandwidths of the control loops; the gains follow from motor and load. What is not written is
-    /// slower in proportion where the control cycle is longer than 1 ms.
+    /// Bandwidths of the control loops; the gains follow from motor and load. Where the control cycle is longer than
+    /// 1 ms, what is not written is slower in proportion, and what is written too where it would swing.
     pub struct LoopsTable {
         /// Position loop.
         pub position: Above<unit::Bandwidth> = "40 1/s",

@@ -6,7 +6,9 @@ use machine::{
     Actuator, Axis, DcMotor, Friction, LaserSource, Machine, Motor, PathLimits, WorkArea,
 };
 use messages::time::{Period, SETPOINT_PERIOD, SETPOINT_TIME};
-use messages::{ActuatorArray, AxisArray, MAX_ACTUATORS, MAX_AXES, MAX_EDGES, Setpoint};
+use messages::{
+    ActuatorArray, AxisArray, MAX_ACTUATORS, MAX_AXES, MAX_EDGES, Nanoseconds, Setpoint,
+};
 
 use messages::plan::LimitUtilization;
 
@@ -217,7 +219,7 @@ pub(crate) struct Checker {
     most: [Most; 4],
     axes: [AxisMost; MAX_AXES],
     motors: [MotorMost; MAX_ACTUATORS],
-    /// The gate's newest edges, where a control cycle plays several setpoints.
+    /// The gate's newest changes, where a control cycle may begin anywhere between two setpoints.
     edges: Option<EdgeTimes>,
     uses: LimitUtilization,
 }
@@ -239,7 +241,7 @@ impl Checker {
             most: [Most::default(); 4],
             axes: [AxisMost::default(); MAX_AXES],
             motors: [MotorMost::default(); MAX_ACTUATORS],
-            edges: EdgeTimes::new(machine.realtime.period),
+            edges: EdgeTimes::new(machine.realtime.period, machine.drives.gate_latency),
             uses: LimitUtilization {
                 velocity: none(),
                 acceleration: none(),
@@ -435,8 +437,9 @@ fn standing(speed: f64) -> f64 {
     if Friction::is_standing(speed) { 0.0 } else { speed }
 }
 
-/// When the gate's newest edges are, [`MAX_EDGES`] of them, for control cycles longer than a setpoint: wherever
-/// such a cycle begins, it has room for no more.
+/// When the gate's newest changes are, [`MAX_EDGES`] of them, where a control cycle may begin anywhere between two
+/// setpoints: it is longer than a setpoint, or the gate is told a part of a cycle later. Wherever such a cycle begins, it
+/// has room for no more.
 #[derive(Debug, Clone, Copy)]
 struct EdgeTimes {
     /// How long a control cycle is [ns].
@@ -444,21 +447,32 @@ struct EdgeTimes {
     /// Times [ns] in a ring, and where the oldest is.
     times: [i64; MAX_EDGES],
     oldest: usize,
+    /// Gate and power at the end of the newest setpoint.
+    last: (u32, f64),
 }
 
 impl EdgeTimes {
-    /// `None` where a cycle is no longer than a setpoint, whose own edges are counted.
-    fn new(period: Period) -> Option<Self> {
-        let before = i64::MIN / 2;
-        let is_long = period > Period::OF_SETPOINTS;
-        is_long.then_some(Self { period: period.time().0, times: [before; MAX_EDGES], oldest: 0 })
+    /// `None` where each cycle is a part of a setpoint, whose own edges are counted.
+    fn new(period: Period, gate_latency: Nanoseconds) -> Option<Self> {
+        let (before, length) = (i64::MIN / 2, period.time().0);
+        let is_anywhere = period > Period::OF_SETPOINTS || gate_latency.0 % length != 0;
+        is_anywhere.then_some(Self {
+            period: length,
+            times: [before; MAX_EDGES],
+            oldest: 0,
+            last: (0, 0.0),
+        })
     }
 
-    /// Takes the edges of the next setpoint; whether any control cycle can hold them and those before.
+    /// Takes the changes of the next setpoint, the one at its beginning included; whether any control cycle can hold
+    /// them and those before.
     fn take(&mut self, setpoint: &Setpoint) -> bool {
         let start = Period::OF_SETPOINTS.of(setpoint.sequence).0;
-        setpoint.laser.edges().iter().all(|edge| {
-            let time = start + i64::from(edge.offset);
+        let Setpoint { laser, .. } = setpoint;
+        let begins = (self.last != (laser.gate, laser.power)).then_some(start);
+        self.last = laser.last();
+        let edges = laser.edges().iter().map(|edge| start + i64::from(edge.offset));
+        begins.into_iter().chain(edges).all(|time| {
             let Some(oldest) = self.times.get_mut(self.oldest) else { return false };
             let apart = time - core::mem::replace(oldest, time);
             self.oldest = (self.oldest + 1) % MAX_EDGES;

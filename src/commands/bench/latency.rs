@@ -82,21 +82,12 @@ fn period_of(period: &str) -> String {
     format!("machine.realtime.period={period}")
 }
 
-/// Measures at each of [`RATES`], with the loops as much slower as the cycle is longer than 1 ms.
+/// Measures at each of [`RATES`].
 fn rates(arguments: &LatencyArguments) -> Result<Exit, Failure> {
-    let axes = inputs::machine(&arguments.machine)?.machine.axes;
     let mut report = RatesReport { rates: Vec::new() };
     for micro in RATES {
         let mut machine = arguments.machine.clone();
         machine.set.push(period_of(&format!("{micro} us")));
-        let slower = (1000.0 / micro).min(1.0);
-        for axis in axes.iter().filter(|_| slower < 1.0) {
-            for (name, bandwidth) in [("position", 40.0), ("velocity", 160.0), ("current", 349.0)] {
-                let (name, bandwidth) =
-                    (format!("axis.{}.loops.{name}", axis.name), bandwidth * slower);
-                machine.set.push(format!("machine.{name}={bandwidth} rad/s"));
-            }
-        }
         let (measured, _) = measure(arguments, &machine)?;
         if !arguments.json {
             if report.rates.is_empty() {
