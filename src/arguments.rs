@@ -176,6 +176,9 @@ pub enum Command {
     Drives(ServiceArguments),
     /// The monitor service: records and measures; nobody waits for it.
     Monitor(MonitorArguments),
+    /// The Modbus service: asks chiller, extraction and source of the machine file, and switches its outputs there; for a
+    /// build with the feature `modbus`.
+    Modbus(ServiceArguments),
     /// Hold a summary to what must be true of every one; for scripts.
     #[command(hide = true)]
     VerifySummary {

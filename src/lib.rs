@@ -85,6 +85,7 @@ fn carry_out(command: &Command) -> Result<Exit, Failure> {
         Command::Controller(arguments) => service::run(Role::Controller, arguments),
         Command::Drives(arguments) => service::run(Role::Drives, arguments),
         Command::Monitor(arguments) => service::monitor(arguments),
+        Command::Modbus(arguments) => service::run(Role::Modbus, arguments),
         Command::Schema { file } => manual::schema(*file),
         Command::Completions { shell } => manual::completions(*shell),
         Command::Manual { folder } => manual::pages(folder),

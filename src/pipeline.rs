@@ -16,6 +16,7 @@ pub mod queue;
 mod refusals;
 pub mod services;
 pub mod serving;
+pub mod slow;
 pub mod status;
 
 use crate::arguments::AccessArguments;
@@ -26,7 +27,7 @@ use machine::{DrivesKind, Machine};
 use messages::time::SETPOINT_TIME;
 use messages::{
     ControllerReport, ControllerState, DrivesReport, JobOffer, OperatorReply, OperatorVerb,
-    PlannerReport, Progress, SimulatedInputs,
+    PlannerReport, Progress, SimulatedInputs, SlowInputs,
 };
 use monitor::recording::level::Level;
 use operators::Operators;
@@ -83,6 +84,8 @@ pub struct Latest {
     pub drives: DrivesReport,
     /// From the planner.
     pub planner: PlannerReport,
+    /// Of the devices on Modbus.
+    pub slow: SlowInputs,
 }
 
 impl Latest {
@@ -118,6 +121,7 @@ struct Subscriptions {
     controller: Subscriber<ControllerReport>,
     drives: Subscriber<DrivesReport>,
     planner: Subscriber<PlannerReport>,
+    slow: Subscriber<SlowInputs>,
 }
 
 /// A domain with its services. Dropping it, in a panic too, is its ordered end: laser, axes,
@@ -165,6 +169,9 @@ impl Pipeline {
             message::tell(&warning);
         }
         let machine = configuration.machine()?;
+        if owner == ServiceOwner::Own {
+            slow::check_built(&machine)?;
+        }
         let domain = Domain::create(instance).map_err(Failure::service)?;
         configuration.write(instance)?;
         let subscriptions = Subscriptions {
@@ -172,6 +179,7 @@ impl Pipeline {
             controller: domain.subscriber(Samples::Latest).map_err(Failure::service)?,
             drives: domain.subscriber(Samples::Latest).map_err(Failure::service)?,
             planner: domain.subscriber(Samples::Latest).map_err(Failure::service)?,
+            slow: domain.subscriber(Samples::Latest).map_err(Failure::service)?,
         };
         let offers = domain.publisher().map_err(Failure::service)?;
         let link = Arc::new(OperatorLink::start(&domain).map_err(Failure::service)?);
@@ -196,8 +204,8 @@ impl Pipeline {
         );
         let operators = Operators::bind(&domain, answers, jobs)?;
         let services = match owner {
-            ServiceOwner::Own => Services::start(&domain)?,
-            ServiceOwner::Others => Services::of_others(),
+            ServiceOwner::Own => Services::start(&domain, &machine)?,
+            ServiceOwner::Others => Services::of_others(&machine),
         };
         Ok(Self {
             machine,
@@ -252,6 +260,9 @@ impl Pipeline {
         }
         if let Some(sample) = self.subscriptions.planner.newest().map_err(Failure::service)? {
             latest.planner = sample;
+        }
+        if let Some(sample) = self.subscriptions.slow.newest().map_err(Failure::service)? {
+            latest.slow = sample;
         }
         let ended = self.services.poll(&self.domain);
         self.serving.poll();

@@ -68,7 +68,7 @@ fn value<'a>(section: &'a Section, key: &str) -> &'a str {
 
 #[test]
 fn every_service_is_hardened() {
-    for name in ["domain", "planner", "controller", "drives", "monitor", "serve"] {
+    for name in ["domain", "planner", "controller", "drives", "monitor", "modbus", "serve"] {
         let unit = service(name);
         for (key, wanted) in HARDENED {
             assert!(unit.contains_key(*key), "{name} lacks {key}");
@@ -80,7 +80,7 @@ fn every_service_is_hardened() {
 }
 
 #[test]
-fn only_the_page_reaches_a_network_and_only_the_cycle_a_priority() {
+fn only_the_page_and_modbus_reach_a_network_and_only_the_cycle_a_priority() {
     for name in ["domain", "planner", "monitor"] {
         let unit = service(name);
         for key in ["PrivateNetwork", "PrivateDevices", "RestrictRealtime"] {
@@ -98,18 +98,18 @@ fn only_the_page_reaches_a_network_and_only_the_cycle_a_priority() {
         assert_eq!(value(&unit, "DevicePolicy"), "closed");
         assert_eq!(value(&unit, "DeviceAllow"), "/dev/cpu_dma_latency rw");
     }
-    let page = service("serve");
-    assert_eq!(value(&page, "RestrictAddressFamilies"), "AF_UNIX AF_INET AF_INET6");
-    assert_eq!(
-        (value(&page, "IPAddressDeny"), value(&page, "IPAddressAllow")),
-        ("any", "localhost")
-    );
-    assert_eq!(value(&page, "RestrictRealtime"), "yes");
+    for name in ["serve", "modbus"] {
+        let unit = service(name);
+        assert_eq!(value(&unit, "RestrictAddressFamilies"), "AF_UNIX AF_INET AF_INET6", "{name}");
+        let allowed = (value(&unit, "IPAddressDeny"), value(&unit, "IPAddressAllow"));
+        assert_eq!(allowed, ("any", "localhost"), "{name}");
+        assert_eq!(value(&unit, "RestrictRealtime"), "yes", "{name}");
+    }
 }
 
 #[test]
 fn services_say_when_they_are_ready_and_that_they_live_but_for_the_cycle() {
-    for name in ["domain", "planner", "monitor"] {
+    for name in ["domain", "planner", "monitor", "modbus"] {
         let unit = service(name);
         assert_eq!((value(&unit, "Type"), value(&unit, "WatchdogSec")), ("notify", "30"), "{name}");
     }
@@ -120,12 +120,14 @@ fn services_say_when_they_are_ready_and_that_they_live_but_for_the_cycle() {
     for name in ["domain", "planner", "controller", "drives"] {
         assert_eq!(value(&service(name), "Restart"), "no", "{name}");
     }
-    assert_eq!(value(&service("monitor"), "Restart"), "on-failure");
+    for name in ["monitor", "modbus"] {
+        assert_eq!(value(&service(name), "Restart"), "on-failure", "{name}");
+    }
 }
 
 #[test]
 fn services_end_with_their_domain_and_the_page_does_not_end_them() {
-    for name in ["planner", "controller", "drives", "monitor"] {
+    for name in ["planner", "controller", "drives", "monitor", "modbus"] {
         let unit = &sections(&format!("graver-{name}@.service"))["Unit"];
         assert_eq!(value(unit, "BindsTo"), "graver-domain@%i.service", "{name}");
         assert_eq!(value(unit, "PartOf"), "graver@%i.target", "{name}");
@@ -136,7 +138,8 @@ fn services_end_with_their_domain_and_the_page_does_not_end_them() {
     let target = &sections("graver@.target")["Unit"];
     let wanted = value(target, "Wants");
     assert_eq!(wanted.split_whitespace().count(), 5);
-    assert!(!wanted.contains("serve"));
+    // Nor is there a device on Modbus beside every machine.
+    assert!(!wanted.contains("serve") && !wanted.contains("modbus"));
     assert_eq!(
         value(&sections("graver-serve@.service")["Install"], "WantedBy"),
         "graver@%i.target"
@@ -148,6 +151,10 @@ fn what_drives_on_a_network_may_is_in_drop_ins_of_their_own() {
     let board = &sections("network/hostmot2.conf")["Service"];
     assert_eq!(value(board, "RestrictAddressFamilies"), "AF_UNIX AF_INET");
     assert!(!board.contains_key("AmbientCapabilities"));
+    let devices = &sections("network/modbus.conf")["Service"];
+    assert!(
+        devices.contains_key("IPAddressAllow") && !devices.contains_key("CapabilityBoundingSet")
+    );
     let bus = &sections("network/ethercat.conf")["Service"];
     assert_eq!(value(bus, "RestrictAddressFamilies"), "AF_UNIX AF_PACKET");
     for key in ["AmbientCapabilities", "CapabilityBoundingSet"] {

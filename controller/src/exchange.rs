@@ -24,6 +24,8 @@ pub struct Peers {
     pub drives: Presence,
     /// Who holds the domain.
     pub supervisor: Presence,
+    /// Who asks the devices on Modbus; missed only where the machine has some.
+    pub modbus: Presence,
 }
 
 /// What a step is given.

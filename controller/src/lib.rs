@@ -25,6 +25,7 @@ pub mod ramp;
 pub mod reference;
 pub mod safety;
 pub mod service;
+pub mod slow;
 pub mod squaring;
 pub mod standing;
 mod state;

@@ -8,7 +8,7 @@ use crate::exchange::{Inputs, Outputs, Peers as PeersPresent, Presence};
 use machine::Machine;
 use messages::{
     Command, ControllerReport, ControllerState, Feedback, Nanoseconds, OperatorRequest,
-    OperatorVerb, Progress, Setpoint,
+    OperatorVerb, Progress, Setpoint, SlowInputs,
 };
 use runtime::clock;
 use runtime::operator::OperatorQueue;
@@ -61,6 +61,8 @@ struct ServiceCycle {
     operators: OperatorQueue,
     feedbacks: Subscriber<Feedback>,
     setpoints: Subscriber<Setpoint>,
+    /// `None` where the machine has no slow devices.
+    slow: Option<Subscriber<SlowInputs>>,
     commands: Publisher<Command>,
     progress: Publisher<Progress>,
     reports: Publisher<ControllerReport>,
@@ -70,15 +72,25 @@ struct ServiceCycle {
 
 impl ServiceCycle {
     fn open(domain: &Domain, machine: &Machine) -> Result<Self, ServiceError> {
+        let mut controller = Controller::new(machine);
+        let mut watched = vec![Role::Domain, Role::Planner, Role::Drives];
+        let mut slow = None;
+        if !machine.operating.devices.is_empty() {
+            // Until they have spoken they are silent.
+            controller.hear(&SlowInputs::default());
+            slow = Some(domain.subscriber(Samples::Latest)?);
+            watched.push(Role::Modbus);
+        }
         Ok(Self {
-            controller: Controller::new(machine),
+            controller,
             outputs: Outputs::default(),
             setpoints_taken: Vec::with_capacity(DRAIN),
             told_to_stop: false,
-            peers: Peers::watch(domain, &[Role::Domain, Role::Planner, Role::Drives])?,
+            peers: Peers::watch(domain, &watched)?,
             operators: OperatorQueue::start(domain)?,
             feedbacks: domain.subscriber(Samples::Latest)?,
             setpoints: domain.subscriber(Samples::All)?,
+            slow,
             commands: domain.publisher()?,
             progress: domain.publisher()?,
             reports: domain.publisher()?,
@@ -92,6 +104,11 @@ impl ServiceCycle {
         while self.setpoints_taken.len() < DRAIN.min(self.controller.room()) {
             let Some(setpoint) = self.setpoints.receive()? else { break };
             self.setpoints_taken.push(setpoint);
+        }
+        if let Some(slow) = &mut self.slow
+            && let Some(words) = slow.newest()?
+        {
+            self.controller.hear(&words);
         }
         let request = self.request();
         let peers = self.present();
@@ -159,6 +176,7 @@ impl ServiceCycle {
             planner: presence(Role::Planner),
             drives: presence(Role::Drives),
             supervisor: presence(Role::Domain),
+            modbus: presence(Role::Modbus),
         }
     }
 

@@ -90,8 +90,8 @@ pub struct Hostmot2 {
     pub actuators: Vec<Hostmot2Actuator>,
     /// The pin of each of the machine's inputs, in their order.
     pub inputs: Vec<u32>,
-    /// The pin of each of its outputs.
-    pub outputs: Vec<u32>,
+    /// The pin of each of its outputs; `None` of one that is switched elsewhere.
+    pub outputs: Vec<Option<u32>>,
 }
 
 /// What drives an actuator on a HostMot2 card: numbers of the card's modules, from 0.
@@ -148,8 +148,8 @@ pub struct Ethercat {
     pub power: Option<u16>,
     /// Where each of the machine's inputs is, in their order.
     pub inputs: Vec<EthercatBit>,
-    /// Where each of its outputs is.
-    pub outputs: Vec<EthercatBit>,
+    /// Where each of its outputs is; `None` of one that is switched elsewhere.
+    pub outputs: Vec<Option<EthercatBit>>,
     /// Who slaves shall be, in the order of the file; nothing is asked of those that are not here.
     pub identities: Vec<EthercatIdentity>,
 }

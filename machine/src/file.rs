@@ -12,6 +12,7 @@ mod loops;
 pub mod mechanism;
 pub mod mesh;
 mod mesh_file;
+pub mod modbus;
 pub mod motors;
 pub mod operating;
 mod relations;

@@ -23,6 +23,7 @@ pub mod laser;
 pub mod limits;
 pub mod machine;
 pub mod mechanisms;
+pub mod modbus;
 pub mod motor;
 pub mod offsets;
 pub mod operating;

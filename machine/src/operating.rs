@@ -1,16 +1,21 @@
 //! What a person needs to operate a machine: its switches and outputs, how its axes find their reference,
 //! and what an open door or an emergency stop does.
 
+use crate::modbus::Device;
+
 /// The most digital inputs, and the most outputs: one bit each in a sample.
-pub const MAX_INPUTS: usize = 64;
+pub use messages::MAX_INPUTS;
 
 /// Everything about operating a machine. The default has no input, and axes that know their place.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Operating {
-    /// Its digital inputs; the first is bit 0 of a feedback's `inputs`, [`MAX_INPUTS`] at most.
+    /// Its digital inputs, [`MAX_INPUTS`] at most; the first is bit 0 of a feedback's `inputs`. Those that devices tell
+    /// stand behind those of the port.
     pub inputs: Vec<Input>,
     /// Its digital outputs; the first is bit 0 of a command's `outputs`.
     pub outputs: Vec<Output>,
+    /// What is asked over Modbus TCP.
+    pub devices: Vec<Device>,
     /// How each axis finds its reference, in the order of the axes; `None` of one that knows its place from
     /// the start.
     pub homing: Vec<Option<Homing>>,
@@ -19,6 +24,14 @@ pub struct Operating {
 }
 
 impl Operating {
+    /// Leaves out the devices and their inputs: nothing beside the drives is asked.
+    pub fn disconnect(&mut self) {
+        if let Some(first) = self.devices.first() {
+            self.inputs.truncate(first.input);
+        }
+        self.devices.clear();
+    }
+
     /// How the axis with this index finds its reference.
     pub fn homing(&self, axis: usize) -> Option<&Homing> {
         self.homing.get(axis)?.as_ref()
@@ -153,6 +166,8 @@ pub enum InputFunction {
     Door,
     /// Something that light needs is missing.
     Interlock,
+    /// Something that people should see to.
+    Warning,
     /// The probe touches.
     Probe,
     /// Nothing that Graver knows of.

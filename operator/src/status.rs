@@ -63,6 +63,10 @@ pub struct Status {
     pub axes: BTreeMap<String, AxisStatus>,
     /// The inputs of the machine file, and whether each is active.
     pub inputs: BTreeMap<String, bool>,
+    /// What keeps the light off: the missing interlocks, each with the device, register, value and limit that it comes from.
+    pub interlocks: Vec<String>,
+    /// What people should see to, in the same words; it stops nothing.
+    pub warnings: Vec<String>,
     /// The outputs of the machine file, and whether each is on.
     pub outputs: BTreeMap<String, bool>,
     /// Where the probe touched last; null before it has.

@@ -17,7 +17,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use messages::{
     Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress, Sample,
-    Setpoint, SimulatedInputs,
+    Setpoint, SimulatedInputs, SlowInputs,
 };
 
 use crate::domain::{Domain, DomainGuard};
@@ -99,6 +99,9 @@ impl Channel for Setpoint {
 impl Channel for Progress {
     const SERVICE: &'static str = "progress";
     const QOS: Qos = Qos::KeepLast { depth: STATUS_DEPTH };
+    // One more than others: who switches slow outputs.
+    const READERS: usize = 5;
+    const DEEP_READERS: usize = 4;
 }
 
 impl Channel for ControllerReport {
@@ -119,6 +122,13 @@ impl Channel for PlannerReport {
 impl Channel for JobOffer {
     const SERVICE: &'static str = "job-offers";
     const QOS: Qos = Qos::KeepLast { depth: STATUS_DEPTH };
+}
+
+impl Channel for SlowInputs {
+    const SERVICE: &'static str = "slow-inputs";
+    const QOS: Qos = Qos::KeepLast { depth: STATUS_DEPTH };
+    // The cycle and the supervisor want the newest one only.
+    const DEEP_READERS: usize = 2;
 }
 
 impl Channel for SimulatedInputs {

@@ -18,7 +18,7 @@ use iceoryx2::prelude::{
 };
 use messages::{
     Command as MotorCommand, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport,
-    Progress, Setpoint, SimulatedInputs,
+    Progress, Setpoint, SimulatedInputs, SlowInputs,
 };
 
 use crate::channel::{self, Channel, ChannelError, Publisher, Samples, Subscriber};
@@ -49,14 +49,16 @@ pub enum Role {
     Drives,
     /// The monitor service.
     Monitor,
+    /// The service that speaks Modbus TCP with devices beside the drives.
+    Modbus,
     /// An observer, who only reads; any number of them.
     Observer,
 }
 
 impl Role {
     /// The roles that exist once, the holder first.
-    pub const NAMED: [Self; 5] =
-        [Self::Domain, Self::Drives, Self::Controller, Self::Planner, Self::Monitor];
+    pub const NAMED: [Self; 6] =
+        [Self::Domain, Self::Drives, Self::Controller, Self::Planner, Self::Monitor, Self::Modbus];
 
     /// The name in messages and files.
     pub fn name(self) -> &'static str {
@@ -66,6 +68,7 @@ impl Role {
             Self::Controller => "controller",
             Self::Drives => "drives",
             Self::Monitor => "monitor",
+            Self::Modbus => "modbus",
             Self::Observer => "observer",
         }
     }
@@ -337,6 +340,7 @@ fn create_services(
         channel::create::<PlannerReport>(node)?,
         channel::create::<JobOffer>(node)?,
         channel::create::<SimulatedInputs>(node)?,
+        channel::create::<SlowInputs>(node)?,
         wake::create(node, Wake::Feedback)?,
         wake::create(node, Wake::Command)?,
         operator::create(node)?,

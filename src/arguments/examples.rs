@@ -171,9 +171,9 @@ Examples:
   graver domain --services --machine mine.toml      on one's own computer: all that takes jobs
   graver domain --machine mine.toml                 for services that systemd starts
 
-The services are graver drives, controller, planner and monitor with the same --instance;
-machine and drives are the domain's. deploy/ has systemd units. SIGTERM or Ctrl-C ends it with
-the machine at rest; a terminal that is closed does not.";
+The services are graver drives, controller, planner and monitor with the same --instance, and
+modbus where the machine file has such devices; machine and drives are the domain's. deploy/ has
+systemd units. SIGTERM or Ctrl-C ends it with the machine at rest; a terminal that is closed does not.";
 
 pub(super) const FLEET_EXAMPLES: &str = "\
 Examples:

@@ -1,4 +1,4 @@
-//! The four services as commands: each joins the domain of its instance, builds itself from the
+//! The services as commands: each joins the domain of its instance, builds itself from the
 //! domain's configuration, and runs until it is told to end.
 
 use crate::arguments::{MonitorArguments, PublishArguments, ServiceArguments};
@@ -6,6 +6,7 @@ use crate::commands::fleet::Station;
 use crate::exit::{Exit, Failure};
 use crate::notify;
 use crate::pipeline::configuration::Configuration;
+use crate::pipeline::slow;
 use machine::Machine;
 use runtime::domain::Role;
 use runtime::thread::{CONTROLLER_PRIORITY, DRIVES_PRIORITY};
@@ -33,13 +34,16 @@ fn serve(
     arguments: &ServiceArguments,
     publish: &PublishArguments,
 ) -> Result<Exit, Failure> {
+    if role == Role::Modbus && !cfg!(feature = "modbus") {
+        return Err(Failure::bad_input(format!("graver modbus: {}", slow::HOW_TO_BUILD)));
+    }
     signal::install().map_err(Failure::service)?;
     let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
     let domain = Domain::join(&instance, role).map_err(Failure::service)?;
     let configuration = Configuration::read(&instance)?;
     notify::ready(&format!("joined instance {}", instance.name()));
     // Controller and drives are watched by each other, cycle by cycle, and start no thread for it.
-    if matches!(role, Role::Planner | Role::Monitor) {
+    if matches!(role, Role::Planner | Role::Monitor | Role::Modbus) {
         notify::watch().map_err(Failure::service)?;
     }
     match role {
@@ -73,6 +77,12 @@ fn serve(
             };
             drives::service::run(&domain, &machine, port, &options)
         }
+        #[cfg(feature = "modbus")]
+        Role::Modbus => modbus::service::run(&domain, &configuration.machine()?, || {
+            signal::termination().is_some()
+        }),
+        #[cfg(not(feature = "modbus"))]
+        Role::Modbus => Ok(()),
         Role::Domain | Role::Observer => Ok(()),
     }
     .map_err(Failure::service)?;

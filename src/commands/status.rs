@@ -108,6 +108,12 @@ fn show(status: &Status) {
     say!("axes       {}", motion::places(&status.axes, &[]));
     show_active("inputs", &status.inputs, "none active");
     show_active("outputs", &status.outputs, "none on");
+    for words in &status.interlocks {
+        say!("interlock  {words}");
+    }
+    for words in &status.warnings {
+        say!("warning    {words}");
+    }
     say!("fault      {}", status.fault.as_deref().unwrap_or("none"));
     let faults = &status.faults;
     for past in faults.iter().skip(faults.len().saturating_sub(FAULTS_SHOWN)) {

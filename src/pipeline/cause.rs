@@ -1,12 +1,19 @@
 //! Why a machine stands, in words.
 
+use super::slow;
 use machine::Machine;
 use machine::operating::InputFunction;
 use messages::{ControllerState, Fault, HoldCause, Progress};
 use monitor::summary::FaultSummary;
 
-/// Why the machine stands or does not go on, with the `fault` that is latched; `None` where there is nothing to say.
-pub(super) fn cause(progress: &Progress, fault: &Fault, machine: &Machine) -> Option<String> {
+/// Why the machine stands or does not go on, with the `fault` that is latched and the `interlocks` that are missing;
+/// `None` where there is nothing to say.
+pub(super) fn cause(
+    progress: &Progress,
+    fault: &Fault,
+    machine: &Machine,
+    interlocks: &[String],
+) -> Option<String> {
     if let Some(fault) = FaultSummary::of(fault, machine) {
         return Some(fault.to_string());
     }
@@ -21,9 +28,7 @@ pub(super) fn cause(progress: &Progress, fault: &Fault, machine: &Machine) -> Op
             HoldCause::Program => format!("programmed pause (M0), line {}", progress.line),
             HoldCause::Door if is_open => "door open".to_owned(),
             HoldCause::Door => "the door was opened".to_owned(),
-            HoldCause::Interlock if active(InputFunction::Interlock) => {
-                "an interlock is missing".to_owned()
-            }
+            HoldCause::Interlock if !interlocks.is_empty() => slow::missing(interlocks),
             HoldCause::Interlock => "an interlock was missing".to_owned(),
             HoldCause::Setpoints => "waiting for setpoints".to_owned(),
             HoldCause::Light => "going back for light that was not given".to_owned(),
@@ -33,6 +38,9 @@ pub(super) fn cause(progress: &Progress, fault: &Fault, machine: &Machine) -> Op
         ControllerState::Stopping => Some("coming to rest".to_owned()),
         ControllerState::Idle | ControllerState::Disabled if is_open => {
             Some("door open".to_owned())
+        }
+        ControllerState::Idle | ControllerState::Disabled if !interlocks.is_empty() => {
+            Some(slow::missing(interlocks))
         }
         _ => None,
     }

@@ -125,6 +125,7 @@ impl Configuration {
         let mut machine = self.source.machine()?;
         if self.drives == Driven::Simulated {
             machine.drives.kind = MachineDrives::Simulated;
+            machine.operating.disconnect();
         }
         Ok(machine)
     }

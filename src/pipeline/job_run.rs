@@ -4,6 +4,7 @@ mod conclude;
 mod homing;
 mod place;
 mod progress;
+mod slow;
 mod watch;
 
 use watch::WORD_PATIENCE;
@@ -69,6 +70,8 @@ pub struct JobRun<'a> {
     run_outcome: RunOutcome,
     /// Its number in the queue.
     number: u64,
+    /// The interlocks and warnings that its summary tells already, one bit for each input.
+    told: u64,
 }
 
 impl<'a> JobRun<'a> {
@@ -105,6 +108,7 @@ impl<'a> JobRun<'a> {
             started,
             run_outcome,
             number,
+            told: 0,
         })
     }
 
@@ -138,6 +142,7 @@ impl<'a> JobRun<'a> {
             }
             self.time_left = self.pipeline.latest.time_left().unwrap_or(self.time_left);
             self.note_place();
+            self.note_inputs();
             self.pipeline.board.note_stage(self.stage());
             let board = &self.pipeline.board;
             line.draw(|| Some(JobProgress::of(&board.read())));
@@ -239,16 +244,17 @@ impl<'a> JobRun<'a> {
             self.run_outcome.warnings.push("the monitor is not recording this job".into());
         }
         let answer = self.pipeline.request(OperatorVerb::Start, stream as f64, WORD_PATIENCE);
-        if !answer.is_ok_and(|reply| reply.accepted == 0) {
+        let reply = answer.ok().filter(|reply| reply.accepted == 0);
+        let Some(reply) = reply else {
             // Without an answer it may be playing all the same.
             self.stage = Stage::Playing;
             self.played = true;
             return;
-        }
+        };
         // The fault for which it refuses is heard with the next poll, if there is one.
         let refused = *self.refused.get_or_insert_with(Instant::now);
         if refused.elapsed() > WORD_PATIENCE {
-            self.end_with("the controller refused to start the job".into());
+            self.end_with(self.why_refused(&reply));
         }
     }
 

@@ -224,7 +224,7 @@ impl Answers {
 
     fn tell(&self, request: OperatorRequest, verb: Verb) -> Value {
         match self.link.ask_within(request, STOP_PATIENCE) {
-            Ok(reply) => json!(told(&reply, verb, &self.machine)),
+            Ok(reply) => json!(self.told(&reply, verb)),
             Err(error) => self.silent(&error),
         }
     }
@@ -239,7 +239,7 @@ impl Answers {
                 Ok(reply) => {
                     let folder = self.board.folder();
                     let capped_by = folder.and_then(|folder| caps(&folder, reply.value));
-                    json!(VerbReply { capped_by, ..told(&reply, verb, &self.machine) })
+                    json!(VerbReply { capped_by, ..self.told(&reply, verb) })
                 }
                 Err(error) => self.silent(&error),
             },
@@ -249,7 +249,7 @@ impl Answers {
 
     fn ask(&self, verb: Verb, value: f64) -> Value {
         match self.link.request(verb.into(), value) {
-            Ok(reply) => json!(told(&reply, verb, &self.machine)),
+            Ok(reply) => json!(self.told(&reply, verb)),
             Err(error) => self.silent(&error),
         }
     }
@@ -277,7 +277,7 @@ impl Answers {
         let asked = Instant::now();
         loop {
             let reply = match self.link.request_within(OperatorVerb::Hold, 0.0, STOP_PATIENCE) {
-                Ok(reply) => told(&reply, Verb::Hold, &self.machine),
+                Ok(reply) => self.told(&reply, Verb::Hold),
                 Err(error) => return self.silent(&error),
             };
             let starting = !reply.accepted
@@ -289,9 +289,11 @@ impl Answers {
             std::thread::sleep(HOLD_RETRY);
         }
     }
-}
 
-/// What the controller of `machine` said about `verb`.
-fn told(reply: &OperatorReply, verb: Verb, machine: &Machine) -> VerbReply {
-    VerbReply { refusal: refusals::words(reply, verb, machine), ..VerbReply::from(*reply) }
+    /// What the controller said about `verb`.
+    fn told(&self, reply: &OperatorReply, verb: Verb) -> VerbReply {
+        let interlocks = self.board.read().interlocks;
+        let refusal = refusals::words(reply, verb, &self.machine, &interlocks);
+        VerbReply { refusal, ..VerbReply::from(*reply) }
+    }
 }

@@ -1,6 +1,6 @@
 //! From processes that were just started to motors that are powered and wait for a job.
 
-use super::Pipeline;
+use super::{Pipeline, slow};
 use messages::{ControllerState, Fault, OperatorVerb};
 use runtime::DomainError;
 use runtime::domain::Role;
@@ -108,10 +108,15 @@ fn silent(pipeline: &Pipeline) -> Option<Role> {
         (Role::Planner, latest.planner.published.0 != 0),
         (Role::Controller, latest.progress.published.0 != 0),
         (Role::Drives, latest.drives.cycle.0 != 0),
+        (Role::Modbus, slow::have_all_spoken(&pipeline.machine, &latest.slow)),
         (Role::Monitor, true),
     ]
     .into_iter()
-    .filter(|(role, _)| *role != Role::Monitor || pipeline.starts(*role))
+    .filter(|(role, _)| match role {
+        Role::Monitor => pipeline.starts(*role),
+        Role::Modbus => !pipeline.machine.operating.devices.is_empty(),
+        _ => true,
+    })
     .find(|(role, spoke)| !spoke || !pipeline.has(*role))
     .map(|(role, _)| role)
 }

@@ -1,11 +1,18 @@
 //! Why a request was refused, in words.
 
+use super::slow;
 use machine::{JointUnit, Machine};
 use messages::{ControllerState, MAX_AXES, OperatorReply, Refusal};
 use operator::Verb;
 
-/// What `reply` of the controller for `machine` to `verb` says; `None` where it is no refusal.
-pub(super) fn words(reply: &OperatorReply, verb: Verb, machine: &Machine) -> Option<String> {
+/// What `reply` of the controller for `machine`, of which these `interlocks` are missing, to `verb` says; `None` where it
+/// is no refusal.
+pub(super) fn words(
+    reply: &OperatorReply,
+    verb: Verb,
+    machine: &Machine,
+    interlocks: &[String],
+) -> Option<String> {
     if reply.accepted == 1 {
         return None;
     }
@@ -51,7 +58,7 @@ pub(super) fn words(reply: &OperatorReply, verb: Verb, machine: &Machine) -> Opt
         }
         Refusal::EmergencyStop => "the emergency stop is pressed".to_owned(),
         Refusal::DoorOpen => "the door is open".to_owned(),
-        Refusal::Interlock => "an interlock is missing".to_owned(),
+        Refusal::Interlock => slow::missing(interlocks),
         Refusal::LimitSwitch => {
             format!("axis {name} is on its limit switch: jog it away from it")
         }

@@ -1,6 +1,7 @@
-//! The four services as child processes: started, watched, stopped in order.
+//! The services as child processes: started, watched, stopped in order.
 
 use crate::exit::Failure;
+use machine::Machine;
 use runtime::child::ChildProcess;
 use runtime::domain::Role;
 use runtime::{Domain, message};
@@ -9,12 +10,14 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-/// The order in which services start.
-const ROLES: [Role; 4] = [Role::Monitor, Role::Planner, Role::Controller, Role::Drives];
+/// The order in which services start. That for Modbus is there where the machine has such devices.
+const ROLES: [Role; 5] =
+    [Role::Monitor, Role::Planner, Role::Modbus, Role::Controller, Role::Drives];
 
 /// The order in which they stop: the controller before drives, so that the axes are brought to
-/// rest by whoever can do it best; the monitor last.
-const STOPPING: [Role; 4] = [Role::Planner, Role::Controller, Role::Drives, Role::Monitor];
+/// rest by whoever can do it best; what switches outputs after both, and the monitor last.
+const STOPPING: [Role; 5] =
+    [Role::Planner, Role::Controller, Role::Drives, Role::Modbus, Role::Monitor];
 
 /// How long a service may take to end after it was told to.
 const END_PATIENCE: Duration = Duration::from_secs(5);
@@ -71,19 +74,21 @@ struct Service {
 
 /// The services that this process has started; dropping them asks those that still run to end.
 pub struct Services {
+    /// Those that the machine needs.
+    roles: Vec<Role>,
     services: Vec<Service>,
     /// The first that ended without which nothing goes on.
     lost: Option<Ended>,
 }
 
 impl Services {
-    /// Starts all four.
+    /// Starts all that `machine` needs.
     ///
     /// # Errors
     /// A process that cannot be started.
-    pub fn start(domain: &Domain) -> Result<Self, Failure> {
-        let mut services = Self::of_others();
-        for role in ROLES {
+    pub fn start(domain: &Domain, machine: &Machine) -> Result<Self, Failure> {
+        let mut services = Self::of_others(machine);
+        for role in services.roles.clone() {
             let child = spawn(domain, role).map_err(Failure::service)?;
             services.services.push(Service { role, child: Some(child), restarts: 0 });
         }
@@ -91,12 +96,14 @@ impl Services {
     }
 
     /// None of our own.
-    pub fn of_others() -> Self {
-        Self { services: Vec::new(), lost: None }
+    pub fn of_others(machine: &Machine) -> Self {
+        let has_devices = !machine.operating.devices.is_empty();
+        let needed = ROLES.into_iter().filter(|role| *role != Role::Modbus || has_devices);
+        Self { roles: needed.collect(), services: Vec::new(), lost: None }
     }
 
-    /// The services that have ended since the last poll. A monitor is started again once, if that
-    /// can be done.
+    /// The services that have ended since the last poll. A monitor, and who asks devices on Modbus, is started again
+    /// once, if that can be done.
     pub fn poll(&mut self, domain: &Domain) -> Vec<Ended> {
         let mut ended = Vec::new();
         for service in &mut self.services {
@@ -109,8 +116,8 @@ impl Services {
                 message::tell(&error.to_string());
             }
             let recovery = match (service.role, service.restarts) {
-                (Role::Monitor, 0) => service.restart(domain),
-                (Role::Monitor, _) => Recovery::None,
+                (Role::Monitor | Role::Modbus, 0) => service.restart(domain),
+                (Role::Monitor | Role::Modbus, _) => Recovery::None,
                 _ => Recovery::Stop,
             };
             ended.push(Ended { role: service.role, pid, how: describe(status), recovery });
@@ -132,17 +139,14 @@ impl Services {
 
     /// The process ids of the living services, by name.
     pub fn pids(&self, domain: &Domain) -> Vec<(&'static str, Option<i32>)> {
-        ROLES
-            .into_iter()
-            .map(|role| {
-                let own = self.services.iter().find(|service| service.role == role);
-                let pid = match own {
-                    Some(service) => service.child.as_ref().map(ChildProcess::pid),
-                    None => domain.peer(role).map(|peer| peer.pid()),
-                };
-                (role.name(), pid)
-            })
-            .collect()
+        let pid = |role: Role| {
+            let own = self.services.iter().find(|service| service.role == role);
+            match own {
+                Some(service) => service.child.as_ref().map(ChildProcess::pid),
+                None => domain.peer(role).map(|peer| peer.pid()),
+            }
+        };
+        self.roles.iter().map(|role| (role.name(), pid(*role))).collect()
     }
 
     /// Tells all to end, one after the other, and makes sure that they do: a service that hangs is

@@ -4,8 +4,12 @@ use super::Latest;
 use super::cause::cause;
 use super::fault_history::FaultHistory;
 use super::refusals::DIRECTIONS;
+use super::slow;
+use machine::operating::InputFunction;
 use machine::{Directions, Machine};
-use messages::{ControllerState, Fault, MAX_AXES, MotionEnd, Nanoseconds, PlannerPhase, Progress};
+use messages::{
+    ControllerState, Fault, HoldCause, MAX_AXES, MotionEnd, Nanoseconds, PlannerPhase, Progress,
+};
 use monitor::summary::FaultSummary;
 use operator::{AxisStatus, PastFault, Probed, Status};
 use std::path::{Path, PathBuf};
@@ -22,6 +26,8 @@ pub struct StatusBoard {
     machine: Mutex<Option<(Machine, Directions)>>,
     /// When the newest fault was found.
     newest: Mutex<Nanoseconds>,
+    /// Whether a job is held by an interlock.
+    is_interlocked: Mutex<bool>,
     history: Mutex<FaultHistory>,
 }
 
@@ -54,9 +60,25 @@ impl StatusBoard {
         *newest = fault.at;
         let machine = locked(&self.machine);
         let told = machine.as_ref().and_then(|(machine, _)| FaultSummary::of(fault, machine));
-        let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
         let code = fault.code().name().to_owned();
         let detail = told.map_or_else(|| code.clone(), |told| told.to_string());
+        self.add(status, code, detail);
+    }
+
+    /// Adds an interlock that holds a job to the faults, once for each hold: who comes after a night reads why it stood.
+    fn remember_interlock(&self, status: &mut Status, progress: &Progress) {
+        let cause = HoldCause::from_wire(progress.hold_cause);
+        let is_held =
+            progress.state == ControllerState::Holding as u32 && cause == HoldCause::Interlock;
+        let was_held = std::mem::replace(&mut *locked(&self.is_interlocked), is_held);
+        if is_held && !was_held {
+            let missing = slow::missing(&status.interlocks);
+            self.add(status, "interlock".to_owned(), missing);
+        }
+    }
+
+    fn add(&self, status: &mut Status, code: String, detail: String) {
+        let time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
         let mut history = locked(&self.history);
         history.add(PastFault { time, code, detail, job: status.job.clone() });
         note_faults(status, &history);
@@ -79,7 +101,7 @@ impl StatusBoard {
         pids: &[(&'static str, Option<i32>)],
     ) {
         let mut status = self.lock();
-        let Latest { progress, drives, planner, .. } = latest;
+        let Latest { progress, drives, planner, slow, .. } = latest;
         let state = ControllerState::from_wire(progress.state);
         let state = if held { ControllerState::Holding } else { state };
         let job = locked(&self.job);
@@ -123,9 +145,14 @@ impl StatusBoard {
             status.held = false;
         }
         status.fault = fault.is_some().then(|| fault.code().name().to_owned());
+        if let Some((machine, _)) = locked(&self.machine).as_ref() {
+            let active = |function| slow::active(machine, function, progress.inputs, slow);
+            status.interlocks = active(InputFunction::Interlock);
+            status.warnings = active(InputFunction::Warning);
+        }
         status.cause = match locked(&self.machine).as_ref() {
             _ if held => Some("feed hold before the first motion".to_owned()),
-            Some((machine, _)) => cause(progress, &fault, machine),
+            Some((machine, _)) => cause(progress, &fault, machine, &status.interlocks),
             None => None,
         };
         let otherwise = match begun {
@@ -134,6 +161,7 @@ impl StatusBoard {
         };
         status.cause = status.cause.take().or(otherwise);
         self.remember(&mut status, &fault);
+        self.remember_interlock(&mut status, progress);
         if let Some((machine, directions)) = locked(&self.machine).as_ref() {
             note_operated(&mut status, progress, machine, directions);
         }

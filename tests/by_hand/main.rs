@@ -5,6 +5,7 @@
 
 mod cell;
 mod kept;
+mod modbus;
 mod outputs;
 #[path = "../support/mod.rs"]
 mod support;

@@ -21,7 +21,8 @@ struct Input {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Digital {
     inputs: Vec<Input>,
-    outputs: Vec<EthercatBit>,
+    /// `None` of those that are switched elsewhere.
+    outputs: Vec<Option<EthercatBit>>,
 }
 
 impl Digital {
@@ -40,7 +41,8 @@ impl Digital {
 
     /// Puts the outputs with a bit in `on` into the process data, 1 where they are on.
     pub(super) fn put(&self, on: u64, Network { main, group, .. }: &Network) {
-        for (index, EthercatBit { slave, bit }) in self.outputs.iter().enumerate() {
+        for (index, output) in self.outputs.iter().enumerate() {
+            let Some(EthercatBit { slave, bit }) = output else { continue };
             let Ok(slave) = group.subdevice(main, usize::from(*slave)) else { continue };
             if let Some(byte) = slave.io_raw_mut().outputs().get_mut(usize::from(bit / 8)) {
                 let mask = 1 << (bit % 8);
@@ -84,6 +86,7 @@ pub(super) fn check(
     let operating = &machine.operating;
     let inputs = operating.inputs.iter().map(|it| (&it.name, "input")).zip(&bus.inputs);
     let outputs = operating.outputs.iter().map(|it| (&it.name, "output")).zip(&bus.outputs);
+    let outputs = outputs.filter_map(|(output, place)| Some((output, place.as_ref()?)));
     for ((name, kind), EthercatBit { slave: position, bit }) in inputs.chain(outputs) {
         if bus.actuators.contains(position) {
             continue;

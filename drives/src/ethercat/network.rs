@@ -164,7 +164,7 @@ pub async fn set_up(
     let slaves = group.len();
     let bus = wanted.bus;
     let gate = bus.gate.map(|gate| gate.slave);
-    let bits = || bus.inputs.iter().chain(&bus.outputs).map(|place| place.slave);
+    let bits = || bus.inputs.iter().chain(bus.outputs.iter().flatten()).map(|place| place.slave);
     let identities = bus.identities.iter().map(|identity| identity.slave);
     let named = bus.actuators.iter().copied().chain(gate).chain(bus.power);
     let named = named.chain(bits()).chain(identities);
@@ -198,7 +198,7 @@ pub async fn set_up(
     for drive in &drives {
         check_watchdog(main, &group, drive.slave, 2).await?;
     }
-    let switched = bus.outputs.iter().map(|place| place.slave);
+    let switched = bus.outputs.iter().flatten().map(|place| place.slave);
     for slave in gate.into_iter().chain(bus.power).chain(switched) {
         check_watchdog(main, &group, usize::from(slave), 0).await?;
     }

@@ -20,7 +20,7 @@ pub struct Config {
     /// The pin of each input of the machine, in their order.
     pub inputs: Vec<u32>,
     /// The pin of each output.
-    pub outputs: Vec<u32>,
+    pub outputs: Vec<Option<u32>>,
 }
 
 /// What an actuator is on.

@@ -24,7 +24,8 @@ struct Output {
 #[derive(Debug, Clone, Default)]
 pub struct Digital {
     inputs: Vec<Input>,
-    outputs: Vec<Output>,
+    /// `None` of those that are switched elsewhere.
+    outputs: Vec<Option<Output>>,
 }
 
 impl Digital {
@@ -37,7 +38,7 @@ impl Digital {
         board: &Board,
         pins: &mut Pins,
         operating: &Operating,
-        [inputs, outputs]: [&[u32]; 2],
+        (inputs, outputs): (&[u32], &[Option<u32>]),
     ) -> Result<Self, BoardError> {
         let mut digital = Self::default();
         let taken = |pin: u32, name: &str| BoardError::Lacking {
@@ -49,10 +50,11 @@ impl Digital {
             wanted: format!("pin {pin} as `{name}`"),
         };
         for (output, &pin) in operating.outputs.iter().zip(outputs) {
-            if !pins.own(pin, output.is_active_low) {
+            let is_active_low = output.is_active_low;
+            if let Some(pin) = pin.filter(|pin| !pins.own(*pin, is_active_low)) {
                 return Err(taken(pin, &output.name));
             }
-            digital.outputs.push(Output { pin, is_active_low: output.is_active_low });
+            digital.outputs.push(pin.map(|pin| Output { pin, is_active_low }));
         }
         for (input, &pin) in operating.inputs.iter().zip(inputs) {
             if !pins.is_input(pin) {
@@ -66,6 +68,7 @@ impl Digital {
     /// Gives the outputs their levels under `actuation`.
     pub fn set(&self, pins: &mut Pins, actuation: &Actuation) {
         for (bit, output) in self.outputs.iter().enumerate().take(MAX_INPUTS) {
+            let Some(output) = output else { continue };
             let is_on = actuation.outputs >> bit & 1 != 0;
             pins.set(output.pin, is_on != output.is_active_low);
         }

@@ -233,7 +233,7 @@ impl Hostmot2Port {
             board.module(Kind::Pwm, power)?;
             board.outputs(Kind::Pwm, power).for_each(|pin| pins.output(pin));
         }
-        let wired = [&self.config.inputs, &self.config.outputs].map(Vec::as_slice);
+        let wired = (self.config.inputs.as_slice(), self.config.outputs.as_slice());
         let digital = Digital::new(&board, &mut pins, &self.machine.operating, wired)?;
         let units: Vec<u32> = drives.iter().filter_map(Drive::pwm).chain(power).collect();
         let pwms = match units.first() {

@@ -92,13 +92,14 @@ drives_tables! {
     ethercat: ethercat::EthercatTable, ethercat::build;
 }
 
-/// The drives of `table` in cycles of `period`, with the pins of what `operating` has; puts the latency of each
-/// actuator, and the age of its measurement, into `actuators`.
+/// The drives of `table` in cycles of `period`, with the pins of what `operating` has, whose outputs called
+/// `switched` are switched elsewhere; puts the latency of each actuator, and the age of its measurement, into
+/// `actuators`.
 pub(super) fn build(
     table: &DrivesTable,
     period: Period,
     actuators: &mut [Actuator],
-    operating: &Operating,
+    (operating, switched): (&Operating, &[&str]),
     diagnostics: &mut Diagnostics,
 ) -> Drives {
     if let [(first, first_place), (second, second_place), ..] = table.declared().as_slice() {
@@ -124,10 +125,10 @@ pub(super) fn build(
     }
     match (table, &mut kind) {
         (DrivesTable { hostmot2: Some(table), .. }, DrivesKind::Hostmot2(card)) => {
-            hostmot2::connect(table, card, operating, diagnostics);
+            hostmot2::connect(table, card, (operating, switched), diagnostics);
         }
         (DrivesTable { ethercat: Some(table), .. }, DrivesKind::Ethercat(bus)) => {
-            wiring::connect(table, bus, operating, diagnostics);
+            wiring::connect(table, bus, (operating, switched), diagnostics);
         }
         _ => {}
     }
@@ -162,7 +163,7 @@ fn refuse_unknown<T>(
 }
 
 /// Refuses tables whose names are none of these of a `kind` of thing.
-fn refuse_others<T>(
+pub(super) fn refuse_others<T>(
     tables: Option<&Named<T>>,
     kind: &str,
     known: &[&str],
@@ -229,7 +230,7 @@ fn refuse_index(operating: &Operating, kind: &str, span: Span, diagnostics: &mut
 }
 
 /// The whole number that `number` is; notes one that is not.
-fn whole(number: &Number<NonNegative>, most: u32, diagnostics: &mut Diagnostics) -> u32 {
+pub(super) fn whole(number: &Number<NonNegative>, most: u32, diagnostics: &mut Diagnostics) -> u32 {
     let rounded = number.value.round();
     if rounded != number.value || rounded > f64::from(most) {
         diagnostics.refuse(

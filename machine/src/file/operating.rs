@@ -263,6 +263,7 @@ pub(super) fn operating(
         homing: homing.collect(),
         inputs,
         outputs,
+        devices: Vec::new(),
         safety: safety(tables.safety, diagnostics),
     }
 }

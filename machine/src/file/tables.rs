@@ -8,6 +8,7 @@
 use super::drives::DrivesTable;
 use super::frame::MachineFrameTable;
 use super::mechanism::MechanismTable;
+use super::modbus::ModbusTable;
 use super::operating::{HomingTable, InputTable, OutputTable, SafetyTable};
 use crate::document::{Either, Fraction, Named, NonNegative, Number, Point, Positive, Spanned};
 use crate::drives::ActuatorMode;
@@ -50,6 +51,8 @@ table! {
         pub inputs: Option<Named<InputTable>>,
         /// Its digital outputs, named.
         pub outputs: Option<Named<OutputTable>>,
+        /// Devices that are asked over Modbus TCP, named.
+        pub modbus: Option<Named<ModbusTable>>,
         /// What an emergency stop and an open door do, and how far a test may go.
         pub safety: SafetyTable,
         /// What the machine bears of a computer that is late.

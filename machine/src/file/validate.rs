@@ -8,6 +8,7 @@ use super::drives;
 use super::laser;
 use super::loops;
 use super::mechanism::{self, Built};
+use super::modbus;
 use super::motors;
 use super::operating::{self, operating};
 use super::relations;
@@ -43,7 +44,7 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
     let (axes, mut driven) = axes(&table, &tables, &joints, realtime.period, &mut diagnostics);
     let mut actuators: Vec<Actuator> =
         driven.iter().map(|(_, actuator)| actuator.clone()).collect();
-    let operating = if axes.len() == joints.len() {
+    let mut operating = if axes.len() == joints.len() {
         let (inputs, outputs) = (table.inputs.as_ref(), table.outputs.as_ref());
         let safety = &table.safety;
         let own = operating::Tables { inputs, outputs, safety, axes: &tables, joints: &joints };
@@ -52,7 +53,10 @@ pub(super) fn machine(document: Document) -> Result<Machine, DocumentError> {
         Operating::default()
     };
     let period = realtime.period;
-    let drives = drives::build(&table.drives, period, &mut actuators, &operating, &mut diagnostics);
+    let switched = modbus::switched(table.modbus.as_ref());
+    let wired = (&operating, switched.as_slice());
+    let drives = drives::build(&table.drives, period, &mut actuators, wired, &mut diagnostics);
+    modbus::connect(table.modbus.as_ref(), &mut operating, &mut diagnostics);
     if diagnostics.is_empty() {
         for ((drive, own), actuator) in driven.iter_mut().zip(&mut actuators) {
             loops::slow_down(actuator, &drive.table, period, &mut diagnostics);

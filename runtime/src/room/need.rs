@@ -8,7 +8,7 @@ use std::mem::{align_of, size_of};
 use iceoryx2::service::header::publish_subscribe::Header;
 use messages::{
     Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress, Setpoint,
-    SimulatedInputs,
+    SimulatedInputs, SlowInputs,
 };
 
 use super::page;
@@ -26,9 +26,9 @@ const FREE_ENTRY: usize = 4;
 /// Services of a domain beside its channels: two wake events and the operators' requests.
 const OTHER_SERVICES: u64 = 3;
 
-/// Nodes that a pipeline has: holder, four services, the threads for operators at both ends, and
+/// Nodes that a pipeline has: holder, five services, the threads for operators at both ends, and
 /// one who looks.
-const NODES: u64 = 8;
+const NODES: u64 = 9;
 
 /// Small files with content that iceoryx2 keeps of a node.
 const NODE_FILES: u64 = 2;
@@ -49,7 +49,8 @@ pub(crate) fn pipeline() -> u64 {
         + whole::<DrivesReport>()
         + whole::<PlannerReport>()
         + whole::<JobOffer>()
-        + whole::<SimulatedInputs>();
+        + whole::<SimulatedInputs>()
+        + whole::<SlowInputs>();
     let wakes = 2 * wake();
     channels + wakes + 2 * operator() + holder() + NODES * node()
 }
@@ -57,7 +58,7 @@ pub(crate) fn pipeline() -> u64 {
 /// What the holder creates: for each service a description and the list of its ports, and the
 /// segment that counts nodes.
 pub(crate) fn holder() -> u64 {
-    const CHANNELS: u64 = 9;
+    const CHANNELS: u64 = 10;
     (2 * (CHANNELS + OTHER_SERVICES) + 1) * page()
 }
 
@@ -148,13 +149,14 @@ mod tests {
         open::<PlannerReport>(&domain, &mut ports);
         open::<JobOffer>(&domain, &mut ports);
         open::<SimulatedInputs>(&domain, &mut ports);
+        open::<SlowInputs>(&domain, &mut ports);
         for wake in [Wake::Feedback, Wake::Command] {
             ports.push(Box::new(domain.listener(wake).unwrap()));
             ports.push(Box::new(domain.notifier(wake).unwrap()));
         }
         ports.push(Box::new(OperatorQueue::start(&domain).unwrap()));
         ports.push(Box::new(OperatorLink::start(&domain).unwrap()));
-        let entries: Vec<Domain> = (0..5).map(|_| Entry::enter(&domain.entry()).unwrap()).collect();
+        let entries: Vec<Domain> = (0..6).map(|_| Entry::enter(&domain.entry()).unwrap()).collect();
 
         let (used, need) = (domain.room().used().unwrap(), pipeline());
         assert!(used <= need, "{used} of {need} bytes");

@@ -76,6 +76,7 @@ impl JobRun<'_> {
     pub(super) fn note_ended(&mut self, ended: &Ended) {
         let consequence = match (ended.role, self.stage) {
             (Role::Monitor, _) => "; the job goes on without harm",
+            (Role::Modbus, _) => ": its devices count as silent, laser off",
             (_, Stage::Starting(_)) => " while starting",
             (Role::Planner, _) => {
                 ": laser off, the controller brings the axes to rest along the path"
@@ -125,6 +126,6 @@ fn death_of(role: Role) -> FaultCode {
         Role::Controller => FaultCode::ControllerLost,
         Role::Drives => FaultCode::DrivesLost,
         Role::Domain => FaultCode::SupervisorLost,
-        Role::Monitor | Role::Observer => FaultCode::None,
+        Role::Monitor | Role::Modbus | Role::Observer => FaultCode::None,
     }
 }

@@ -160,32 +160,36 @@ fn actuator(
 pub(super) fn connect(
     table: &Hostmot2Table,
     card: &mut Hostmot2,
-    operating: &Operating,
+    (operating, switched): (&Operating, &[&str]),
     diagnostics: &mut Diagnostics,
 ) {
     refuse_index(operating, "pin of a card", table.span, diagnostics);
     let inputs: Vec<&str> = operating.inputs.iter().map(|input| input.name.as_str()).collect();
     let outputs: Vec<&str> = operating.outputs.iter().map(|output| output.name.as_str()).collect();
     let [wired_in, wired_out] = [table.inputs.as_ref(), table.outputs.as_ref()];
-    card.inputs = pins((wired_in, "input", table.span), &inputs, diagnostics);
-    card.outputs = pins((wired_out, "output", table.span), &outputs, diagnostics);
+    let inputs = pins((wired_in, "input", table.span), &inputs, &[], diagnostics);
+    card.inputs = inputs.into_iter().flatten().collect();
+    card.outputs = pins((wired_out, "output", table.span), &outputs, switched, diagnostics);
 }
 
-/// The pin of each of `names`, as `tables`, of which there should be some at `span`, have them.
+/// The pin of each of `names`, as `tables`, of which there should be some at `span`, have them; those in `elsewhere`
+/// need none.
 fn pins(
     (tables, kind, span): (Option<&Named<Hostmot2PinTable>>, &str, Span),
     names: &[&str],
+    elsewhere: &[&str],
     diagnostics: &mut Diagnostics,
-) -> Vec<u32> {
+) -> Vec<Option<u32>> {
     refuse_others(tables, kind, names, diagnostics);
     let pin = |name: &&str| match find(tables, name) {
-        Some(table) => whole(&table.pin, LAST_CHANNEL, diagnostics),
+        Some(table) => Some(whole(&table.pin, LAST_CHANNEL, diagnostics)),
+        None if elsewhere.contains(name) => None,
         None => {
             // A switch that nobody reads would never be active.
             let message = format!("nothing is said of the pin of the {kind} `{name}`");
             let help = Some(format!("add [drives.hostmot2.{kind}s.{name}] with its `pin`"));
             diagnostics.refuse(ProblemKind::MissingKey, span, message, help);
-            0
+            Some(0)
         }
     };
     names.iter().map(pin).collect()

@@ -16,14 +16,16 @@ const LAST_INPUT_OF_DRIVE: u16 = 31;
 pub(super) fn connect(
     table: &EthercatTable,
     bus: &mut Ethercat,
-    operating: &Operating,
+    (operating, switched): (&Operating, &[&str]),
     diagnostics: &mut Diagnostics,
 ) {
     refuse_index(operating, "slave on a bus", table.span, diagnostics);
     let inputs: Vec<&str> = operating.inputs.iter().map(|input| input.name.as_str()).collect();
     let outputs: Vec<&str> = operating.outputs.iter().map(|output| output.name.as_str()).collect();
-    bus.inputs = bits((table.inputs.as_ref(), "input", table.span), &inputs, diagnostics);
-    bus.outputs = bits((table.outputs.as_ref(), "output", table.span), &outputs, diagnostics);
+    let [wired_in, wired_out] = [table.inputs.as_ref(), table.outputs.as_ref()];
+    let inputs_at = bits((wired_in, "input", table.span), &inputs, &[], diagnostics);
+    bus.inputs = inputs_at.into_iter().flatten().collect();
+    bus.outputs = bits((wired_out, "output", table.span), &outputs, switched, diagnostics);
     for (name, place) in inputs.iter().zip(&bus.inputs) {
         if bus.actuators.contains(&place.slave) && place.bit > LAST_INPUT_OF_DRIVE {
             let span = find(table.inputs.as_ref(), name).map_or(table.span, |own| own.bit.span);
@@ -35,7 +37,7 @@ pub(super) fn connect(
         }
     }
     for (index, output) in operating.outputs.iter().enumerate() {
-        let Some(place) = bus.outputs.get(index) else { continue };
+        let Some(Some(place)) = bus.outputs.get(index) else { continue };
         let own = find(table.outputs.as_ref(), &output.name);
         let span = own.map_or(table.span, |own| own.slave.span);
         let mut refuse = |message: String, help: &str| diagnostics.contradict(span, message, help);
@@ -65,7 +67,7 @@ pub(super) fn connect(
             );
         }
         let mut before = bus.outputs.iter().take(index).zip(&operating.outputs);
-        if let Some((_, other)) = before.find(|(other, _)| *other == place) {
+        if let Some((_, other)) = before.find(|(other, _)| other.as_ref() == Some(place)) {
             refuse(
                 format!(
                     "`{name}` is on bit {} of slave {}, as `{}` is",
@@ -89,28 +91,29 @@ fn user(bus: &Ethercat, place: EthercatBit) -> Option<&'static str> {
     }
 }
 
-/// The place of each of `names`, as `tables`, of which there should be some at `span`, have them.
+/// The place of each of `names`, as `tables`, of which there should be some at `span`, have them; those in
+/// `elsewhere` need none.
 fn bits(
     (tables, kind, span): (Option<&Named<EthercatBitTable>>, &str, Span),
     names: &[&str],
+    elsewhere: &[&str],
     diagnostics: &mut Diagnostics,
-) -> Vec<EthercatBit> {
+) -> Vec<Option<EthercatBit>> {
     refuse_others(tables, kind, names, diagnostics);
     let place = |name: &&str| match find(tables, name) {
         Some(table) => {
             let mut number = |number: &Whole, most| whole(number, most, diagnostics) as u16;
-            EthercatBit {
-                slave: number(&table.slave, LAST_SLAVE),
-                bit: number(&table.bit, LAST_BIT),
-            }
+            let slave = number(&table.slave, LAST_SLAVE);
+            Some(EthercatBit { slave, bit: number(&table.bit, LAST_BIT) })
         }
+        None if elsewhere.contains(name) => None,
         None => {
             // A switch that nobody reads would never be active.
             let message = format!("nothing is said of where the {kind} `{name}` is");
             let help =
                 Some(format!("add [drives.ethercat.{kind}s.{name}] with its `slave` and `bit`"));
             diagnostics.refuse(ProblemKind::MissingKey, span, message, help);
-            EthercatBit { slave: 0, bit: 0 }
+            Some(EthercatBit { slave: 0, bit: 0 })
         }
     };
     names.iter().map(place).collect()
