@@ -14,5 +14,14 @@ gzip -9n "$made/man"/*.1
 "$program" completions bash >"$made/completions/graver"
 "$program" completions zsh >"$made/completions/_graver"
 "$program" completions fish >"$made/completions/graver.fish"
-gzip -9nc CHANGELOG.md >"$made/changelog.gz"
+# What Debian wants to be told of each version; what has changed is in CHANGELOG.md, beside it.
+version=$("$program" --version | cut -d' ' -f2)
+maintainer=$(sed -n 's/^maintainer = "\(.*\)"$/\1/p' Cargo.toml)
+cat >"$made/changelog" <<END
+graver ($version-1) unstable; urgency=medium
+
+  * See /usr/share/doc/graver/CHANGELOG.md.
+
+ -- $maintainer  $(date -R)
+END
 cargo deb --no-build "$@"
