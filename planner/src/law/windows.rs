@@ -161,12 +161,14 @@ fn law_of(profile: &Move, speed: u16, acceleration: u16, jerk: u16) -> TimeLaw {
 }
 
 /// Whether an even `speed` [m/s] keeps every limit from `from` to `to`, looked at each few
-/// milliseconds of it.
+/// milliseconds of it, or each micrometre where that is farther: a path of days is no longer than another.
 pub(crate) fn keeps_even(limits: &mut impl Limits, from: f64, to: f64, speed: f64) -> bool {
     /// Time between two places [s].
     const APART: f64 = 2e-3;
+    /// The same of a slow path [m].
+    const LEAST: f64 = 1e-6;
     let mut rows = Vec::new();
-    let count = ((to - from) / (speed * APART)).ceil().max(1.0) as usize;
+    let count = ((to - from) / (speed * APART).max(LEAST)).ceil().max(1.0) as usize;
     let inside = (0..=count).map(|index| from + (to - from) * index as f64 / count as f64);
     let mut borders = Vec::new();
     limits.borders(from, to, &mut borders);

@@ -14,6 +14,10 @@ use crate::law::End;
 use crate::law::time_law::TimeLaw;
 use crate::limits::along::SpeedLimit;
 
+/// The way that is added to what surely leads to rest [m], and how long it may take at most [s].
+const SLOW_ROOM: f64 = 1e-5;
+const SLOW_TIME: f64 = 0.05;
+
 /// A path that is under way.
 #[derive(Debug, Clone)]
 pub(super) struct PathRun<const N: usize> {
@@ -105,8 +109,10 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     pub(super) fn least_reach(&self, speeds: &[SpeedLimit]) -> f64 {
         let limits = &self.limits.path;
         let top = speeds.iter().map(|speed| speed.speed).fold(0.0, f64::max);
-        // Twice the way to rest, at least.
-        let rest = top * top / limits.acceleration + top * limits.acceleration / limits.jerk + 1e-5;
+        // Twice the way to rest, at least, and some more; of a slow path no more than a moment of it, as windows are
+        // worked out by time.
+        let room = SLOW_ROOM.min(top * SLOW_TIME);
+        let rest = top * top / limits.acceleration + top * limits.acceleration / limits.jerk + room;
         rest * 0.1
     }
 }

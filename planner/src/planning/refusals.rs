@@ -73,21 +73,31 @@ pub(super) fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
     let beyond = |point: &[f64; 3]| (point[row] - limit) * (value - limit).signum();
     // How far a step goes beyond: by less than a fitted curve strays it does not.
     let leaves = |step: Step| {
-        let points = match &step.action {
+        let mut farthest = 0.0_f64;
+        let mut take = |point: [f64; 3]| {
+            farthest = farthest.max(beyond(&point));
+            true
+        };
+        match &step.action {
             Action::Mark { curve, .. } | Action::Feed { curve, .. } => {
-                let mut points = vec![curve.from().into()];
-                Track::new(curve).sample(CHORD, &mut points);
-                points
+                take(curve.from().into());
+                // Of a much bent curve there are more points than memory should hold.
+                Track::new(curve).visit(CHORD, &mut take);
             }
             Action::Trace { points, .. } => {
                 let chords = bezier::samples(points, bezier::chords(points, CHORD));
-                core::iter::once(points[0]).chain(chords).map(Into::into).collect()
+                core::iter::once(points[0]).chain(chords).for_each(|point| {
+                    take(point.into());
+                });
             }
-            Action::Follow { path, .. } => path.points(CHORD),
-            Action::Rapid { to } => vec![(*to).into()],
+            Action::Follow { path, .. } => path.points(CHORD).into_iter().for_each(|point| {
+                take(point);
+            }),
+            Action::Rapid { to } => {
+                take((*to).into());
+            }
             _ => return None,
-        };
-        let farthest = points.iter().map(beyond).fold(0.0, f64::max);
+        }
         (farthest > (value - limit).abs() / 2.0).then_some((step.line, farthest))
     };
     let steps = job.steps().into_iter().flatten().map_while(Result::ok);
