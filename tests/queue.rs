@@ -189,7 +189,8 @@ fn what_a_held_queue_means_is_said_to_whoever_holds_it_and_whoever_submits() {
 #[test]
 fn a_job_outlives_whoever_submitted_it() {
     let desk = Desk::new();
-    let job = desk.place.file("job.ngc", &lines(4));
+    // Long enough to be there still when it is looked at on a loaded computer.
+    let job = desk.place.file("job.ngc", &lines(12));
     let follower = desk.submit(&job, &[]);
     desk.await_running(1);
     follower.signal(KILL);
