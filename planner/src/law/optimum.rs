@@ -222,7 +222,12 @@ impl<'a> Travel<'a> {
     }
 }
 
-/// From rest to a place of a line at `speed` [m/s].
+/// The part of the acceleration that the bend at an end may take in a run-in: the rest changes the speed.
+const BENT: f64 = 0.99;
+
+/// From rest to a place of a line at `speed` [m/s]. At the largest speed of its bend, or beyond what the
+/// joints leave along it, nothing would be left for the run-in, which then takes hours: it is told as at
+/// a bend that leaves a little.
 fn run_in_of(start: &Jet, speed: f64, limits: &FlightLimits) -> Flight {
     let to = State {
         position: start.point,
@@ -230,7 +235,8 @@ fn run_in_of(start: &Jet, speed: f64, limits: &FlightLimits) -> Flight {
         acceleration: start.second * (speed * speed),
         ..State::rest(start.point)
     };
-    Flight::ramp_in(&to, &FlightLimits { speed, ..*limits })
+    let acceleration = limits.acceleration.max(to.acceleration.norm() / BENT);
+    Flight::ramp_in(&to, &FlightLimits { speed, acceleration, ..*limits })
 }
 
 /// The speed up to `most` with the least time. The time has one minimum for one stroke; for many
