@@ -8,7 +8,7 @@ mod support;
 
 use machine::Machine;
 use messages::random::SplitMix64;
-use messages::{ControllerState, Nanoseconds, OperatorVerb};
+use messages::{ControllerState, FaultCode, FaultQuantity, Nanoseconds, OperatorVerb};
 use support::{Bench, Job, check_marks, reach, stalling, started, two_marks};
 
 /// Largest distance of the tool from the plan, with the laser on and off [m].
@@ -131,5 +131,38 @@ fn the_machine_file_says_how_many_feedbacks_may_be_missing() {
             let fault = bench.last().command.fault;
             assert_eq!(fault.is_some(), !borne, "{milliseconds} ms, {skipped}: {fault:?}");
         }
+    }
+}
+
+#[test]
+fn a_job_that_gets_on_between_losses_goes_on_and_one_that_does_not_is_stopped() {
+    let machine = Machine::builtin();
+    let job = two_marks(&machine, 0.2, 0.5);
+    // Of these losses no more than three lie within 128 ms of the first, and all of them.
+    for (apart, is_borne) in [(0.05, true), (0.01, false)] {
+        let mut bench = started(&machine, &job);
+        for loss in 0..5 {
+            let at = job.lit[0].0 + 0.015 + apart * f64::from(loss);
+            assert!(at < job.lit[0].1, "the mark is too short");
+            let is_due = |bench: &Bench| {
+                let command = &bench.last().command;
+                command.laser.is_lit() && command.stream_time >= at || command.fault.is_some()
+            };
+            while !is_due(&bench) {
+                bench.run(Some(&job), 1);
+            }
+            if bench.last().command.fault.is_some() {
+                break;
+            }
+            bench.stall(2);
+        }
+        let case = format!("{apart} s apart");
+        if is_borne {
+            finish(&mut bench, &job, &case);
+            continue;
+        }
+        let fault = bench.last().command.fault;
+        assert_eq!(fault.code(), FaultCode::StaleCommand, "{case}");
+        assert_eq!((fault.quantity(), fault.value), (FaultQuantity::Losses, 4.0), "{case}");
     }
 }
