@@ -110,6 +110,21 @@ fn every_letter(check: impl Fn(&Machine, &str, u32) + Sync) {
     });
 }
 
+/// Rows a tenth of a millimetre apart, so slow that friction holds the axis across them between its small steps.
+#[test]
+fn the_rows_of_a_slow_hatch_lie_where_they_should() {
+    let place = support::Place::new();
+    let row = |index: u32| {
+        let (from, to) = if index.is_multiple_of(2) { (0, 8) } else { (8, 0) };
+        format!("G0 X{from} Y{:.1}\nG1 X{to}\n", f64::from(index) * 0.1)
+    };
+    let rows: String = (0..12).map(row).collect();
+    let job = place.file("rows.ngc", &format!("G21 G90\nM3 S500 F1200\n{rows}M5\nM2\n"));
+    let machine = load("cartesian", &[]);
+    let marks = run(&machine, &machine, &job, &[], 0).marks;
+    assert!(marks.error_max <= 15e-6, "error {:e}", marks.error_max);
+}
+
 /// The accuracy that is promised, and the limits that are kept.
 fn assert_accurate(what: &str, outcome: &Outcome) {
     let marks = &outcome.marks;

@@ -100,6 +100,10 @@ pub struct Cascade {
     speed_limit: f64,
     velocity: ProportionalIntegral,
     current: ProportionalIntegral,
+    /// Whether the plan stands.
+    stands: bool,
+    /// The integral of the velocity loop when it came to stand [A].
+    before: f64,
 }
 
 impl Cascade {
@@ -122,7 +126,23 @@ impl Cascade {
                 motor.resistance * gains.current,
                 motor.voltage,
             ),
+            stands: false,
+            before: 0.0,
         }
+    }
+
+    /// Whether the plan `stands` in this cycle. The friction of a standing motor takes either side, and up to
+    /// `friction` [A] of what the integral gathers meanwhile is against that: when the plan moves again, the
+    /// feedforward has the friction, and that much of the integral would push the motor past its place, or hold it
+    /// back, row after row of a hatch. What is more stays: it is weight, or a motor that the file has wrong.
+    pub fn heed_friction(&mut self, stands: bool, friction: f64) {
+        if stands && !self.stands {
+            self.before = self.velocity.accumulated;
+        } else if self.stands && !stands {
+            let gathered = self.velocity.accumulated - self.before;
+            self.velocity.accumulated -= gathered.clamp(-friction, friction);
+        }
+        self.stands = stands;
     }
 
     /// One cycle. With `integrating` off the velocity integral stays as it is: where friction holds
@@ -177,6 +197,7 @@ impl Cascade {
     pub fn reset(&mut self) {
         self.velocity.reset();
         self.current.reset();
+        (self.stands, self.before) = (false, 0.0);
     }
 }
 

@@ -130,6 +130,7 @@ impl Controller {
             let creeps = fastest <= count * actuator.gains.position;
             let held_by_friction = creeps && error.abs() <= band;
             let constant = actuator.motor.dc().map_or(1.0, |motor| motor.torque_constant);
+            cascade.heed_friction(fastest == 0.0, actuator.friction.coulomb / constant);
             let planned = Reference { current: target.effort / constant, ..reference };
             let drive = match actuator.mode {
                 ActuatorMode::Voltage => cascade.step(&reference, &measured, !held_by_friction),
