@@ -52,7 +52,6 @@ fn check(mode: &str, seed: u64) {
         assert!((lit - asked).abs() <= most, "an edge at {lit} ns instead of {asked}");
     }
     let error = played.error(&lit, &plan.artwork);
-    println!("{mode}, clocks {seed}: {error} m");
     let most = match mode {
         "torque" => ERROR_BY_TORQUE,
         "velocity" | "position" if seed == 0 => ERROR,

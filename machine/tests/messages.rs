@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use machine::document::{Document, Override, Position};
+use machine::document::{Attachments, Document, Override, Position};
 use machine::{CornerMode, Machine, MechanismKind, Timing};
 
 const COREXY: &str = include_str!("../../machines/corexy.toml");
@@ -305,11 +305,13 @@ fn override_refused(setting: &str, expected: &str) {
 fn what_is_other_in_the_plant_alone_is_laid_over_last_and_named_as_it_was_written() {
     let both = set(&["path.jerk=400 m/s^3"]);
     let plant = set(&["mechanism.corexy.mass_x=0.4 kg", "path.jerk=300 m/s^3"]);
-    let simulated = Machine::simulated(None, &both, &plant).unwrap();
+    let simulated = Machine::simulated(None, Attachments::default(), &both, &plant).unwrap();
     assert_eq!(simulated.path.jerk, 300.0);
-    let error = Machine::simulated(None, &both, &set(&["path.jrk=3"])).unwrap_err();
+    let error =
+        Machine::simulated(None, Attachments::default(), &both, &set(&["path.jrk=3"])).unwrap_err();
     assert!(error.to_string().contains("--set plant.path.jrk=3: unknown key `jrk`"), "{error}");
-    let error = Machine::simulated(None, &set(&["path.jrk=3"]), &plant).unwrap_err();
+    let error = Machine::simulated(None, Attachments::default(), &set(&["path.jrk=3"]), &plant)
+        .unwrap_err();
     assert!(error.to_string().contains("--set machine.path.jrk=3"), "{error}");
 }
 

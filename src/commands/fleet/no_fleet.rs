@@ -7,7 +7,7 @@ use runtime::Instance;
 
 /// There is none.
 #[derive(Default)]
-pub struct Station;
+pub struct Station(());
 
 impl Station {
     /// None.
@@ -15,7 +15,7 @@ impl Station {
     /// # Errors
     /// A server to speak with.
     pub fn start(arguments: &PublishArguments, instance: &Instance) -> Result<Self, Failure> {
-        check(arguments, instance).map(|()| Self)
+        check(arguments, instance).map(Self)
     }
 
     /// None.
