@@ -19,11 +19,8 @@ use std::process::Stdio;
 use std::time::Duration;
 use support::{
     CONTINUE, Ended, HANGUP, INTERRUPT, KILL, Place, Running, STOP, TERMINATE, lines, number,
-    service, services,
+    service, services, slow_to_plan,
 };
-
-/// A line that takes half an hour, so that planning it takes long enough to act meanwhile.
-const SLOW: &str = "G21 G90 G54\nM3 S800 F1\nG0 X-15 Y0\nG1 X15\nM5\nM2\n";
 
 /// Asserts how a run ended, and gives its summary, which is the one in the run folder.
 fn assert_ended(place: &Place, ended: &Ended, code: i32, outcome: &str) -> Value {
@@ -68,7 +65,7 @@ fn a_signal_while_it_starts_stops_it() {
 fn a_signal_while_it_plans_stops_it() {
     for signal in [INTERRUPT, TERMINATE] {
         let place = Place::new();
-        let mut running = start(&place, SLOW, &[]);
+        let mut running = start(&place, &slow_to_plan(), &[]);
         let services = services(&await_planning(&place, &mut running));
         running.signal(signal);
         assert_stopped(&place, &running.wait());
@@ -121,10 +118,10 @@ fn a_second_signal_waits_for_nothing_that_hangs() {
 
 #[test]
 fn stop_works_while_it_starts_and_while_it_plans() {
-    for text in [lines(4), SLOW.to_owned()] {
+    for text in [lines(4), slow_to_plan()] {
         let place = Place::new();
         let mut running = start(&place, &text, &[]);
-        if text == SLOW {
+        if text == slow_to_plan() {
             await_planning(&place, &mut running);
         } else {
             place.await_status(&mut running, "a pipeline", |_| true);
@@ -199,7 +196,7 @@ fn stop_reaches_the_controller_past_a_supervisor_that_hangs() {
 #[test]
 fn a_fault_before_the_job_plays_is_a_fault() {
     let place = Place::new();
-    let mut running = start(&place, SLOW, &[]);
+    let mut running = start(&place, &slow_to_plan(), &[]);
     let status = await_planning(&place, &mut running);
     let all = services(&status);
     let controller = service(&status, "controller");
@@ -274,7 +271,7 @@ fn a_controller_that_hangs_before_the_motors_are_powered_ends_the_job() {
 #[test]
 fn a_planner_that_dies_while_it_plans_aborts_the_job() {
     let place = Place::new();
-    let mut running = start(&place, SLOW, &[]);
+    let mut running = start(&place, &slow_to_plan(), &[]);
     let status = await_planning(&place, &mut running);
     let all = services(&status);
     service(&status, "planner").signal(KILL).unwrap();

@@ -231,12 +231,7 @@ fn a_stop_of_the_machine_holds_what_waits() {
 #[test]
 fn a_job_that_is_withdrawn_while_it_is_planned_is_gone_at_once() {
     let desk = Desk::new();
-    // Hours of motion, planned to the end before anything moves: the last line is out of reach.
-    let text = format!(
-        "G21 G90 G54\nM3 S800 F1\nG0 X-15 Y0\n{}G1 X1000\nM5\nM2\n",
-        "G1 X15\nG1 X-15\n".repeat(20)
-    );
-    let long = desk.place.file("long.ngc", &text);
+    let long = desk.place.file("long.ngc", &support::slow_to_plan());
     let short = desk.place.file("short.ngc", &lines(1));
     desk.detach(&long);
     desk.detach(&short);

@@ -126,7 +126,8 @@ fn a_stop_over_http_reaches_the_controller_past_a_holder_that_hangs() {
     running.signal(STOP);
     let reply = done(&address, "POST", "/api/v1/requests/stop", b"");
     assert_valid("reply", &reply);
-    assert_eq!((&reply["accepted"], &reply["direct"]), (&json!(true), &json!(true)), "{reply:#}");
+    assert_eq!(reply["accepted"], true, "{reply:#}");
+    assert!(reply["direct"].as_str().unwrap().contains("did not answer"), "{reply:#}");
     // Nothing else goes past it.
     running.signal(CONTINUE);
     assert_eq!(running.wait().json(1)["outcome"], "stopped");

@@ -131,7 +131,9 @@ fn every_key_that_could_be_given_changes_the_machine_or_is_refused() {
             .map(|line| line.split('#').next().unwrap().trim().trim_matches(['[', ']']))
             .collect();
         for path in &paths {
-            for (key, field) in table_of(path, &schema)["properties"].as_object().unwrap() {
+            // A table of names that the file chooses has none.
+            let keys = table_of(path, &schema)["properties"].as_object();
+            for (key, field) in keys.into_iter().flatten() {
                 let Some(value) = example(field) else { continue };
                 if COMPARED.contains(&key.as_str()) || is_there(&text, path, key) {
                     continue;

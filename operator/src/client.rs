@@ -65,7 +65,7 @@ impl Client {
                 Err(ClientError::Socket(silent @ SocketError::Silent { .. })),
                 Some((verb, value)),
             ) => {
-                let reply = direct::ask(&self.instance, verb, value);
+                let reply = direct::ask(&self.instance, (verb, value), &silent);
                 Ok(json!(reply.map_err(|error| ClientError::Unheard { silent, error })?))
             }
             (answer, _) => answer,

@@ -3,22 +3,27 @@
 
 use crate::{Verb, VerbReply};
 use runtime::operator::{OperatorLink, PATIENCE};
+use runtime::socket::SocketError;
 use runtime::{Domain, Instance, Role};
 use std::time::{Duration, Instant};
 
 /// Pause between two tries: somebody else may be asking past the holder too.
 const RETRY: Duration = Duration::from_millis(50);
 
-/// Asks the controller of `instance` directly.
+/// Asks the controller of `instance` directly, whose holder is `silent`.
 ///
 /// # Errors
 /// Why it cannot be asked, in words.
-pub(crate) fn ask(instance: &Instance, verb: Verb, value: f64) -> Result<VerbReply, String> {
+pub(crate) fn ask(
+    instance: &Instance,
+    (verb, value): (Verb, f64),
+    silent: &SocketError,
+) -> Result<VerbReply, String> {
     let begun = Instant::now();
     loop {
         let asked = once(instance, verb, value);
         if asked.is_ok() || begun.elapsed() > PATIENCE {
-            return asked;
+            return asked.map(|reply| VerbReply { direct: Some(silent.to_string()), ..reply });
         }
         std::thread::sleep(RETRY);
     }
@@ -29,5 +34,5 @@ fn once(instance: &Instance, verb: Verb, value: f64) -> Result<VerbReply, String
     let domain = domain.map_err(|error| error.to_string())?;
     let link = OperatorLink::start(&domain).map_err(|error| error.to_string())?;
     let reply = link.request(verb.into(), value).map_err(|error| error.to_string())?;
-    Ok(VerbReply { direct: true, ..VerbReply::from(reply) })
+    Ok(VerbReply::from(reply))
 }

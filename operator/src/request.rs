@@ -146,9 +146,10 @@ pub struct VerbReply {
     pub power: f64,
     /// What limits the override: why the job cannot run as fast as asked; null where nothing does.
     pub capped_by: Option<String>,
-    /// Whether the controller answered past a holder that does not: of a stop and a hold.
+    /// Of a stop and a hold: that the holder does not answer, in words, where the controller answered past it; null where
+    /// the holder did.
     #[serde(default)]
-    pub direct: bool,
+    pub direct: Option<String>,
 }
 
 impl VerbReply {
@@ -177,7 +178,7 @@ impl From<OperatorReply> for VerbReply {
             value: reply.value,
             power: reply.power,
             capped_by: None,
-            direct: false,
+            direct: None,
         }
     }
 }

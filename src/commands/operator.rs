@@ -66,8 +66,8 @@ fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure
 fn answer(request: &Request, arguments: &InstanceArguments) -> Result<Value, Failure> {
     let instance = Instance::new(&arguments.instance).map_err(Failure::bad_input)?;
     let reply = Client::new(instance).ask(request).map_err(Failure::service)?;
-    if reply["direct"] == true {
-        message::tell("the pipeline's holder does not answer; the controller was asked directly");
+    if let Some(silent) = reply["direct"].as_str() {
+        message::tell(&format!("{silent}; the controller was asked directly"));
     }
     Ok(reply)
 }

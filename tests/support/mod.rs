@@ -352,6 +352,12 @@ pub(crate) fn lines(lines: u32) -> String {
     text + "M5\nM2\n"
 }
 
+/// A program of hours that is planned to its end before anything moves: its last line is out of reach.
+pub(crate) fn slow_to_plan() -> String {
+    let lines = "G1 X15\nG1 X-15\n".repeat(20);
+    format!("G21 G90 G54\nM3 S800 F1\nG0 X-15 Y0\n{lines}G1 X1000\nM5\nM2\n")
+}
+
 /// Asserts that a JSON value is valid against the committed schema of this name.
 pub(crate) fn assert_valid(name: &str, value: &Value) {
     let path = source("docs/schema").join(format!("{name}.json"));
