@@ -81,7 +81,8 @@ impl Pipeline for LocalPipeline {
     }
 
     fn submit(&self, file: &Path, set: &[String]) -> Result<u64, String> {
-        let job = JobRequest { job: Some(file.to_owned()), set: set.to_vec(), offsets: None };
+        let (job, set) = (Some(file.to_owned()), set.to_vec());
+        let job = JobRequest { job, set, offsets: None, confined: true };
         let request = Request::Submit { job, out: None, detached: true };
         let submitted = self.client.ask_for::<Submitted>(&request);
         submitted.map(|submitted| submitted.number).map_err(|error| error.to_string())
