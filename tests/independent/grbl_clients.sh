@@ -26,6 +26,7 @@ python() {
 
 XDG_RUNTIME_DIR=$work XDG_STATE_HOME=$work/state
 export XDG_RUNTIME_DIR XDG_STATE_HOME
+: >"$work/graver.log"
 (cd "$work" && exec "$graver" domain --services --no-realtime --machine "$here/../../machines/diode_corexy.toml" \
     --grbl 127.0.0.1:0 --grbl-tty "$work/port" 2>"$work/graver.log") &
 pid=$!
