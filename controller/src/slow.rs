@@ -50,8 +50,10 @@ impl Slow {
         let Some(slow) = &self.newest else { return 0 };
         let devices = self.devices[..self.count].iter().zip(&slow.devices);
         devices.fold(slow.active & self.told, |active, (watched, said)| {
+            // A time far ahead is no time at all, and must not hold for ever.
+            let age = now.0.saturating_sub(said.answered.0).unsigned_abs();
             let is_heard = said.state == DeviceState::Answering as u32
-                && now - said.answered <= watched.longest
+                && age <= watched.longest.0.unsigned_abs()
                 && asking == Presence::Present;
             if is_heard { active } else { active | watched.silence }
         })

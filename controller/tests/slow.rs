@@ -80,3 +80,21 @@ fn no_bit_of_another_input_is_taken() {
     assert_eq!(active(&slow, 1000), ALARM | FULL);
     assert_eq!(active(&slow, 1000) & DOOR, 0);
 }
+
+/// Whatever stands in the memory that is shared, an answer of a time that is none holds for nothing.
+#[test]
+fn an_answer_far_ahead_or_of_no_time_is_silence() {
+    let mut slow = slow();
+    // Said between the beginning of the cycle and its look: a moment ahead.
+    slow.hear(&said(0, 1002));
+    assert_eq!(active(&slow, 1000), 0);
+    slow.hear(&said(0, 100_000));
+    assert_eq!(active(&slow, 1000), CHILLER | FILTER);
+    for answered in [i64::MIN, i64::MAX] {
+        let mut nonsense = said(0, 0);
+        nonsense.devices[..2].iter_mut().for_each(|it| it.answered = Nanoseconds(answered));
+        slow.hear(&nonsense);
+        assert_eq!(active(&slow, 1000), CHILLER | FILTER, "{answered}");
+        assert_eq!(active(&slow, -1000), CHILLER | FILTER, "{answered}");
+    }
+}
