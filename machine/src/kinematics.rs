@@ -264,7 +264,7 @@ pub trait Mechanism<const N: usize>: Clone + Send + Sync + 'static {
     type ChainState: Copy + core::fmt::Debug + Send + 'static;
 
     /// The name in machine files and summaries.
-    const NAME: &'static str;
+    fn name(&self) -> &'static str;
 
     /// What of a pose it can choose.
     fn task_space(&self) -> TaskSpace;

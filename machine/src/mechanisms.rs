@@ -1,5 +1,6 @@
 //! The mechanisms, one file each, and the choice among them that a machine file makes.
 
+mod by_joints;
 pub mod cartesian;
 pub mod corexy;
 pub mod five_bar;
@@ -25,31 +26,42 @@ pub use serial::Serial;
 pub use tri_planar::TriPlanar;
 pub use twin_actuator::{ActuatorBodies, TwinActuator, TwinBranch};
 
-use crate::kinematics::{Mechanism, TaskSpace};
+use by_joints::{by_joints, of_another};
+use nalgebra::{SMatrix, Vector3, Vector6};
 use scaled::Scale;
+
+use crate::analysis::Bodies;
+use crate::kinematics::{
+    Branch, Jacobian, JointMotion, Joints, KinematicsError, Margin, Mechanism, Pose, TaskSpace,
+    ToolMotion,
+};
 
 /// The one list of the mechanisms: the choice among them, and what is asked of whichever it is.
 macro_rules! mechanisms {
-    ($( $(#[doc = $about:expr])* $variant:ident($held:ty): $mechanism:ty; )*) => {
+    ($( $joints:literal, $any:ident, $branch:ident, $chain:ident {
+        $( $(#[doc = $about:expr])* $variant:ident($held:ty): $mechanism:ty; )*
+    } )*) => {
+        $( by_joints! { $joints, $any, $branch, $chain: $( $variant: $mechanism; )* } )*
+
         /// The mechanism of a machine file, matched once when a stage starts.
         #[derive(Debug, Clone, PartialEq)]
         pub enum MechanismKind {
-            $( $(#[doc = $about])* $variant($held), )*
+            $( $( $(#[doc = $about])* $variant($held), )* )*
         }
 
-        $( impl From<$mechanism> for MechanismKind {
+        $( $( impl From<$mechanism> for MechanismKind {
             fn from(mechanism: $mechanism) -> Self {
                 Self::$variant(mechanism.into())
             }
-        } )*
+        } )* )*
 
         impl MechanismKind {
-            /// Hands the mechanism to `visitor` as its own type.
+            /// Hands the mechanism to `visitor`.
             pub fn visit<V: MechanismVisitor>(&self, visitor: V) -> V::Output {
                 match self {
-                    $( Self::$variant(mechanism) => {
-                        visitor.visit(<$mechanism as Clone>::clone(mechanism))
-                    } )*
+                    $( $( Self::$variant(mechanism) => {
+                        visitor.visit($any::$variant(<$mechanism as Clone>::clone(mechanism)))
+                    } )* )*
                 }
             }
 
@@ -60,7 +72,7 @@ macro_rules! mechanisms {
             pub fn scaled(&self, mass: f64, stiffness: f64) -> Self {
                 let mut kind = self.clone();
                 match &mut kind {
-                    $( Self::$variant(mechanism) => mechanism.scale(mass, stiffness), )*
+                    $( $( Self::$variant(mechanism) => mechanism.scale(mass, stiffness), )* )*
                 }
                 kind
             }
@@ -69,38 +81,48 @@ macro_rules! mechanisms {
 }
 
 mechanisms! {
-    /// Carriages in x and y, or one of them over a chuck.
-    Cartesian(Cartesian<2>): Cartesian<2>;
-    /// The same, and a carriage that moves the head up and down.
-    CartesianLift(Cartesian<3>): Cartesian<3>;
-    /// Two belts that move the head in x and y together.
-    CoreXy(CoreXy<2>): CoreXy<2>;
-    /// The same, and a carriage that moves the head up and down.
-    CoreXyLift(CoreXy<3>): CoreXy<3>;
-    /// Two mirrors that turn the beam over a flat field.
-    Galvo(Galvo): Galvo;
-    /// Two linear axes, a rotary table, and a head that tilts and turns.
-    Mcm(Mcm): Mcm;
-    /// A rotary arm over a rotary table, with a vertical axis.
-    Polar(Polar): Polar;
-    /// A platform on three legs with planar motors as feet.
-    TriPlanar(Box<TriPlanar>): TriPlanar;
-    /// Two arms whose forearms meet in the tool.
-    FiveBar(FiveBar): FiveBar;
-    /// Two carts on one rail, with a link each to the tool.
-    Prrrp(Prrrp): Prrrp;
-    /// Two actuators of variable length that meet in one joint.
-    TwinActuator(TwinActuator): TwinActuator;
-    /// An open chain of two joints.
-    Serial2(Box<Serial<2>>): Serial<2>;
-    /// An open chain of three joints.
-    Serial3(Box<Serial<3>>): Serial<3>;
-    /// An open chain of four joints.
-    Serial4(Box<Serial<4>>): Serial<4>;
-    /// An open chain of five joints.
-    Serial5(Box<Serial<5>>): Serial<5>;
-    /// An open chain of six joints.
-    Serial6(Box<Serial<6>>): Serial<6>;
+    2, TwoJoints, TwoJointsBranch, TwoJointsChain {
+        /// Carriages in x and y, or one of them over a chuck.
+        Cartesian(Cartesian<2>): Cartesian<2>;
+        /// Two belts that move the head in x and y together.
+        CoreXy(CoreXy<2>): CoreXy<2>;
+        /// Two mirrors that turn the beam over a flat field.
+        Galvo(Galvo): Galvo;
+        /// Two arms whose forearms meet in the tool.
+        FiveBar(FiveBar): FiveBar;
+        /// Two carts on one rail, with a link each to the tool.
+        Prrrp(Prrrp): Prrrp;
+        /// Two actuators of variable length that meet in one joint.
+        TwinActuator(TwinActuator): TwinActuator;
+        /// An open chain of two joints.
+        Serial2(Box<Serial<2>>): Serial<2>;
+    }
+    3, ThreeJoints, ThreeJointsBranch, ThreeJointsChain {
+        /// The same, and a carriage that moves the head up and down.
+        CartesianLift(Cartesian<3>): Cartesian<3>;
+        /// The same, and a carriage that moves the head up and down.
+        CoreXyLift(CoreXy<3>): CoreXy<3>;
+        /// A rotary arm over a rotary table, with a vertical axis.
+        Polar(Polar): Polar;
+        /// An open chain of three joints.
+        Serial3(Box<Serial<3>>): Serial<3>;
+    }
+    4, FourJoints, FourJointsBranch, FourJointsChain {
+        /// An open chain of four joints.
+        Serial4(Box<Serial<4>>): Serial<4>;
+    }
+    5, FiveJoints, FiveJointsBranch, FiveJointsChain {
+        /// Two linear axes, a rotary table, and a head that tilts and turns.
+        Mcm(Mcm): Mcm;
+        /// An open chain of five joints.
+        Serial5(Box<Serial<5>>): Serial<5>;
+    }
+    6, SixJoints, SixJointsBranch, SixJointsChain {
+        /// A platform on three legs with planar motors as feet.
+        TriPlanar(Box<TriPlanar>): TriPlanar;
+        /// An open chain of six joints.
+        Serial6(Box<Serial<6>>): Serial<6>;
+    }
 }
 
 /// Work that is generic over the mechanism, such as a sampler or a plant.
@@ -131,8 +153,8 @@ impl MechanismKind {
         struct Name;
         impl MechanismVisitor for Name {
             type Output = &'static str;
-            fn visit<const N: usize, M: Mechanism<N>>(self, _mechanism: M) -> &'static str {
-                M::NAME
+            fn visit<const N: usize, M: Mechanism<N>>(self, mechanism: M) -> &'static str {
+                mechanism.name()
             }
         }
         self.visit(Name)

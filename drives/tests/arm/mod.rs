@@ -31,7 +31,9 @@ impl Arm {
 impl Mechanism<2> for Arm {
     type Branch = ();
     type ChainState = Joints<2>;
-    const NAME: &'static str = "arm";
+    fn name(&self) -> &'static str {
+        "arm"
+    }
 
     fn task_space(&self) -> TaskSpace {
         TaskSpace::Plane

@@ -20,7 +20,9 @@ pub(crate) struct Shaft {
 impl Mechanism<1> for Shaft {
     type Branch = ();
     type ChainState = Joints<1>;
-    const NAME: &'static str = "shaft";
+    fn name(&self) -> &'static str {
+        "shaft"
+    }
 
     fn task_space(&self) -> TaskSpace {
         TaskSpace::Plane

@@ -63,7 +63,9 @@ impl<const N: usize> Mechanism<N> for Cartesian<N> {
     type Branch = ();
     type ChainState = Joints<N>;
 
-    const NAME: &'static str = "cartesian";
+    fn name(&self) -> &'static str {
+        "cartesian"
+    }
 
     fn task_space(&self) -> TaskSpace {
         if N < 3 { TaskSpace::Plane } else { TaskSpace::Space }

@@ -81,7 +81,9 @@ impl<const N: usize> Mechanism<N> for CoreXy<N> {
     type Branch = ();
     type ChainState = Joints<N>;
 
-    const NAME: &'static str = "corexy";
+    fn name(&self) -> &'static str {
+        "corexy"
+    }
 
     fn task_space(&self) -> TaskSpace {
         if N < 3 { TaskSpace::Plane } else { TaskSpace::Space }

@@ -357,7 +357,9 @@ impl Mechanism<2> for FiveBar {
     type Branch = FiveBarBranch;
     type ChainState = FiveBarChainState;
 
-    const NAME: &'static str = "five_bar";
+    fn name(&self) -> &'static str {
+        "five_bar"
+    }
 
     fn task_space(&self) -> TaskSpace {
         TaskSpace::Plane

@@ -240,7 +240,9 @@ impl Mechanism<2> for Galvo {
     type Branch = ();
     type ChainState = Joints<2>;
 
-    const NAME: &'static str = "galvo";
+    fn name(&self) -> &'static str {
+        "galvo"
+    }
 
     fn task_space(&self) -> TaskSpace {
         TaskSpace::Plane

@@ -261,7 +261,9 @@ impl Mechanism<5> for Mcm {
     type Branch = McmBranch;
     type ChainState = Joints<5>;
 
-    const NAME: &'static str = "mcm";
+    fn name(&self) -> &'static str {
+        "mcm"
+    }
 
     fn task_space(&self) -> TaskSpace {
         TaskSpace::Axis

@@ -223,7 +223,9 @@ impl Mechanism<3> for Polar {
     type Branch = PolarBranch;
     type ChainState = Joints<3>;
 
-    const NAME: &'static str = "polar";
+    fn name(&self) -> &'static str {
+        "polar"
+    }
 
     fn task_space(&self) -> TaskSpace {
         TaskSpace::Space

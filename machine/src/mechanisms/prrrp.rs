@@ -187,7 +187,9 @@ impl Mechanism<2> for Prrrp {
     type Branch = PrrrpBranch;
     type ChainState = PrrrpChainState;
 
-    const NAME: &'static str = "prrrp";
+    fn name(&self) -> &'static str {
+        "prrrp"
+    }
 
     fn task_space(&self) -> TaskSpace {
         TaskSpace::Plane

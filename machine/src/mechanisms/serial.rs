@@ -88,7 +88,9 @@ impl<const N: usize> Mechanism<N> for Serial<N> {
     type Branch = ();
     type ChainState = SerialChainState<N>;
 
-    const NAME: &'static str = "serial";
+    fn name(&self) -> &'static str {
+        "serial"
+    }
 
     fn task_space(&self) -> TaskSpace {
         self.task_space

@@ -184,7 +184,9 @@ impl Mechanism<6> for TriPlanar {
     type Branch = TriPlanarBranch;
     type ChainState = TriPlanarChainState;
 
-    const NAME: &'static str = "tri_planar";
+    fn name(&self) -> &'static str {
+        "tri_planar"
+    }
 
     fn task_space(&self) -> TaskSpace {
         TaskSpace::Pose

@@ -228,7 +228,9 @@ impl Mechanism<2> for TwinActuator {
     type Branch = TwinBranch;
     type ChainState = TwinAssembly;
 
-    const NAME: &'static str = "twin_actuator";
+    fn name(&self) -> &'static str {
+        "twin_actuator"
+    }
 
     fn task_space(&self) -> TaskSpace {
         TaskSpace::Plane

@@ -31,14 +31,18 @@ pub(crate) fn conforms<const N: usize, M: Mechanism<N>>(
     let (mut cases, mut tries) = (0, 0);
     while cases < CASES {
         tries += 1;
-        assert!(tries <= 20 * CASES, "{}: hardly a state of the sampler is of use", M::NAME);
+        assert!(
+            tries <= 20 * CASES,
+            "{}: hardly a state of the sampler is of use",
+            mechanism.name()
+        );
         let q = joints(&mut random);
         let Ok(state) = mechanism.solve(&q, mechanism.branch(), None) else { continue };
         if !clear(mechanism, &state, 1.2) {
             continue;
         }
         let tool = random.motion(&mechanism.pose(&state), mechanism.task_space());
-        let context = format!("{} case {cases}: {q:?} {tool:?}", M::NAME);
+        let context = format!("{} case {cases}: {q:?} {tool:?}", mechanism.name());
         positions(mechanism, &q, &tool.pose(), &context);
         for (branch, taken) in branches.iter().zip(&mut taken) {
             *taken += usize::from(solves(mechanism, *branch, &q, &tool.pose(), &context));
@@ -54,7 +58,7 @@ pub(crate) fn conforms<const N: usize, M: Mechanism<N>>(
         cases += 1;
     }
     for (branch, taken) in branches.iter().zip(taken) {
-        assert!(taken > CASES / 20, "{} {branch:?} solved only {taken} cases", M::NAME);
+        assert!(taken > CASES / 20, "{} {branch:?} solved only {taken} cases", mechanism.name());
     }
     dynamics::transmission(mechanism);
 }

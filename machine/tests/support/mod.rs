@@ -96,7 +96,7 @@ pub fn conforms<const N: usize, M: Mechanism<N>>(
     let mut random = Random::new(0x9e37_79b9_7f4a_7c15);
     for case in 0..300 {
         let tool = draw(&mut random);
-        let context = format!("{} case {case}: {tool:?}", M::NAME);
+        let context = format!("{} case {case}: {tool:?}", mechanism.name());
         let q = mechanism.inverse(&tool.pose(), branch, &Joints::zeros()).unwrap();
         let back = mechanism.forward(&q, branch).unwrap();
         near((back.position - tool.position).norm(), 0.0, 1e-14, &context);

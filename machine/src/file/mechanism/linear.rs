@@ -167,7 +167,10 @@ pub(super) fn joints<const N: usize, M: Mechanism<N>>(
     if let Some(first) = table.home_axes.as_ref().and_then(|values| values.first()) {
         diagnostics.contradict(
             first.span,
-            format!("`home_axes` has no effect: a place of a {} says how its axes stand", M::NAME),
+            format!(
+                "`home_axes` has no effect: a place of a {} says how its axes stand",
+                mechanism.name()
+            ),
             "write `home`, where the tool rests",
         );
     }
