@@ -303,36 +303,43 @@ fn machine_of(job: &Path) -> Option<PathBuf> {
 
 #[test]
 fn broken_programs_are_refused_at_their_line() {
-    let place = Place::new();
-    let mut random = SplitMix64::new(73);
-    let path = place.path("job.ngc");
     let jobs: Vec<PathBuf> = std::fs::read_dir(source("jobs"))
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.extension().is_some_and(|extension| extension == "ngc"))
         .collect();
     assert!(jobs.len() >= 3, "{jobs:?}");
-    for job in jobs {
-        let text = std::fs::read_to_string(&job).unwrap();
-        let machine = machine_of(&job);
-        let machine = machine.as_deref();
-        assert!(matches!(judge(machine, &job, &[]), Verdict::Sound), "{job:?}");
-        let mut refused = Vec::new();
-        // Samples of other machines are longer: of their mutations, of the same kinds, every twelfth.
-        let every = if machine.is_some() { 12 } else { 1 };
-        for (what, broken) in gcode_mutations(&text, &mut random).into_iter().step_by(every) {
-            std::fs::write(&path, &broken).unwrap();
-            let what = format!("{}, {what}", job.display());
-            if assert_told(&path, machine, &path, &[], &what) {
-                let kept = format!("{}\n{broken}", path.display());
-                let named = |file: &Path| ["--machine".to_owned(), file.display().to_string()];
-                let mut arguments = vec![path.display().to_string()];
-                arguments.extend(machine.map(named).into_iter().flatten());
-                refused.push((kept, arguments));
-            }
+    std::thread::scope(|scope| {
+        for (number, job) in jobs.iter().enumerate() {
+            scope.spawn(move || broken_program_is_refused(job, 73 + number as u64));
         }
-        assert_refused_by_binary(&place, &refused, &mut random);
+    });
+}
+
+/// Breaks the program in `job` in many ways.
+fn broken_program_is_refused(job: &Path, seed: u64) {
+    let place = Place::new();
+    let mut random = SplitMix64::new(seed);
+    let path = place.path("job.ngc");
+    let text = std::fs::read_to_string(job).unwrap();
+    let machine = machine_of(job);
+    let machine = machine.as_deref();
+    assert!(matches!(judge(machine, job, &[]), Verdict::Sound), "{job:?}");
+    let mut refused = Vec::new();
+    // Samples of other machines are longer: of their mutations, of the same kinds, every twelfth.
+    let every = if machine.is_some() { 12 } else { 1 };
+    for (what, broken) in gcode_mutations(&text, &mut random).into_iter().step_by(every) {
+        std::fs::write(&path, &broken).unwrap();
+        let what = format!("{}, {what}", job.display());
+        if assert_told(&path, machine, &path, &[], &what) {
+            let kept = format!("{}\n{broken}", path.display());
+            let named = |file: &Path| ["--machine".to_owned(), file.display().to_string()];
+            let mut arguments = vec![path.display().to_string()];
+            arguments.extend(machine.map(named).into_iter().flatten());
+            refused.push((kept, arguments));
+        }
     }
+    assert_refused_by_binary(&place, &refused, &mut random);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! One job in a pipeline, from the start of the machine to the summary.
 
 mod conclude;
+mod held;
 mod homing;
 mod place;
 mod progress;
@@ -72,6 +73,7 @@ pub struct JobRun<'a> {
     number: u64,
     /// The interlocks and warnings that its summary tells already, one bit for each input.
     told: u64,
+    holds: held::OwnHolds,
 }
 
 impl<'a> JobRun<'a> {
@@ -109,6 +111,7 @@ impl<'a> JobRun<'a> {
             run_outcome,
             number,
             told: 0,
+            holds: held::OwnHolds::default(),
         })
     }
 
@@ -143,6 +146,7 @@ impl<'a> JobRun<'a> {
             self.time_left = self.pipeline.latest.time_left().unwrap_or(self.time_left);
             self.note_place();
             self.note_inputs();
+            self.note_holds();
             self.pipeline.board.note_stage(self.stage());
             let board = &self.pipeline.board;
             line.draw(|| Some(JobProgress::of(&board.read())));

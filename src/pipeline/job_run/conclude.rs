@@ -61,6 +61,7 @@ impl JobRun<'_> {
         }
         let (level, spare) = self.pipeline.recording();
         (self.run_outcome.level, self.run_outcome.spare) = (level, Some(spare));
+        self.tell_holds();
         let machine = &self.pipeline.machine;
         self.run_outcome.warnings.splice(0..0, machine.job_warnings());
         // Its report takes its time.
