@@ -21,6 +21,11 @@ struct Nats {
 
 impl Nats {
     fn start(place: &Place) -> Option<Self> {
+        Self::start_with(place, &[])
+    }
+
+    /// With these arguments too.
+    fn start_with(place: &Place, more: &[&str]) -> Option<Self> {
         let named = std::env::var_os("NATS_SERVER").map(PathBuf::from);
         let path = std::env::var_os("PATH").unwrap_or_default();
         // Debian has it where only root looks.
@@ -40,6 +45,7 @@ impl Nats {
         let folder = place.path("nats");
         std::fs::create_dir(&folder).unwrap();
         let child = Command::new(&program)
+            .args(more)
             .args(["-a", "127.0.0.1", "-p", "-1", "-js", "-sd"])
             .arg(folder.join("store"))
             .arg("--ports_file_dir")
@@ -207,6 +213,75 @@ fn what_is_no_fleet_is_refused_before_anything_starts_and_a_server_that_is_not_t
     assert_eq!(done["outcome"], "completed");
     assert!(done["marks"].is_object(), "{done:#}");
     until("it is told", || domain.said().contains("cannot be reached").then_some(()));
+    domain.signal(support::TERMINATE);
+    domain.wait().accepted();
+    place.assert_nothing_left(&[]);
+}
+
+/// A certificate authority, and a key and a certificate of `localhost` by it, in this folder; `false` where there is no openssl.
+fn certificates(folder: &Path) -> bool {
+    std::fs::create_dir(folder).unwrap();
+    let new_key = "req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes";
+    let authority = "-x509 -days 2 -subj /CN=hall -keyout ca.key -out ca.pem \
+                     -addext basicConstraints=critical,CA:TRUE -addext keyUsage=critical,keyCertSign";
+    let steps = [
+        format!("{new_key} {authority}"),
+        format!("{new_key} -subj /CN=localhost -keyout server.key -out server.csr"),
+        "x509 -req -in server.csr -CA ca.pem -CAkey ca.key -CAcreateserial -days 2 -extfile names -out server.pem"
+            .to_owned(),
+    ];
+    std::fs::write(folder.join("names"), "subjectAltName=DNS:localhost\n").unwrap();
+    steps.iter().all(|step| {
+        let mut openssl = Command::new("openssl");
+        openssl.args(step.split_whitespace()).current_dir(folder);
+        let Ok(made) = openssl.stdin(Stdio::null()).output() else {
+            let _ = writeln!(std::io::stderr(), "NOT RUN: a fleet over TLS: no openssl in PATH");
+            return false;
+        };
+        assert!(made.status.success(), "{step}: {}", String::from_utf8_lossy(&made.stderr));
+        true
+    })
+}
+
+#[test]
+fn a_server_is_known_by_its_certificate_and_nobody_speaks_with_another_one() {
+    let place = Place::new();
+    let folder = place.path("tls");
+    if !certificates(&folder) {
+        return;
+    }
+    let file = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+    let (key, certificate, ca) = (file("server.key"), file("server.pem"), file("ca.pem"));
+    let encrypted = ["--tls", "--tlskey", &key, "--tlscert", &certificate];
+    let Some(nats) = Nats::start_with(&place, &encrypted) else { return };
+    let port = nats.address.rsplit(':').next().unwrap();
+    let address = format!("tls://localhost:{port}");
+
+    // Whoever does not know who signed it, or asks for another name, does not speak with it.
+    for (address, more) in
+        [(address.clone(), &[][..]), (format!("tls://127.0.0.1:{port}"), &["--ca", &ca])]
+    {
+        let ended = place.graver(&[&["fleet", "status", &address][..], more].concat());
+        assert_eq!(ended.code, Some(4), "{address}: {}", ended.error);
+    }
+    let fleet = ["fleet", "status", &address, "--ca", &ca, "--json"];
+    assert_valid("fleet_status", &place.graver(&fleet).json(0));
+
+    let job = place.file("lines.ngc", &lines(1));
+    let submit = ["fleet", "submit", &address, job.to_str().unwrap(), "--group", "lasers"];
+    place.graver(&[&submit[..], &["--ca", &ca]].concat()).accepted();
+    let machine = source("machines/corexy.toml");
+    let start = [
+        &["domain", "--services", "--no-realtime", "--machine", machine.to_str().unwrap()][..],
+        &["--publish", &address, "--publish-ca", &ca, "--publish-as", "cell-1"],
+        &["--jobs-of", "lasers", "--instance", place.instance().name()],
+    ];
+    let domain = place.start(&start.concat());
+    until("the job is done", || {
+        let told = place.graver(&fleet).json(0);
+        let jobs = told["jobs"].as_array().unwrap();
+        jobs.iter().any(|job| job["state"] == "completed").then_some(())
+    });
     domain.signal(support::TERMINATE);
     domain.wait().accepted();
     place.assert_nothing_left(&[]);
