@@ -243,6 +243,7 @@ impl<'a> Bench<'a> {
             setpoints: &self.planned.setpoints[self.sent..end],
             request,
             peers: Peers::default(),
+            slow: 0,
         };
         self.sent = end;
         self.controller.step(Nanoseconds(1), &inputs, &mut self.outputs);

@@ -83,6 +83,7 @@ fn main() {
                 setpoints: &batch,
                 request,
                 peers: Peers::default(),
+                slow: 0,
             };
             controller.step(Nanoseconds(0), &inputs, &mut outputs);
             sent = end;

@@ -62,7 +62,6 @@ use crate::planned::Planned;
 use crate::player::{Event, Player};
 use crate::reference::Reference;
 use crate::safety::Safety;
-use crate::slow::Slow;
 use crate::squaring::Squaring;
 use crate::standing::Standing;
 use crate::state::{AfterRest, State};
@@ -76,7 +75,7 @@ use machine::{Actuator, ActuatorMode, Machine};
 use messages::feedback::status;
 use messages::{
     ActuatorArray, Command, CommandMode, ControllerReport, Fault, FaultCode, FaultQuantity,
-    Feedback, LaserCycle, MAX_ACTUATORS, MotionEnd, Nanoseconds, RealtimeFacts, SlowInputs,
+    Feedback, LaserCycle, MAX_ACTUATORS, MotionEnd, Nanoseconds, RealtimeFacts,
 };
 use transitions::Waits;
 
@@ -116,7 +115,6 @@ pub struct Controller {
     squaring: Squaring,
     reference: Reference,
     safety: Safety,
-    slow: Slow,
     switching: Switching,
     /// What moves without a stream.
     travel: Travel,
@@ -176,7 +174,6 @@ impl Controller {
             squaring: Squaring::default(),
             reference: Reference::new(machine),
             safety: Safety::new(machine),
-            slow: Slow::new(machine),
             switching: Switching::new(machine),
             travel: Travel::new(machine, period.seconds()),
             homing: Homing::new(machine, period.seconds()),
@@ -209,11 +206,6 @@ impl Controller {
         self.statistics.set_realtime(facts);
     }
 
-    /// Takes what slow devices say, before the step that it is for. From the first time on their silence counts.
-    pub fn hear(&mut self, slow: &SlowInputs) {
-        self.slow.hear(slow);
-    }
-
     /// Answers one feedback.
     pub fn step(&mut self, now: Nanoseconds, inputs: &Inputs<'_>, outputs: &mut Outputs) {
         self.refer();
@@ -234,7 +226,7 @@ impl Controller {
             self.fail(finding, now);
         }
         let settling = self.pass_missed(elapsed, feedback, now);
-        self.safety.see(feedback.inputs | self.slow.active(now, inputs.peers.modbus));
+        self.safety.see(feedback.inputs | inputs.slow);
         self.heed_inputs(now, feedback);
         outputs.reply = inputs.request.map(|request| self.request(&request, feedback));
         self.transition(now, feedback);

@@ -1,5 +1,6 @@
 //! What goes into a controller step and what comes out of it.
 
+use messages::command::lost;
 use messages::{
     Command, ControllerReport, Feedback, Nanoseconds, OperatorReply, OperatorRequest, Progress,
     Setpoint,
@@ -24,8 +25,26 @@ pub struct Peers {
     pub drives: Presence,
     /// Who holds the domain.
     pub supervisor: Presence,
-    /// Who asks the devices on Modbus; missed only where the machine has some.
-    pub modbus: Presence,
+}
+
+impl Peers {
+    /// Who is lost, in bits of [`lost`].
+    pub fn lost(&self) -> u32 {
+        let bit = |peer, bit| if peer == Presence::Lost { bit } else { 0 };
+        bit(self.planner, lost::PLANNER)
+            | bit(self.drives, lost::DRIVES)
+            | bit(self.supervisor, lost::SUPERVISOR)
+    }
+
+    /// Those of whom these are lost; bits of [`lost`].
+    pub fn without(lost: u32) -> Self {
+        let of = |bit| if lost & bit == 0 { Presence::Present } else { Presence::Lost };
+        Self {
+            planner: of(lost::PLANNER),
+            drives: of(lost::DRIVES),
+            supervisor: of(lost::SUPERVISOR),
+        }
+    }
 }
 
 /// What a step is given.
@@ -42,6 +61,8 @@ pub struct Inputs<'a> {
     pub request: Option<OperatorRequest>,
     /// Who is there.
     pub peers: Peers,
+    /// Inputs that slow devices make active, one bit each in the order of the machine file.
+    pub slow: u64,
 }
 
 /// What a step gives back.

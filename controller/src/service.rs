@@ -5,6 +5,7 @@
 
 use crate::controller::Controller;
 use crate::exchange::{Inputs, Outputs, Peers as PeersPresent, Presence};
+use crate::slow::Slow;
 use machine::Machine;
 use messages::{
     Command, ControllerReport, ControllerState, Feedback, Nanoseconds, OperatorRequest,
@@ -62,7 +63,7 @@ struct ServiceCycle {
     feedbacks: Subscriber<Feedback>,
     setpoints: Subscriber<Setpoint>,
     /// `None` where the machine has no slow devices.
-    slow: Option<Subscriber<SlowInputs>>,
+    slow: Option<(Subscriber<SlowInputs>, Slow)>,
     commands: Publisher<Command>,
     progress: Publisher<Progress>,
     reports: Publisher<ControllerReport>,
@@ -72,17 +73,17 @@ struct ServiceCycle {
 
 impl ServiceCycle {
     fn open(domain: &Domain, machine: &Machine) -> Result<Self, ServiceError> {
-        let mut controller = Controller::new(machine);
         let mut watched = vec![Role::Domain, Role::Planner, Role::Drives];
         let mut slow = None;
         if !machine.operating.devices.is_empty() {
+            let mut said = Slow::new(machine);
             // Until they have spoken they are silent.
-            controller.hear(&SlowInputs::default());
-            slow = Some(domain.subscriber(Samples::Latest)?);
+            said.hear(&SlowInputs::default());
+            slow = Some((domain.subscriber(Samples::Latest)?, said));
             watched.push(Role::Modbus);
         }
         Ok(Self {
-            controller,
+            controller: Controller::new(machine),
             outputs: Outputs::default(),
             setpoints_taken: Vec::with_capacity(DRAIN),
             told_to_stop: false,
@@ -105,15 +106,10 @@ impl ServiceCycle {
             let Some(setpoint) = self.setpoints.receive()? else { break };
             self.setpoints_taken.push(setpoint);
         }
-        if let Some(slow) = &mut self.slow
-            && let Some(words) = slow.newest()?
-        {
-            self.controller.hear(&words);
-        }
         let request = self.request();
-        let peers = self.present();
+        let (peers, slow) = (self.present(), self.slow(received)?);
         let setpoints = &self.setpoints_taken;
-        let inputs = Inputs { feedback, received, setpoints, request, peers };
+        let inputs = Inputs { feedback, received, setpoints, request, peers, slow };
         self.controller.step(received, &inputs, &mut self.outputs);
 
         // The command first: everything else can wait until drives has it.
@@ -168,16 +164,28 @@ impl ServiceCycle {
     }
 
     fn present(&mut self) -> PeersPresent {
-        let mut presence = |role| match self.peers.state(role) {
+        PeersPresent {
+            planner: self.presence(Role::Planner),
+            drives: self.presence(Role::Drives),
+            supervisor: self.presence(Role::Domain),
+        }
+    }
+
+    fn presence(&mut self, role: Role) -> Presence {
+        match self.peers.state(role) {
             PeerState::Dead => Presence::Lost,
             PeerState::Unknown | PeerState::Alive => Presence::Present,
-        };
-        PeersPresent {
-            planner: presence(Role::Planner),
-            drives: presence(Role::Drives),
-            supervisor: presence(Role::Domain),
-            modbus: presence(Role::Modbus),
         }
+    }
+
+    /// The inputs that slow devices make active at `now`, one bit each.
+    fn slow(&mut self, now: Nanoseconds) -> Result<u64, ServiceError> {
+        let asking = self.presence(Role::Modbus);
+        let Some((words, said)) = &mut self.slow else { return Ok(0) };
+        if let Some(newest) = words.newest()? {
+            said.hear(&newest);
+        }
+        Ok(said.active(now, asking))
     }
 
     /// Told to end, or without a supervisor; never while the axes may still be moving, unless nobody moves them.

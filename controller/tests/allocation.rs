@@ -6,7 +6,8 @@
 
 mod support;
 
-use controller::{Controller, Inputs, Outputs, Peers};
+use controller::slow::Slow;
+use controller::{Controller, Inputs, Outputs, Peers, Presence};
 use machine::Machine;
 use messages::feedback::status;
 use messages::{
@@ -70,6 +71,7 @@ fn no_step_allocates_while_axes_are_homed_and_moved_by_hand() {
     let mut outputs = Outputs::default();
     let mut feedback = Feedback { status: status::POWERED, ..Feedback::default() };
     let mut slow = SlowInputs::default();
+    let mut devices = Slow::new(&machine);
     slow.devices[0].state = DeviceState::Answering as u32;
     let (mut seen, mut ends) = ([0; 16], Vec::with_capacity(16));
     for cycle in 1..6000_u64 {
@@ -96,15 +98,16 @@ fn no_step_allocates_while_axes_are_homed_and_moved_by_hand() {
         let is_on = |axis: usize| feedback.position[axis] * machine.actuators[axis].ratio < -5e-3;
         feedback.inputs = u64::from(is_on(0)) | u64::from(is_on(1)) << 1;
         slow.devices[0].answered = now;
-        let inputs = Inputs {
-            feedback: &feedback,
-            received: now,
-            setpoints: &[],
-            request,
-            peers: Peers::default(),
-        };
         let ((), asked) = Allocations::during(|| {
-            controller.hear(&slow);
+            devices.hear(&slow);
+            let inputs = Inputs {
+                feedback: &feedback,
+                received: now,
+                setpoints: &[],
+                request,
+                peers: Peers::default(),
+                slow: devices.active(now, Presence::Present),
+            };
             controller.step(now, &inputs, &mut outputs);
         });
         assert_eq!(asked, Allocations::default(), "in cycle {cycle}");
@@ -186,6 +189,7 @@ fn assert_no_step_allocates(machine: &Machine, speed: f64) {
             setpoints: &job.setpoints[sent..end],
             request,
             peers: Peers::default(),
+            slow: 0,
         };
         let ((), asked) = Allocations::during(|| {
             controller.step(Nanoseconds(cycle as i64), &inputs, &mut outputs);

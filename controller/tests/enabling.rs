@@ -81,7 +81,7 @@ impl Rig {
         });
         let now = feedback.deadline;
         let peers = Peers::default();
-        let inputs = Inputs { feedback, received: now, setpoints: &[], request, peers };
+        let inputs = Inputs { feedback, received: now, setpoints: &[], request, peers, slow: 0 };
         let ((), asked) = Allocations::during(|| {
             self.controller.step(now, &inputs, &mut self.outputs);
         });

@@ -118,6 +118,7 @@ fn play(machine: &Machine, job: &Job, doubts: u64, random: &mut SplitMix64) -> (
             setpoints: &setpoints,
             request,
             peers,
+            slow: 0,
         };
         let state_before = outputs.command.state();
         controller.step(Nanoseconds(step as i64), &inputs, &mut outputs);

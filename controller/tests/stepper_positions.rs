@@ -144,6 +144,7 @@ impl Drivers {
             setpoints: &setpoints[self.sent..end],
             request,
             peers: Peers::default(),
+            slow: 0,
         };
         self.sent = end;
         let mut outputs = Outputs::default();

@@ -1,6 +1,6 @@
 //! Controller to drives: what the motors and the laser shall do in the next cycle.
 
-use crate::{ActuatorArray, Cycle, Fault, LaserCycle, Nanoseconds, sample};
+use crate::{ActuatorArray, Cycle, Fault, LaserCycle, Nanoseconds, OperatorRequest, sample};
 
 /// What drives shall do with the motors. Discriminants are the values in samples; 1 to 3 were modes of
 /// the machine as a whole.
@@ -28,9 +28,36 @@ impl CommandMode {
     }
 }
 
+/// Bits of [`Given::lost`].
+pub mod lost {
+    /// The planner.
+    pub const PLANNER: u32 = 1;
+    /// Drives.
+    pub const DRIVES: u32 = 1 << 1;
+    /// The domain's holder.
+    pub const SUPERVISOR: u32 = 1 << 2;
+}
+
+sample! {
+    /// What the controller was given for a command, beside the feedback and the setpoints themselves: with these it
+    /// can be made again.
+    Given = "graver.Given.v1" {
+        /// When the newest of its setpoints was published; 0 without any.
+        newest: Nanoseconds,
+        /// How many setpoints it took from the planner.
+        setpoints: u32,
+        /// Peers that were lost, bits of [`lost`].
+        lost: u32,
+        /// Inputs that slow devices made active, one bit each in the order of the machine file.
+        slow: u64,
+        /// The request that it carried out or refused; zeros without one.
+        request: OperatorRequest,
+    }
+}
+
 sample! {
     /// The answer to one feedback. Drives latches it and applies it at the next deadline, always.
-    Command = "graver.Command.v6" {
+    Command = "graver.Command.v7" {
         /// The `Feedback::epoch` this answers: a command for another run of drives is not fresh.
         epoch: u64,
         /// The feedback this answers; it takes effect at the deadline of `cycle + 1`.
@@ -80,6 +107,10 @@ sample! {
         laser: LaserCycle,
         /// The latched fault, if any.
         fault: Fault,
+        /// How many answers this controller has given, this one included: from 1, without gaps.
+        number: u64,
+        /// What it was made of.
+        given: Given,
     }
 }
 

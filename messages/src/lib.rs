@@ -35,7 +35,7 @@ pub mod state;
 pub mod time;
 
 pub use axis::{ActuatorArray, AxisArray, MAX_ACTUATORS, MAX_AXES};
-pub use command::{Command, CommandMode};
+pub use command::{Command, CommandMode, Given};
 pub use fault::{Fault, FaultCode, FaultQuantity};
 pub use feedback::Feedback;
 pub use job::{JobOffer, PlannerPhase, PlannerReport};
@@ -46,7 +46,7 @@ pub use progress::Progress;
 pub use refusal::Refusal;
 pub use report::{ControllerReport, DrivesReport, LinkCounters, RealtimeFacts};
 pub use sample::Sample;
-pub use setpoint::Setpoint;
+pub use setpoint::{SentSetpoint, Setpoint};
 pub use slow::{DeviceState, MAX_DEVICES, MAX_INPUTS, SlowDevice, SlowInputs};
 pub use stall::{StallCause, Stalls};
 pub use state::{ControllerState, HoldCause};

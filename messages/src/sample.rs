@@ -191,6 +191,8 @@ mod tests {
             crate::OperatorRequest::LAYOUT,
             crate::OperatorReply::LAYOUT,
             crate::SimulatedInputs::LAYOUT,
+            crate::Given::LAYOUT,
+            crate::SentSetpoint::LAYOUT,
         ];
         layouts.sort_unstable();
         assert!(layouts.windows(2).all(|pair| pair[0] != pair[1]), "{layouts:x?}");

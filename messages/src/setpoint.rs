@@ -30,7 +30,7 @@ sample! {
         stream: u64,
         /// Position in the stream, from 0 without gaps.
         sequence: u64,
-        /// When the planner published it.
+        /// When the planner published it: later than the one before.
         published: Nanoseconds,
         /// Bits of [`flags`].
         flags: u64,
@@ -78,5 +78,14 @@ impl Setpoint {
     /// Whether all the flags in `bits` are set.
     pub fn has(&self, bits: u64) -> bool {
         self.flags & bits == bits
+    }
+}
+
+sample! {
+    /// A setpoint that was sent, told once more for whoever records: on the channel of the setpoints themselves nobody
+    /// but the controller may listen.
+    SentSetpoint = "graver.SentSetpoint.v1" {
+        /// The setpoint.
+        setpoint: Setpoint,
     }
 }

@@ -5,6 +5,7 @@
 //! warning in it too.
 
 pub mod artwork;
+mod room;
 pub mod verdict;
 
 pub use crate::recording::info::{RecordingInfo, RecordingState};
@@ -346,8 +347,18 @@ pub fn write(
         summary.report_time += took;
         summary.wall += took;
     }
-    if let Err(error) = folder.write_json(run_folder::SUMMARY, summary) {
-        summary.warnings.push(format!("cannot write {error}"));
+    match room::write(folder, summary) {
+        Ok(false) => {}
+        Ok(true) => {
+            let path = folder.file(run_folder::SAMPLES);
+            let words = "was cut short, so that the summary has room";
+            summary.warnings.push(format!("{}: the disk is full: its end {words}", path.display()));
+            // A little longer than before, and in the room that was made.
+            if let Err(error) = folder.write_json(run_folder::SUMMARY, summary) {
+                summary.warnings.push(format!("cannot write {error}"));
+            }
+        }
+        Err(error) => summary.warnings.push(format!("cannot write {error}")),
     }
 }
 

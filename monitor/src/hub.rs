@@ -1,10 +1,12 @@
 //! The hub: everything that the services say, received always and handed on to whoever wants it.
 //!
 //! The machine does not wait for a hub: its buffers are deep, and what it was too slow for is
-//! counted. Setpoints are between planner and controller alone.
+//! counted. Setpoints are between planner and controller alone; the planner tells them once more for the one hub that
+//! records.
 
 use messages::{
     Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress,
+    SentSetpoint, Setpoint,
 };
 use runtime::channel::{Channel, ChannelError};
 use runtime::{Domain, Samples, ServiceError, Subscriber};
@@ -17,6 +19,8 @@ pub struct Batch {
     pub feedbacks: Vec<Feedback>,
     /// From the controller, one a cycle.
     pub commands: Vec<Command>,
+    /// From the planner, for the hub that records: those that the commands are made of, and what follows them.
+    pub setpoints: Vec<Setpoint>,
     /// From the controller, every few cycles.
     pub progress: Vec<Progress>,
     /// From the controller, every second and at the end of a stream.
@@ -81,6 +85,8 @@ pub struct Hub {
     drives_reports: Subscriber<DrivesReport>,
     planner_reports: Subscriber<PlannerReport>,
     offers: Subscriber<JobOffer>,
+    /// `None` for a hub that does not record.
+    setpoints: Option<Subscriber<SentSetpoint>>,
     batch: Batch,
     lost: Lost,
     /// When feedback and commands came last.
@@ -88,6 +94,14 @@ pub struct Hub {
 }
 
 impl Hub {
+    /// The same, with the setpoints that were sent: for the process that records.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn recording(domain: &Domain) -> Result<Self, ChannelError> {
+        Ok(Self { setpoints: Some(domain.subscriber(Samples::All)?), ..Self::open(domain)? })
+    }
+
     /// Listens to everything in `domain`, of which the process may be any member.
     ///
     /// # Errors
@@ -101,6 +115,7 @@ impl Hub {
             drives_reports: domain.subscriber(Samples::Latest)?,
             planner_reports: domain.subscriber(Samples::Latest)?,
             offers: domain.subscriber(Samples::Latest)?,
+            setpoints: None,
             batch: Batch::default(),
             lost: Lost::default(),
             heard: [Instant::now(); 2],
@@ -122,6 +137,13 @@ impl Hub {
         receive(&mut self.offers, &mut batch.offers)?;
         receive(&mut self.feedbacks, &mut batch.feedbacks)?;
         receive(&mut self.commands, &mut batch.commands)?;
+        if let Some(setpoints) = &mut self.setpoints {
+            // After the commands: a setpoint is told before the controller can take it.
+            batch.setpoints.clear();
+            while let Some(sent) = setpoints.receive()? {
+                batch.setpoints.push(sent.setpoint);
+            }
+        }
         let [feedback_heard, command_heard] = &mut self.heard;
         if !batch.feedbacks.is_empty() {
             *feedback_heard = Instant::now();

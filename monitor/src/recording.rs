@@ -9,9 +9,11 @@ mod cycle;
 pub mod events;
 pub mod file;
 pub mod info;
+pub mod lead;
 pub mod level;
 pub mod message;
 pub mod old_file;
+pub mod supply;
 pub mod table;
 pub mod wire;
 
@@ -69,6 +71,12 @@ impl Recorder {
     pub fn resume(last: &CycleRecord, continuity: Continuity, lost_commands: u64) -> Self {
         let newest = Some(Stamp::of(&last.feedback));
         Self { newest, started: true, continuity, lost_commands, ..Self::default() }
+    }
+
+    /// A recorder that has what waits in this one, and has counted nothing.
+    pub fn begun_anew(&self) -> Self {
+        let (feedbacks, commands) = (self.feedbacks.clone(), self.commands.clone());
+        Self { feedbacks, commands, started: self.started, ..Self::default() }
     }
 
     /// Takes a feedback; feedback comes in order, possibly with gaps. One that was recorded before

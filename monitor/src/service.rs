@@ -98,7 +98,7 @@ impl Service {
             spare: spare(domain.instance()),
         };
         Ok(Self {
-            hub: Hub::open(domain)?,
+            hub: Hub::recording(domain)?,
             peers: Peers::watch(domain, &[Role::Domain, Role::Controller, Role::Drives])?,
             recorder: JobRecorder::new(setup),
             level: options.level,

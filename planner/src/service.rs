@@ -16,7 +16,8 @@ use crate::request::Refusal;
 use crossbeam::channel::TryRecvError;
 use machine::Machine;
 use messages::{
-    ControllerState, JobOffer, PlannerPhase, PlannerReport, Progress, Setpoint, run_folder,
+    ControllerState, JobOffer, Nanoseconds, PlannerPhase, PlannerReport, Progress, SentSetpoint,
+    Setpoint, run_folder,
 };
 use planning_thread::{Known, Planned, PlanningThread};
 use runtime::peer::{PeerState, Peers};
@@ -76,6 +77,10 @@ struct Service {
     progress: Subscriber<Progress>,
     newest_progress: Progress,
     setpoints: Publisher<Setpoint>,
+    /// The same once more, for whoever records.
+    sent: Publisher<SentSetpoint>,
+    /// When the newest was sent.
+    newest_sent: Nanoseconds,
     reports: Publisher<PlannerReport>,
     report: PlannerReport,
     reported: Instant,
@@ -92,6 +97,8 @@ impl Service {
             progress: domain.subscriber(Samples::Latest)?,
             newest_progress: Progress::default(),
             setpoints: domain.publisher()?,
+            sent: domain.publisher()?,
+            newest_sent: Nanoseconds(0),
             reports: domain.publisher()?,
             report: PlannerReport::default(),
             reported: Instant::now(),
@@ -234,7 +241,11 @@ impl Service {
         while credit > 0 {
             let next = waiting.take().map(|setpoint| *setpoint).or_else(|| window.next());
             let Some(mut setpoint) = next else { break };
-            setpoint.published = clock::now();
+            // By its time each is told from the one before.
+            setpoint.published = clock::now().max(self.newest_sent + Nanoseconds(1));
+            self.newest_sent = setpoint.published;
+            // First: whoever records has it before it can act. One that is sent again has a newer time then.
+            self.sent.publish(&SentSetpoint { setpoint })?;
             if !self.setpoints.publish(&setpoint)? {
                 *waiting = Some(Box::new(setpoint));
                 return Ok(());

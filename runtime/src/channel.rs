@@ -17,7 +17,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use messages::{
     Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress, Sample,
-    Setpoint, SimulatedInputs, SlowInputs,
+    SentSetpoint, Setpoint, SimulatedInputs, SlowInputs,
 };
 
 use crate::domain::{Domain, DomainGuard};
@@ -94,6 +94,14 @@ impl Channel for Setpoint {
     const QOS: Qos = Qos::Reliable { depth: SETPOINTS_UNDER_WAY };
     // A second reader that stands still would hold the planner up.
     const READERS: usize = 1;
+}
+
+impl Channel for SentSetpoint {
+    const SERVICE: &'static str = "sent-setpoints";
+    const QOS: Qos = Qos::KeepLast { depth: SETPOINTS_UNDER_WAY };
+    // The monitor, and its successor.
+    const READERS: usize = 2;
+    const KEPT: usize = KEPT_FOR_A_SUCCESSOR;
 }
 
 impl Channel for Progress {

@@ -18,7 +18,7 @@ use iceoryx2::prelude::{
 };
 use messages::{
     Command as MotorCommand, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport,
-    Progress, Setpoint, SimulatedInputs, SlowInputs,
+    Progress, SentSetpoint, Setpoint, SimulatedInputs, SlowInputs,
 };
 
 use crate::channel::{self, Channel, ChannelError, Publisher, Samples, Subscriber};
@@ -334,6 +334,7 @@ fn create_services(
         channel::create::<Feedback>(node)?,
         channel::create::<MotorCommand>(node)?,
         channel::create::<Setpoint>(node)?,
+        channel::create::<SentSetpoint>(node)?,
         channel::create::<Progress>(node)?,
         channel::create::<ControllerReport>(node)?,
         channel::create::<DrivesReport>(node)?,

@@ -63,7 +63,7 @@ pub(super) const REPLAY_EXAMPLES: &str = "\
 Examples:
   graver simulate jobs/letters.toml --out runs/a
   graver replay runs/a                              controller and drives, bit for bit as recorded
-  graver replay runs/a/samples.mcap --json
+  graver replay runs/b --json                       of a run in real time: its controller
 
 Exit code 1 when an output differs: the first difference is told by its cycle, field and values.";
 

@@ -133,7 +133,7 @@ pub enum ExportFormat {
 /// Arguments of `replay`.
 #[derive(Debug, Clone, Args)]
 pub struct ReplayArguments {
-    /// Run folder of `graver simulate`, or its `samples.mcap`.
+    /// Run folder, or its `samples.mcap`.
     #[arg(value_name = "RECORDING")]
     pub recording: PathBuf,
     /// Print one JSON object on stdout.

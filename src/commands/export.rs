@@ -6,11 +6,10 @@ use crate::files::Sources;
 use messages::{MAX_ACTUATORS, run_folder};
 use monitor::recording::CycleRecord;
 use monitor::recording::file::parts::{self, PartsReader};
-use monitor::recording::file::reader::{Entry, EntryReader};
+use monitor::recording::file::reader::Entry;
 use monitor::recording::file::writer::RecordingWriter;
 use monitor::recording::file::{Description, RecordingError};
 use monitor::recording::level::Level;
-use monitor::recording::message::Origin;
 use monitor::recording::old_file::OldReader;
 use monitor::recording::table::TableWriter;
 use monitor::summary::Summary;
@@ -19,14 +18,14 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-type Records = Box<dyn Iterator<Item = Result<CycleRecord, RecordingError>>>;
+type Entries = Box<dyn Iterator<Item = Result<Entry, RecordingError>>>;
 
 /// A recording of this version or an earlier one.
 struct Recording {
     /// Its file, the first one where it has several.
     path: PathBuf,
     description: Description,
-    records: Records,
+    entries: Entries,
 }
 
 /// Writes the recording to a file, or to standard output.
@@ -45,12 +44,12 @@ pub fn run(arguments: &ExportArguments) -> Result<Exit, Failure> {
             let written = |error| Failure::output(format!("{}: {error}", path.display()));
             let mut writer = RecordingWriter::create(path, &recording.description, Level::Full)
                 .map_err(written)?;
-            if recording.description.simulated {
-                copy_simulation(&recording.path, |entry| {
-                    rewrite(&mut writer, entry).map_err(written)
-                })?;
-            } else {
-                copy(recording, |record| writer.write(&[*record]).map_err(written))?;
+            for entry in recording.entries {
+                match entry {
+                    Ok(entry) => rewrite(&mut writer, entry).map_err(written)?,
+                    Err(error @ RecordingError::Truncated { .. }) => warn(&recording.path, &error),
+                    Err(error) => return Err(at(&recording.path, error)),
+                }
             }
             writer.finish().map_err(written)?;
             Ok(Exit::Done)
@@ -79,19 +78,21 @@ fn open(place: &Path) -> Result<Recording, Failure> {
         let path = place.join(run_folder::SAMPLES);
         let reader = PartsReader::open(place).map_err(|error| at(&path, error))?;
         let description = reader.description().clone();
-        return Ok(Recording { path, description, records: Box::new(reader) });
+        return Ok(Recording { path, description, entries: Box::new(reader.entries()) });
     }
     let path = if place.is_dir() { old } else { place.to_owned() };
     match PartsReader::of_file(&path) {
         Ok(reader) => {
             let description = reader.description().clone();
-            Ok(Recording { path, description, records: Box::new(reader) })
+            Ok(Recording { path, description, entries: Box::new(reader.entries()) })
         }
         Err(RecordingError::NotARecording) => {
             let file = File::open(&path).map_err(|error| at(&path, error))?;
             let reader = OldReader::new(BufReader::new(file)).map_err(|error| at(&path, error))?;
             let description = Description::of(reader.period());
-            Ok(Recording { path, description, records: Box::new(reader) })
+            let entry = |record| Entry::Cycle(Box::new(record), Vec::new());
+            let entries = Box::new(reader.map(move |record| record.map(entry)));
+            Ok(Recording { path, description, entries })
         }
         Err(error) => Err(at(&path, error)),
     }
@@ -127,35 +128,17 @@ fn table(
     }
 }
 
-/// Writes what stands in the recording of a simulation, so that it can be played again. What happens in it the writer
-/// finds anew.
+/// Writes what stands in a recording, so that it can be played again. What happens in it the writer finds anew.
 fn rewrite(writer: &mut RecordingWriter, entry: Entry) -> io::Result<()> {
-    let origin = |deadline| Origin { deadline, ..Origin::default() };
     match entry {
-        Entry::Cycle(record) => writer.write(&[*record]),
-        Entry::Setpoint(deadline, setpoint) => {
-            writer.write_inputs(&origin(deadline), &[*setpoint], None)
-        }
-        Entry::Request(deadline, request) => {
-            writer.write_inputs(&origin(deadline), &[], Some(&request))
+        Entry::Cycle(record, setpoints) => writer.write_cycle(&record, &setpoints),
+        Entry::Lead(record, setpoints) => {
+            let mut message = Vec::new();
+            record.put(&setpoints, &mut message);
+            writer.write_lead(record.origin().deadline, &message)
         }
         Entry::Event(_) => Ok(()),
     }
-}
-
-/// Hands on what the controller got too: a simulation has one file.
-fn copy_simulation(
-    path: &Path,
-    mut write: impl FnMut(Entry) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    for entry in EntryReader::open(path).map_err(|error| at(path, error))? {
-        match entry {
-            Ok(entry) => write(entry)?,
-            Err(error @ RecordingError::Truncated { .. }) => warn(path, &error),
-            Err(error) => return Err(at(path, error)),
-        }
-    }
-    Ok(())
 }
 
 /// All records before the torn one are whole.
@@ -168,10 +151,11 @@ fn copy(
     recording: Recording,
     mut write: impl FnMut(&CycleRecord) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let Recording { path, records, .. } = recording;
-    for record in records {
-        match record {
-            Ok(record) => write(&record)?,
+    let Recording { path, entries, .. } = recording;
+    for entry in entries {
+        match entry {
+            Ok(Entry::Cycle(record, _)) => write(&record)?,
+            Ok(_) => {}
             Err(error @ RecordingError::Truncated { .. }) => warn(&path, &error),
             Err(error) => return Err(at(&path, error)),
         }

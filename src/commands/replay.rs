@@ -1,4 +1,4 @@
-//! `graver replay`: a recording of a simulation played again, stage by stage, bit for bit.
+//! `graver replay`: a recording played again, stage by stage, bit for bit.
 
 use crate::arguments::ReplayArguments;
 use crate::exit::{Exit, Failure};
@@ -6,11 +6,14 @@ use crate::inputs::MachineSource;
 use crate::output::{self, say};
 use drives::PlantOptions;
 use messages::run_folder;
-use monitor::recording::file::reader::EntryReader;
+use monitor::recording::file::RecordingError;
+use monitor::recording::file::parts::PartsReader;
+use monitor::recording::file::reader::Entry;
+use runtime::message;
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::path::PathBuf;
-use workbench::replay::{Replayed, StageDifference, replay};
+use std::path::{Path, PathBuf};
+use workbench::replay::{Replayed, Simulated, StageDifference, replay};
 
 /// What `replay --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -57,24 +60,22 @@ impl From<StageDifference> for FirstDifference {
 /// # Errors
 /// A recording that cannot be read, or played.
 pub fn run(arguments: &ReplayArguments) -> Result<Exit, Failure> {
-    let path = match &arguments.recording {
-        folder if folder.is_dir() => folder.join(run_folder::SAMPLES),
-        file => file.clone(),
+    let place = &arguments.recording;
+    let (path, reader) = if place.is_dir() {
+        (place.join(run_folder::SAMPLES), PartsReader::open(place))
+    } else {
+        (place.clone(), PartsReader::of_file(place))
     };
     let at =
         |error: &dyn std::fmt::Display| Failure::bad_input(format!("{}: {error}", path.display()));
-    let reader = EntryReader::open(&path).map_err(|error| at(&error))?;
+    let reader = reader.map_err(|error| at(&error))?;
     let description = reader.description().clone();
-    if !description.simulated {
-        return Err(at(
-            &"a recording in real time: what the controller got when is not in it; only one of \
-              `graver simulate` can be played",
-        ));
-    }
     let source: MachineSource = serde_json::from_str(&description.machine)
         .map_err(|error| at(&format!("the machine in it: {error}")))?;
+    let (machine, plant) = (source.machine()?, source.plant()?);
     let options = PlantOptions { seed: description.seed, ..PlantOptions::default() };
-    let replayed = replay(&source.machine()?, &source.plant()?, options, reader);
+    let simulated = description.simulated.then_some(Simulated { plant: &plant, options });
+    let replayed = replay(&machine, simulated, whole(&path, reader.entries()));
     let Replayed { cycles, difference } = replayed.map_err(|error| at(&error))?;
     if cycles == 0 {
         return Err(at(&"no cycle is in it: recorded with --record events?"));
@@ -82,19 +83,34 @@ pub fn run(arguments: &ReplayArguments) -> Result<Exit, Failure> {
     let equal = difference.is_none();
     let report =
         ReplayReport { recording: path, equal, cycles, difference: difference.map(Into::into) };
-    tell(&report, arguments.json)?;
+    tell(&report, description.simulated, arguments.json)?;
     Ok(if equal { Exit::Done } else { Exit::Stopped })
 }
 
-fn tell(report: &ReplayReport, json: bool) -> Result<(), Failure> {
+/// All that is whole: before a torn end everything is.
+fn whole(
+    path: &Path,
+    entries: impl Iterator<Item = Result<Entry, RecordingError>>,
+) -> impl Iterator<Item = Result<Entry, RecordingError>> {
+    entries.map_while(|entry| match entry {
+        Err(error @ RecordingError::Truncated { .. }) => {
+            message::tell(&format!("warning: {}: {error}", path.display()));
+            None
+        }
+        entry => Some(entry),
+    })
+}
+
+fn tell(report: &ReplayReport, simulated: bool, json: bool) -> Result<(), Failure> {
     if json {
         return output::json(report);
     }
     match &report.difference {
-        None => say!(
-            "{} cycles: controller and drives give what was recorded, bit for bit",
-            report.cycles
-        ),
+        None => {
+            let stages =
+                if simulated { "controller and drives give" } else { "the controller gives" };
+            say!("{} cycles: {stages} what was recorded, bit for bit", report.cycles);
+        }
         Some(it) => say!(
             "cycle {}: {} of {} is {}, recorded was {}",
             it.cycle,

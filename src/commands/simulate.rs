@@ -11,7 +11,6 @@ use monitor::marks::StreamEnd;
 use monitor::recording::file::Description;
 use monitor::recording::file::writer::RecordingWriter;
 use monitor::recording::level::Level;
-use monitor::recording::message::Origin;
 use monitor::run_analysis::{Clock, RunAnalysis};
 use monitor::run_folder::RunFolder;
 use std::io;
@@ -138,14 +137,5 @@ impl Recording {
 }
 
 fn write(writer: &mut RecordingWriter, stretch: &Stretch<'_>) -> io::Result<()> {
-    let Stretch { records, setpoints, requests, .. } = stretch;
-    for (deadline, setpoint) in *setpoints {
-        let origin = Origin { deadline: deadline.0, ..Origin::default() };
-        writer.write_inputs(&origin, &[*setpoint], None)?;
-    }
-    for (deadline, request) in *requests {
-        let origin = Origin { deadline: deadline.0, ..Origin::default() };
-        writer.write_inputs(&origin, &[], Some(request))?;
-    }
-    writer.write(records)
+    stretch.cycles().try_for_each(|(record, setpoints)| writer.write_cycle(record, &setpoints))
 }

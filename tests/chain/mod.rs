@@ -90,7 +90,7 @@ impl<'a> Chain<'a> {
         let room = if plays { self.controller.room().min(DRAIN) } else { 0 };
         let setpoints: Vec<Setpoint> = self.setpoints.by_ref().take(room).collect();
         let (received, setpoints) = (self.deadline, setpoints.as_slice());
-        let inputs = Inputs { feedback, received, setpoints, request, peers };
+        let inputs = Inputs { feedback, received, setpoints, request, peers, slow: 0 };
         self.controller.step(self.deadline, &inputs, &mut self.outputs);
         self.bridge.latch(&self.outputs.command, self.deadline);
         self.bridge.finish(self.deadline);

@@ -1,18 +1,19 @@
 //! A recording played again: the stages get what they got, and must give what they gave, bit for bit.
 //!
-//! The controller is fed with the recorded feedback, setpoints and requests, the simulated drives with
-//! the recorded commands. Neither hears the other, so a difference is where it arose.
+//! The controller is fed with the recorded feedback, setpoints and requests. Of a simulation the simulated drives are fed
+//! with the recorded commands too. Neither hears the other, so a difference is where it arose. In real time, drives depend on
+//! more than commands, and are not played.
 
 use controller::{Controller, Inputs, Outputs, Peers};
 use drives::bridge::BridgeOptions;
 use drives::{Bridge, Deadlines, PlantOptions, SimulatedPlant};
 use machine::Machine;
-use messages::{Command, Feedback, OperatorRequest, Setpoint};
+use messages::{Command, Feedback, Given, OperatorRequest, Setpoint};
 use monitor::recording::CycleRecord;
+use monitor::recording::continuity::{Stamp, Succession};
 use monitor::recording::file::RecordingError;
 use monitor::recording::file::reader::Entry;
 use monitor::recording::message::difference::{Difference, difference};
-use std::collections::VecDeque;
 
 /// What a replay found.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,13 +44,17 @@ pub enum ReplayError {
     /// The machine cannot be simulated.
     #[error(transparent)]
     Plant(#[from] drives::plant::PlantError),
-    /// The stages cannot be brought to where it begins.
+    /// The controller cannot be brought to where it begins.
     #[error(
-        "it begins with cycle {first}, when the stages have run already: only a whole recording can be played"
+        "it begins with cycle {cycle}, when the controller had given {answers} answers: only a recording that begins \
+         with its controller can be played, which is that of `graver simulate`, of `graver run`, and of the first job \
+         of a `graver domain`, at --record full"
     )]
     NotFromTheStart {
-        /// Its first cycle.
-        first: u64,
+        /// Its first cycle with an answer.
+        cycle: u64,
+        /// Answers before it.
+        answers: u64,
     },
     /// Cycles are missing in it.
     #[error("cycle {cycle} follows cycle {before}: what lies between was not recorded")]
@@ -59,101 +64,150 @@ pub enum ReplayError {
         /// The first one after it.
         cycle: u64,
     },
+    /// Setpoints are missing in it.
+    #[error(
+        "in cycle {cycle} the controller took {taken} setpoints, of which {recorded} were recorded"
+    )]
+    Setpoints {
+        /// The cycle.
+        cycle: u64,
+        /// How many there were.
+        taken: u32,
+        /// How many of them are in the recording.
+        recorded: usize,
+    },
 }
 
-/// The stages, and what waits to be given to them.
-struct Stages {
+/// The controller, and the answer before.
+struct Answering {
     controller: Controller,
-    bridge: Bridge,
     outputs: Outputs,
-    setpoints: VecDeque<(i64, Setpoint)>,
-    requests: VecDeque<(i64, OperatorRequest)>,
-    given: Vec<Setpoint>,
+    /// How many answers it has given, and the cycle of the newest.
+    newest: (u64, u64),
 }
 
-impl Stages {
+impl Answering {
+    /// Answers a cycle that was answered; what differs.
+    fn play(
+        &mut self,
+        machine: &Machine,
+        record: &CycleRecord,
+        setpoints: &[Setpoint],
+    ) -> Result<Option<StageDifference>, ReplayError> {
+        let CycleRecord { feedback, command } = record;
+        let cycle = feedback.cycle.0;
+        let (answers, before) = self.newest;
+        match command.number {
+            1 if answers > 0 => self.controller = Controller::new(machine),
+            number if number == answers + 1 => {}
+            number if answers == 0 => {
+                return Err(ReplayError::NotFromTheStart {
+                    cycle,
+                    answers: number.saturating_sub(1),
+                });
+            }
+            _ => return Err(ReplayError::Gap { before, cycle }),
+        }
+        self.newest = (command.number, cycle);
+        let Given { setpoints: taken, lost, slow, request, .. } = command.given;
+        if taken as usize != setpoints.len() {
+            return Err(ReplayError::Setpoints { cycle, taken, recorded: setpoints.len() });
+        }
+        let inputs = Inputs {
+            feedback,
+            received: command.received,
+            setpoints,
+            request: (request != OperatorRequest::default()).then_some(request),
+            peers: Peers::without(lost),
+            slow,
+        };
+        self.controller.step(command.received, &inputs, &mut self.outputs);
+        // Its service stamps it as it leaves.
+        self.outputs.command.published = command.published;
+        let answered = difference::<Command>(command, &self.outputs.command, &record.origin());
+        Ok(answered.map(|difference| StageDifference { stage: "controller", cycle, difference }))
+    }
+}
+
+/// Simulated drives.
+struct Driving {
+    bridge: Bridge,
+    newest: Option<Stamp>,
+}
+
+impl Driving {
+    /// Of a plant whose clock is that of the machine.
     fn new(machine: &Machine, plant: &Machine, options: PlantOptions) -> Result<Self, ReplayError> {
         let plant = Machine { realtime: machine.realtime, ..plant.clone() };
         let port = SimulatedPlant::new(&plant, options)?;
         let options =
             BridgeOptions { epoch: 1, deadlines: Deadlines::Strict, timing: machine.realtime };
-        Ok(Self {
-            controller: Controller::new(machine),
-            bridge: Bridge::new(port, options).with_brakes(machine.operating.brakes()),
-            outputs: Outputs::default(),
-            setpoints: VecDeque::new(),
-            requests: VecDeque::new(),
-            given: Vec::new(),
-        })
+        let bridge = Bridge::new(port, options).with_brakes(machine.operating.brakes());
+        Ok(Self { bridge, newest: None })
     }
 
-    /// Plays one cycle; the first output that differs.
-    fn play(&mut self, record: &CycleRecord) -> Option<StageDifference> {
+    /// Measures in a cycle and latches its command; what differs.
+    fn play(&mut self, record: &CycleRecord) -> Result<Option<StageDifference>, ReplayError> {
         let CycleRecord { feedback, command } = record;
+        let stamp = Stamp::of(feedback);
+        if let Some(before) = self.newest.replace(stamp)
+            && Succession::between(before, stamp) != Succession::Next
+        {
+            return Err(ReplayError::Gap { before: before.cycle, cycle: stamp.cycle });
+        }
         let now = feedback.deadline;
         self.bridge.begin(now, now);
-        let cycle = feedback.cycle.0;
-        let differs = |stage, difference| StageDifference { stage, cycle, difference };
         let measured = difference::<Feedback>(feedback, self.bridge.feedback(), &record.origin());
-        if let Some(difference) = measured {
-            return Some(differs("drives", difference));
-        }
-        self.given.clear();
-        while let Some((_, setpoint)) = self.setpoints.pop_front_if(|(time, _)| *time <= now.0) {
-            self.given.push(setpoint);
-        }
-        let request = self.requests.pop_front_if(|(time, _)| *time <= now.0);
-        let inputs = Inputs {
-            feedback,
-            received: command.received,
-            setpoints: &self.given,
-            request: request.map(|(_, request)| request),
-            peers: Peers::default(),
-        };
-        self.controller.step(now, &inputs, &mut self.outputs);
         self.bridge.latch(command, now);
         self.bridge.finish(now);
-        let answered = difference::<Command>(command, &self.outputs.command, &record.origin());
-        answered.map(|difference| differs("controller", difference))
+        let cycle = feedback.cycle.0;
+        Ok(measured.map(|difference| StageDifference { stage: "drives", cycle, difference }))
     }
 }
 
-/// Plays a recording of a simulation of `plant` under a controller for `machine` again.
+/// What is recorded with a plant that is simulated in virtual time.
+#[derive(Debug, Clone, Copy)]
+pub struct Simulated<'a> {
+    /// The plant.
+    pub plant: &'a Machine,
+    /// Its options.
+    pub options: PlantOptions,
+}
+
+/// Plays a recording of a controller for `machine` again, and of its simulated drives where it is of a simulation.
 ///
 /// # Errors
 /// [`ReplayError`].
 pub fn replay(
     machine: &Machine,
-    plant: &Machine,
-    options: PlantOptions,
+    simulated: Option<Simulated<'_>>,
     entries: impl Iterator<Item = Result<Entry, RecordingError>>,
 ) -> Result<Replayed, ReplayError> {
-    let mut stages = Stages::new(machine, plant, options)?;
+    let mut answering = Answering {
+        controller: Controller::new(machine),
+        outputs: Outputs::default(),
+        newest: (0, 0),
+    };
+    let mut driving = match simulated {
+        Some(Simulated { plant, options }) => Some(Driving::new(machine, plant, options)?),
+        None => None,
+    };
     let mut replayed = Replayed { cycles: 0, difference: None };
-    let mut before = 0;
     for entry in entries {
-        match entry? {
-            Entry::Event(_) => {}
-            Entry::Setpoint(time, setpoint) => stages.setpoints.push_back((time, *setpoint)),
-            Entry::Request(time, request) => stages.requests.push_back((time, request)),
-            Entry::Cycle(record) => {
-                let cycle = record.feedback.cycle.0;
-                match replayed.cycles {
-                    0 if record.feedback.deadline != machine.realtime.period.time() => {
-                        return Err(ReplayError::NotFromTheStart { first: cycle });
-                    }
-                    1.. if cycle != before + record.feedback.elapsed() => {
-                        return Err(ReplayError::Gap { before, cycle });
-                    }
-                    _ => {}
-                }
-                before = cycle;
-                replayed.cycles += 1;
-                replayed.difference = stages.play(&record);
-                if replayed.difference.is_some() {
-                    break;
-                }
-            }
+        let (Entry::Cycle(record, setpoints) | Entry::Lead(record, setpoints)) = entry? else {
+            continue;
+        };
+        if record.is_answered() {
+            replayed.difference = answering.play(machine, &record, &setpoints)?;
+        }
+        if replayed.difference.is_none()
+            && let Some(driving) = &mut driving
+        {
+            replayed.difference = driving.play(&record)?;
+        }
+        replayed.cycles += 1;
+        if replayed.difference.is_some() {
+            break;
         }
     }
     Ok(replayed)

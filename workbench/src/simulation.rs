@@ -79,8 +79,6 @@ struct Pipeline {
     outputs: Outputs,
     /// Records of the cycles before the job.
     powering: Vec<CycleRecord>,
-    /// What was asked for since this was emptied, by the deadline of the cycle.
-    requests: Vec<(Nanoseconds, OperatorRequest)>,
 }
 
 impl Pipeline {
@@ -101,18 +99,16 @@ impl Pipeline {
             now: Nanoseconds(0),
             outputs: Outputs::default(),
             powering: Vec::new(),
-            requests: Vec::new(),
         })
     }
 
     /// One cycle, in the order of the real one; no time passes in it.
     fn cycle(&mut self, setpoints: &[Setpoint], request: Option<OperatorRequest>) {
         self.now = self.now + self.period;
-        self.requests.extend(request.map(|request| (self.now, request)));
         self.bridge.begin(self.now, self.now);
         let feedback = self.bridge.feedback();
         let peers = Peers::default();
-        let inputs = Inputs { feedback, received: self.now, setpoints, request, peers };
+        let inputs = Inputs { feedback, received: self.now, setpoints, request, peers, slow: 0 };
         self.controller.step(self.now, &inputs, &mut self.outputs);
         self.bridge.latch(&self.outputs.command, self.now);
         self.bridge.finish(self.now);
@@ -132,10 +128,8 @@ impl Pipeline {
     }
 
     fn tell_powering(&mut self, examine: &mut Examine<'_>) {
-        let (records, requests) = (&self.powering[..], &self.requests[..]);
-        examine(&Stretch { is_power_up: true, records, setpoints: &[], requests });
+        examine(&Stretch { is_power_up: true, records: &self.powering, setpoints: &[] });
         self.powering.clear();
-        self.requests.clear();
     }
 
     fn enable(
@@ -174,18 +168,28 @@ fn request(verb: OperatorVerb, value: f64) -> OperatorRequest {
     OperatorRequest { verb: verb as u32, ticket: 1, value, ..OperatorRequest::default() }
 }
 
-/// What a simulation did since the stretch before: records in order, and what the controller got in their cycles, by the
-/// deadline of the cycle.
+/// What a simulation did since the stretch before: records in order, and the setpoints that the controller took in their
+/// cycles.
 #[derive(Debug, Clone, Copy)]
 pub struct Stretch<'a> {
     /// Whether the motors are being powered and homed: nothing of the job is in it.
     pub is_power_up: bool,
     /// The records.
     pub records: &'a [CycleRecord],
-    /// Setpoints.
+    /// Setpoints, by the deadline of their cycle.
     pub setpoints: &'a [(Nanoseconds, Setpoint)],
-    /// Requests of people, or in their stead.
-    pub requests: &'a [(Nanoseconds, OperatorRequest)],
+}
+
+impl<'a> Stretch<'a> {
+    /// Each record with the setpoints that the controller took in its cycle.
+    pub fn cycles(&self) -> impl Iterator<Item = (&'a CycleRecord, Vec<Setpoint>)> {
+        let mut setpoints = self.setpoints.iter().peekable();
+        self.records.iter().map(move |record| {
+            let of_it = |(time, _): &&(Nanoseconds, Setpoint)| *time == record.feedback.deadline;
+            let taken = std::iter::from_fn(|| setpoints.next_if(of_it));
+            (record, taken.map(|(_, setpoint)| *setpoint).collect())
+        })
+    }
 }
 
 /// Plays `plan` on a controller for `machine` and a simulated `plant`; `examine` gets every record
@@ -234,7 +238,6 @@ pub fn simulate_all(
     while remaining > 0 {
         records.clear();
         given.clear();
-        pipeline.requests.clear();
         let began = Instant::now();
         while records.len() < CHUNK && remaining > 0 {
             waiting.clear();
@@ -257,9 +260,7 @@ pub fn simulate_all(
             }
         }
         stepping += began.elapsed();
-        let requests = &pipeline.requests[..];
-        let (records, setpoints) = (&records[..], &given[..]);
-        examine(&Stretch { is_power_up: false, records, setpoints, requests });
+        examine(&Stretch { is_power_up: false, records: &records, setpoints: &given });
     }
     let drives = pipeline.bridge.report(RealtimeFacts::default());
     Ok(Simulated { controller: report, drives, stepping })

@@ -8,7 +8,7 @@ use crate::state::State;
 use crate::supervision::Finding;
 use machine::ActuatorMode;
 use messages::{
-    Command, Fault, FaultCode, FaultQuantity, Feedback, LaserCycle, MAX_AXES, MAX_EDGES,
+    Command, Fault, FaultCode, FaultQuantity, Feedback, Given, LaserCycle, MAX_AXES, MAX_EDGES,
     Nanoseconds, Progress,
 };
 
@@ -37,6 +37,8 @@ impl Controller {
             homing: u64::from(self.asks()),
             laser,
             fault: self.fault,
+            number: self.cycles,
+            given: given(inputs),
             ..Command::default()
         };
         if self.playing != 0 {
@@ -197,6 +199,18 @@ impl Controller {
             lit: u32::from(lit),
             fault: self.fault,
         }
+    }
+}
+
+/// What the command is made of, beside the feedback and the setpoints.
+fn given(inputs: &Inputs<'_>) -> Given {
+    let Inputs { setpoints, request, peers, slow, .. } = inputs;
+    Given {
+        newest: setpoints.last().map_or(Nanoseconds(0), |setpoint| setpoint.published),
+        setpoints: setpoints.len() as u32,
+        lost: peers.lost(),
+        slow: *slow,
+        request: request.unwrap_or_default(),
     }
 }
 

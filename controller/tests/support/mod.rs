@@ -379,6 +379,7 @@ impl Bench {
             setpoints,
             request,
             peers: self.peers,
+            slow: 0,
         };
         let mut outputs = Outputs::default();
         self.controller.step(now, &inputs, &mut outputs);

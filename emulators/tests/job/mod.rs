@@ -105,8 +105,14 @@ fn run(port: Box<dyn Port>, machine: &Machine, mut deadline: Nanoseconds, plan: 
         let room = if cycle > START { controller.room().min(DRAIN) } else { 0 };
         let waiting: Vec<Setpoint> = setpoints.by_ref().take(room).collect();
         let peers = Peers::default();
-        let inputs =
-            Inputs { feedback: &feedback, received: deadline, setpoints: &waiting, request, peers };
+        let inputs = Inputs {
+            feedback: &feedback,
+            received: deadline,
+            setpoints: &waiting,
+            request,
+            peers,
+            slow: 0,
+        };
         controller.step(deadline, &inputs, &mut outputs);
         bridge.latch(&outputs.command, deadline);
         bridge.finish(deadline);

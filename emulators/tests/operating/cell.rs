@@ -96,6 +96,7 @@ impl Cell {
             setpoints: &[],
             request,
             peers: Peers::default(),
+            slow: 0,
         };
         self.before = [self.before[1], self.outputs.command];
         self.controller.step(self.now, &inputs, &mut self.outputs);

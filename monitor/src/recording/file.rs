@@ -20,11 +20,8 @@ pub const CYCLES: &str = "/cycle";
 /// The topic of the events.
 pub const EVENTS: &str = "/event";
 
-/// The topic of the setpoints, as the controller got them: where both are in one process.
-pub const SETPOINTS: &str = "/setpoint";
-
-/// The topic of the requests, as the controller got them: where both are in one process.
-pub const REQUESTS: &str = "/request";
+/// The topic of what the controller did before the job: cycles with which a replay begins, and nothing is judged by.
+pub const LEAD: &str = "/lead";
 
 /// The name of the metadata that describe a run.
 const PROPERTIES: &str = "graver";

@@ -40,6 +40,8 @@ pub enum Shape {
     Text,
     /// Another message.
     Message(&'static str),
+    /// A list of other messages.
+    Messages(&'static str),
 }
 
 /// A field of a message, as a schema tells it.

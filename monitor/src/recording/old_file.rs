@@ -1,12 +1,15 @@
-//! `samples.bin`, as earlier versions recorded: the records as they stand in memory, behind a header that says what they are.
+//! `samples.bin`, as earlier versions recorded: the records as they stood in memory, behind a header that says what they are.
 //! It is only read.
+
+mod samples;
 
 use super::CycleRecord;
 use super::file::RecordingError;
 use messages::time::Period;
-use messages::{Command, Feedback, Nanoseconds, Sample, sample};
+use messages::{Nanoseconds, Sample, sample};
+use samples::{OldCommand, OldFeedback, OldRecord};
 use std::io::{self, Read};
-use zerocopy::{FromBytes, FromZeros, IntoBytes};
+use zerocopy::{FromZeros, IntoBytes};
 
 /// Bytes for a sample's name in the header, unused ones zero.
 const NAME_LENGTH: usize = 32;
@@ -42,12 +45,12 @@ impl Header {
         Self {
             magic: Self::MAGIC,
             layout: Self::LAYOUT,
-            record_size: size_of::<CycleRecord>() as u64,
+            record_size: size_of::<OldRecord>() as u64,
             period: period.time(),
-            feedback_layout: Feedback::LAYOUT,
-            command_layout: Command::LAYOUT,
-            feedback: name_bytes(Feedback::NAME),
-            command: name_bytes(Command::NAME),
+            feedback_layout: OldFeedback::LAYOUT,
+            command_layout: OldCommand::LAYOUT,
+            feedback: name_bytes(OldFeedback::NAME),
+            command: name_bytes(OldCommand::NAME),
         }
     }
 }
@@ -95,10 +98,15 @@ impl<R: Read> OldReader<R> {
             (
                 &name_text(&header.feedback),
                 header.feedback_layout,
-                Feedback::NAME,
-                Feedback::LAYOUT,
+                OldFeedback::NAME,
+                OldFeedback::LAYOUT,
             ),
-            (&name_text(&header.command), header.command_layout, Command::NAME, Command::LAYOUT),
+            (
+                &name_text(&header.command),
+                header.command_layout,
+                OldCommand::NAME,
+                OldCommand::LAYOUT,
+            ),
         ];
         for (recorded, recorded_layout, name, expected_layout) in parts {
             if recorded_layout != expected_layout {
@@ -120,9 +128,11 @@ impl<R: Read> OldReader<R> {
     }
 
     fn read(&mut self) -> Result<Option<CycleRecord>, RecordingError> {
-        let mut bytes = [0_u8; size_of::<CycleRecord>()];
+        let mut record = OldRecord::new_zeroed();
         let mut filled = 0;
-        while let Some(rest) = bytes.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+        while let Some(rest) =
+            record.as_mut_bytes().get_mut(filled..).filter(|rest| !rest.is_empty())
+        {
             match self.reader.read(rest) {
                 Ok(0) if filled == 0 => return Ok(None),
                 Ok(0) => return Err(RecordingError::Truncated { record: self.count }),
@@ -132,7 +142,8 @@ impl<R: Read> OldReader<R> {
             }
         }
         self.count += 1;
-        Ok(Some(CycleRecord::read_from_bytes(&bytes).unwrap_or_else(|_| CycleRecord::new_zeroed())))
+        let (feedback, command) = ((&record.feedback).into(), (&record.command).into());
+        Ok(Some(CycleRecord { feedback, command }))
     }
 }
 
@@ -159,10 +170,13 @@ mod tests {
     fn written(count: u64) -> Vec<u8> {
         let mut bytes = Header::of(Period::OF_SETPOINTS).as_bytes().to_vec();
         for cycle in 0..count {
-            let mut record = CycleRecord::new_zeroed();
+            let mut record = OldRecord::new_zeroed();
             record.feedback.cycle = Cycle(cycle);
             record.feedback.tool = [0.25 * cycle as f64, -1e-9, f64::MAX];
             record.command.cycle = Cycle(cycle);
+            record.command.outputs = 5;
+            record.command.stream_time = 1e-3 * cycle as f64;
+            record.command.fault.code = 9;
             bytes.extend(record.as_bytes());
         }
         bytes
@@ -175,9 +189,19 @@ mod tests {
         let records: Vec<_> = OldReader::new(&bytes[..]).unwrap().map(Result::unwrap).collect();
         assert_eq!(records.len(), 10);
         assert_eq!(records[3].feedback.tool, [0.75, -1e-9, f64::MAX]);
+        let command = &records[3].command;
+        assert_eq!((command.cycle, command.outputs, command.homing), (Cycle(3), 5, 0));
+        assert_eq!((command.stream_time, command.fault.code), (3e-3, 9));
         let results: Vec<_> = OldReader::new(&bytes[..bytes.len() - 1]).unwrap().collect();
         assert_eq!(results.len(), 10);
         assert!(matches!(results[9], Err(RecordingError::Truncated { record: 9 })));
+    }
+
+    #[test]
+    fn the_layouts_are_those_in_the_files_that_there_are() {
+        let layouts = [OldFeedback::LAYOUT, OldCommand::LAYOUT];
+        assert_eq!(layouts, [0x6102_41cc_40b1_2de3, 0x8bb3_55d6_a558_7792]);
+        assert_eq!(size_of::<OldRecord>(), 2176);
     }
 
     #[test]
@@ -186,7 +210,7 @@ mod tests {
         assert!(matches!(OldReader::new(&bytes[..5]), Err(RecordingError::NotARecording)));
         bytes[32] ^= 1; // the feedback's layout hash
         let error = OldReader::new(&bytes[..]).unwrap_err();
-        assert!(error.to_string().contains(Feedback::NAME), "{error}");
+        assert!(error.to_string().contains(OldFeedback::NAME), "{error}");
         bytes[0] = b'X';
         assert!(matches!(OldReader::new(&bytes[..]), Err(RecordingError::NotARecording)));
     }

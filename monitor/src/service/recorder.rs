@@ -1,12 +1,12 @@
 //! The sink that records jobs: a recording for each job that is offered, in its run folder.
 
-use super::recording::{self, Recording};
+use super::recording::{self, Came, Recording};
 use super::store::Setup;
 use crate::conclusion::RecordingState;
 use crate::hub::{Batch, Sink};
+use crate::recording::lead::Lead;
 use crate::run_folder::{FileError, RunFolder};
-use crate::stage::Inputs;
-use messages::{Command, ControllerReport, DrivesReport, Feedback, JobOffer, run_folder};
+use messages::{Command, ControllerReport, DrivesReport, Feedback, JobOffer, Setpoint, run_folder};
 use runtime::ServiceError;
 use runtime::channel::DEEP;
 use runtime::message::tell;
@@ -22,6 +22,8 @@ pub(super) struct JobRecorder {
     /// What came before the first job: a monitor that was started again gets the newest cycles
     /// before it hears of the job that they belong to.
     early: Early,
+    /// What no recording has had.
+    lead: Lead,
     pub(super) job: Option<Job>,
     pub(super) recording: Option<Recording>,
 }
@@ -39,15 +41,22 @@ pub(super) struct Job {
 struct Early {
     feedbacks: Vec<Feedback>,
     commands: Vec<Command>,
+    setpoints: Vec<Setpoint>,
 }
 
 impl Early {
+    fn came(&self) -> Came<'_> {
+        let Self { feedbacks, commands, setpoints } = self;
+        Came { feedbacks, commands, setpoints }
+    }
+
     fn take(&mut self, batch: &Batch) {
         if self.feedbacks.len().max(self.commands.len()) > DEEP {
             *self = Self::default();
         }
         self.feedbacks.extend(&batch.feedbacks);
         self.commands.extend(&batch.commands);
+        self.setpoints.extend(&batch.setpoints);
     }
 }
 
@@ -60,6 +69,7 @@ impl JobRecorder {
             drives: None,
             newest_command: Command::default(),
             early: Early::default(),
+            lead: Lead::default(),
             job: None,
             recording: None,
         }
@@ -81,6 +91,7 @@ impl JobRecorder {
 
     pub(super) fn end_recording(&mut self) -> Result<(), ServiceError> {
         let Some(mut recording) = self.recording.take() else { return Ok(()) };
+        self.lead = Lead::default();
         match recording.finish() {
             Ok(()) => Ok(()),
             Err(error) => refuse(&recording.folder, recording.stream, &error),
@@ -89,6 +100,7 @@ impl JobRecorder {
 
     pub(super) fn drop_recording(&mut self, error: &FileError) -> Result<(), ServiceError> {
         let Some(recording) = self.recording.take() else { return Ok(()) };
+        self.lead = Lead::default();
         refuse(&recording.folder, recording.stream, error)
     }
 
@@ -113,7 +125,8 @@ impl JobRecorder {
         let goes_on = RecordingState::of(&folder, stream) == RecordingState::Open;
         let mut overruns_before = self.drives.map_or(0, |report| report.overruns);
         if self.shall_record(stream, &folder) {
-            match Recording::begin(stream, folder.clone(), overruns_before, &self.setup) {
+            let (setup, lead) = (&self.setup, self.lead.hand_over());
+            match Recording::begin(stream, folder.clone(), overruns_before, setup, lead) {
                 Ok(recording) => {
                     overruns_before = recording.overruns_before;
                     self.recording = Some(recording);
@@ -123,12 +136,12 @@ impl JobRecorder {
         }
         let early = std::mem::take(&mut self.early);
         self.job = Some(Job { stream, folder, began: Instant::now(), overruns_before });
-        if goes_on { self.record(&early.feedbacks, &early.commands) } else { Ok(()) }
+        if goes_on { self.record(&early.came()) } else { Ok(()) }
     }
 
-    fn record(&mut self, feedbacks: &[Feedback], commands: &[Command]) -> Result<(), ServiceError> {
+    fn record(&mut self, came: &Came<'_>) -> Result<(), ServiceError> {
         let Some(recording) = &mut self.recording else { return Ok(()) };
-        match recording.take(&Inputs { feedbacks, commands }) {
+        match recording.take(came) {
             Ok(()) => Ok(()),
             Err(error) => self.drop_recording(&error),
         }
@@ -168,7 +181,11 @@ impl Sink for JobRecorder {
         if self.job.is_none() {
             self.early.take(batch);
         }
-        self.record(&batch.feedbacks, &batch.commands)
+        let Batch { feedbacks, commands, setpoints, .. } = batch;
+        if self.recording.is_none() {
+            self.lead.take(feedbacks, commands, setpoints);
+        }
+        self.record(&Came { feedbacks, commands, setpoints })
     }
 
     fn end(&mut self) -> Result<(), ServiceError> {

@@ -7,9 +7,11 @@ use crate::recording::Recorder;
 use crate::recording::continuity::Continuity;
 use crate::recording::file::parts;
 use crate::recording::info::{Progress, RecordingInfo};
+use crate::recording::lead::Beginning;
+use crate::recording::supply::Supply;
 use crate::run_folder::{FileError, RunFolder};
 use crate::stage::{Inputs, MonitorStage, Outputs};
-use messages::{ControllerReport, run_folder};
+use messages::{Command, ControllerReport, Feedback, Setpoint, run_folder};
 use std::fs::File;
 use std::io::BufWriter;
 use std::time::{Duration, Instant};
@@ -17,12 +19,22 @@ use std::time::{Duration, Instant};
 /// Length of an interval in the latency log.
 const INTERVAL: Duration = Duration::from_secs(1);
 
+/// The samples that a recording is made of, each kind in order.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Came<'a> {
+    pub(super) feedbacks: &'a [Feedback],
+    pub(super) commands: &'a [Command],
+    /// Those that the planner sent.
+    pub(super) setpoints: &'a [Setpoint],
+}
+
 /// A recording under way.
 pub(super) struct Recording {
     pub(super) stream: u64,
     pub(super) folder: RunFolder,
     stage: MonitorStage,
     outputs: Outputs,
+    supply: Supply,
     store: Store,
     /// `None` when it could not be written any further.
     log: Option<IntervalLog<BufWriter<File>>>,
@@ -54,12 +66,13 @@ impl Recording {
         folder: RunFolder,
         overruns_before: u64,
         setup: &Setup,
+        lead: Beginning,
     ) -> Result<Self, FileError> {
         let left =
             RecordingInfo::of(&folder, stream).filter(|info| info.progress == Progress::Open);
         match left {
             Some(info) if !parts::of(folder.path()).is_empty() => Self::resume(folder, info, setup),
-            _ => Self::create(stream, folder, overruns_before, setup),
+            _ => Self::create(stream, folder, overruns_before, setup, lead),
         }
     }
 
@@ -68,6 +81,7 @@ impl Recording {
         folder: RunFolder,
         overruns_before: u64,
         setup: &Setup,
+        lead: Beginning,
     ) -> Result<Self, FileError> {
         // The note first: a recording without one is nobody's.
         RecordingInfo {
@@ -77,11 +91,14 @@ impl Recording {
             ..RecordingInfo::default()
         }
         .write(&folder)?;
-        let store = Store::create(stream, &folder, setup)?;
+        let mut store = Store::create(stream, &folder, setup)?;
+        store.begin(&lead.messages)?;
         let latency = folder.file(run_folder::LATENCY);
         let log = IntervalLog::create(&latency).map_err(FileError::at(&latency))?;
-        let stage = MonitorStage::new();
-        Ok(Self::new(stream, folder, stage, store, (log, Duration::ZERO), overruns_before))
+        let stage = MonitorStage::with(lead.recorder);
+        let began = (log, Duration::ZERO);
+        let recording = Self::new(stream, folder, stage, store, began, overruns_before);
+        Ok(Self { supply: lead.supply, ..recording })
     }
 
     fn resume(folder: RunFolder, info: RecordingInfo, setup: &Setup) -> Result<Self, FileError> {
@@ -121,6 +138,7 @@ impl Recording {
             folder,
             stage,
             outputs: Outputs::default(),
+            supply: Supply::default(),
             store,
             log: Some(log),
             log_began,
@@ -140,9 +158,11 @@ impl Recording {
     ///
     /// # Errors
     /// A file that cannot be written, with its path.
-    pub(super) fn take(&mut self, inputs: &Inputs<'_>) -> Result<(), FileError> {
-        self.played |= inputs.commands.iter().any(|command| command.stream == self.stream);
-        self.stage.step(inputs, &mut self.outputs);
+    pub(super) fn take(&mut self, came: &Came<'_>) -> Result<(), FileError> {
+        let Came { feedbacks, commands, setpoints } = *came;
+        self.played |= commands.iter().any(|command| command.stream == self.stream);
+        setpoints.iter().for_each(|setpoint| self.supply.push(setpoint));
+        self.stage.step(&Inputs { feedbacks, commands }, &mut self.outputs);
         self.write()?;
         if self.began.elapsed() >= self.logged + INTERVAL {
             self.log_interval();
@@ -159,7 +179,10 @@ impl Recording {
         if let Some(record) = self.outputs.records.last() {
             self.newest = record.feedback.cycle.0;
         }
-        self.store.write(&self.outputs.records)
+        let supply = &mut self.supply;
+        let given = self.outputs.records.iter().map(|record| supply.take(&record.command.given));
+        let given: Vec<Vec<Setpoint>> = given.collect();
+        self.store.write(&self.outputs.records, &given)
     }
 
     /// Logs the latencies since the last time. Where that fails the recording goes on without.

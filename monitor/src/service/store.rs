@@ -6,7 +6,9 @@
 use crate::recording::CycleRecord;
 use crate::recording::file::parts::{Extent, PartsWriter, Resumed};
 use crate::recording::file::{Description, RecordingError};
+use crate::recording::lead::Messages;
 use crate::run_folder::{FileError, RunFolder};
+use messages::Setpoint;
 use std::io;
 use std::path::PathBuf;
 
@@ -102,18 +104,32 @@ impl Store {
         Self { description, spare: setup.spare.clone(), writer, reason: None, room: u64::MAX }
     }
 
-    /// Appends records, so that nothing of them is lost when this process dies.
+    /// Writes what was before the job. Where that does not succeed, the recording goes on without.
+    ///
+    /// # Errors
+    /// Where there is no place left for the recording.
+    pub(super) fn begin(&mut self, lead: &Messages) -> Result<(), FileError> {
+        let mut messages = lead.iter();
+        let written =
+            messages.try_for_each(|(time, message)| self.writer.write_lead(*time, message));
+        written.and_then(|()| self.writer.flush()).or_else(|source| self.move_out(source))
+    }
+
+    /// Appends records, each with the setpoints that the controller took in it, so that nothing of them is lost when this
+    /// process dies.
     ///
     /// # Errors
     /// Where there is no place left for them.
-    pub(super) fn write(&mut self, records: &[CycleRecord]) -> Result<(), FileError> {
-        let written = self.writer.write(records).and_then(|()| self.writer.flush());
-        let Err(source) = written else {
+    pub(super) fn write(
+        &mut self,
+        records: &[CycleRecord],
+        given: &[Vec<Setpoint>],
+    ) -> Result<(), FileError> {
+        let Err(source) = append(&mut self.writer, records, given) else {
             return if self.writer.size() > self.room { Err(self.full()) } else { Ok(()) };
         };
         self.move_out(source)?;
-        let written = self.writer.write(records).and_then(|()| self.writer.flush());
-        written.map_err(|_| self.full())
+        append(&mut self.writer, records, given).map_err(|_| self.full())
     }
 
     /// Closes it.
@@ -162,6 +178,17 @@ impl Store {
             }
         }
     }
+}
+
+fn append(
+    writer: &mut PartsWriter,
+    records: &[CycleRecord],
+    given: &[Vec<Setpoint>],
+) -> io::Result<()> {
+    for (record, setpoints) in records.iter().zip(given) {
+        writer.write_cycle(record, setpoints)?;
+    }
+    writer.flush()
 }
 
 impl FileError {

@@ -7,8 +7,8 @@ use std::mem::{align_of, size_of};
 
 use iceoryx2::service::header::publish_subscribe::Header;
 use messages::{
-    Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress, Setpoint,
-    SimulatedInputs, SlowInputs,
+    Command, ControllerReport, DrivesReport, Feedback, JobOffer, PlannerReport, Progress,
+    SentSetpoint, Setpoint, SimulatedInputs, SlowInputs,
 };
 
 use super::page;
@@ -44,6 +44,7 @@ pub(crate) fn pipeline() -> u64 {
     let channels = whole::<Feedback>()
         + whole::<Command>()
         + whole::<Setpoint>()
+        + whole::<SentSetpoint>()
         + whole::<Progress>()
         + whole::<ControllerReport>()
         + whole::<DrivesReport>()
@@ -58,7 +59,7 @@ pub(crate) fn pipeline() -> u64 {
 /// What the holder creates: for each service a description and the list of its ports, and the
 /// segment that counts nodes.
 pub(crate) fn holder() -> u64 {
-    const CHANNELS: u64 = 10;
+    const CHANNELS: u64 = 11;
     (2 * (CHANNELS + OTHER_SERVICES) + 1) * page()
 }
 
@@ -143,6 +144,7 @@ mod tests {
         open::<Feedback>(&domain, &mut ports);
         open::<Command>(&domain, &mut ports);
         open::<Setpoint>(&domain, &mut ports);
+        open::<SentSetpoint>(&domain, &mut ports);
         open::<Progress>(&domain, &mut ports);
         open::<ControllerReport>(&domain, &mut ports);
         open::<DrivesReport>(&domain, &mut ports);

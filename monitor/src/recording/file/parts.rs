@@ -3,15 +3,15 @@
 //! A part is closed when it has grown large, and when another process goes on with the recording. Where there is a quota the oldest
 //! part makes room.
 
-use super::reader::RecordingReader;
+use super::reader::{Entry, EntryReader, RecordingReader};
 use super::writer::RecordingWriter;
 use super::{Description, RecordingError};
 use crate::recording::CycleRecord;
 use crate::recording::continuity::Stamp;
 use crate::recording::level::Level;
 use crate::run_folder::RunFolder;
-use messages::run_folder;
 use messages::time::Period;
+use messages::{Setpoint, run_folder};
 use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::io::{self, BufReader};
@@ -63,13 +63,15 @@ fn name(number: u64) -> String {
     }
 }
 
-/// Reads the records of all parts in a row; an iterator that ends at the first error. A record that stands in two
-/// parts is read once.
+/// Reads all parts in a row; as an iterator their records, until the first error. A record that stands in two parts is
+/// read once.
 pub struct PartsReader {
     waiting: VecDeque<PathBuf>,
-    current: RecordingReader<BufReader<File>>,
+    current: EntryReader<BufReader<File>>,
     path: PathBuf,
     newest: Option<Stamp>,
+    /// Whether it reads more than the records.
+    whole: bool,
 }
 
 impl PartsReader {
@@ -90,10 +92,13 @@ impl PartsReader {
         waiting.extend(then.map(of).unwrap_or_default());
         loop {
             let path = waiting.pop_front().unwrap_or_else(|| folder.join(run_folder::SAMPLES));
-            match RecordingReader::open(&path) {
+            match EntryReader::open(&path) {
                 // Not even its beginning could be written.
                 Err(RecordingError::Truncated { .. }) if !waiting.is_empty() => {}
-                current => return Ok(Self { current: current?, waiting, path, newest: None }),
+                current => {
+                    let current = current?.reading(false);
+                    return Ok(Self { current, waiting, path, newest: None, whole: false });
+                }
             }
         }
     }
@@ -103,8 +108,9 @@ impl PartsReader {
     /// # Errors
     /// [`RecordingError`] when it cannot be read.
     pub fn of_file(path: &Path) -> Result<Self, RecordingError> {
-        let current = RecordingReader::open(path)?;
-        Ok(Self { current, waiting: VecDeque::new(), path: path.to_owned(), newest: None })
+        let current = EntryReader::open(path)?.reading(false);
+        let (waiting, path) = (VecDeque::new(), path.to_owned());
+        Ok(Self { current, waiting, path, newest: None, whole: false })
     }
 
     /// What the recording says of itself.
@@ -114,7 +120,7 @@ impl PartsReader {
 
     /// The period of the cycle.
     pub fn period(&self) -> Period {
-        self.current.period()
+        self.description().period
     }
 
     /// The part that is being read.
@@ -123,29 +129,48 @@ impl PartsReader {
     }
 }
 
-impl Iterator for PartsReader {
-    type Item = Result<CycleRecord, RecordingError>;
+impl PartsReader {
+    /// All that stands in it, in order, until the first error.
+    pub fn entries(self) -> impl Iterator<Item = Result<Entry, RecordingError>> {
+        let mut reader = Self { whole: true, current: self.current.reading(true), ..self };
+        std::iter::from_fn(move || reader.entry())
+    }
 
-    fn next(&mut self) -> Option<Self::Item> {
+    fn entry(&mut self) -> Option<Result<Entry, RecordingError>> {
         loop {
             match self.current.next() {
-                Some(Ok(record)) => {
+                Some(Ok(Entry::Cycle(record, setpoints))) => {
                     let stamp = Stamp::of(&record.feedback);
                     if !self.newest.is_some_and(|newest| newest.has_come_to(stamp)) {
                         self.newest = Some(stamp);
-                        return Some(Ok(record));
+                        return Some(Ok(Entry::Cycle(record, setpoints)));
                     }
                 }
                 // A part that its writer did not close ends where the next one begins.
                 None | Some(Err(RecordingError::Truncated { .. })) if !self.waiting.is_empty() => {
                     let path = self.waiting.pop_front()?;
-                    match RecordingReader::open(&path) {
+                    let opened = EntryReader::open(&path).map(|it| it.reading(self.whole));
+                    match opened {
                         Ok(reader) => (self.current, self.path) = (reader, path),
                         Err(RecordingError::Truncated { .. }) if !self.waiting.is_empty() => {}
                         Err(error) => return Some(Err(error)),
                     }
                 }
                 other => return other,
+            }
+        }
+    }
+}
+
+impl Iterator for PartsReader {
+    type Item = Result<CycleRecord, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            match self.entry()? {
+                Ok(Entry::Cycle(record, _)) => return Some(Ok(*record)),
+                Ok(_) => {}
+                Err(error) => return Some(Err(error)),
             }
         }
     }
@@ -231,14 +256,22 @@ impl PartsWriter {
         Ok(Self { folder: folder.clone(), extent, writer, number, closed, part })
     }
 
-    /// Appends records, as many of them as the level keeps.
+    /// Appends a record with the setpoints that the controller took in it, as far as the level keeps them.
     ///
     /// # Errors
     /// Whatever the operating system reports.
-    pub fn write(&mut self, records: &[CycleRecord]) -> io::Result<()> {
+    pub fn write_cycle(&mut self, record: &CycleRecord, setpoints: &[Setpoint]) -> io::Result<()> {
         let Some(writer) = &mut self.writer else { return Ok(()) };
-        writer.write(records)?;
+        writer.write_cycle(record, setpoints)?;
         if writer.size() >= self.part { self.rotate() } else { Ok(()) }
+    }
+
+    /// Appends a cycle of before the job, by its deadline [ns] and its message.
+    ///
+    /// # Errors
+    /// Whatever the operating system reports.
+    pub fn write_lead(&mut self, deadline: i64, message: &[u8]) -> io::Result<()> {
+        self.writer.as_mut().map_or(Ok(()), |writer| writer.write_lead(deadline, message))
     }
 
     /// Bytes of all parts.
@@ -318,6 +351,10 @@ mod tests {
         CycleRecord::unanswered(Feedback { cycle: Cycle(cycle), ..Feedback::default() })
     }
 
+    fn write(writer: &mut PartsWriter, records: &[CycleRecord]) {
+        records.iter().for_each(|record| writer.write_cycle(record, &[]).unwrap());
+    }
+
     fn cycles(folder: &Path) -> Vec<u64> {
         let reader = PartsReader::open(folder).unwrap();
         reader
@@ -353,7 +390,7 @@ mod tests {
         let folder = RunFolder::create_at(below.path()).unwrap();
         let (description, extent) = (Description::of(Period::OF_SETPOINTS), Extent::default());
         let mut writer = PartsWriter::create(&folder, &description, extent).unwrap();
-        writer.write(&[1, 2, 3].map(record)).unwrap();
+        write(&mut writer, &[1, 2, 3].map(record));
         writer.flush().unwrap();
         let path = folder.file(run_folder::SAMPLES);
         let bytes = fs::read(&path).unwrap();
@@ -366,7 +403,7 @@ mod tests {
             let Resumed { mut writer, last, records } = resumed.unwrap();
             assert_eq!(last.map_or(0, |last| last.feedback.cycle.0), whole.len() as u64, "{kept}");
             assert_eq!(records, whole.len() as u64);
-            writer.write(&[record(100)]).unwrap();
+            write(&mut writer, &[record(100)]);
             writer.finish().unwrap();
             if kept > 0 && !whole.is_empty() {
                 let expect: Vec<u64> = whole.into_iter().chain([100]).collect();
@@ -401,7 +438,7 @@ mod tests {
         let description = Description::of(Period::OF_SETPOINTS);
         let extent = Extent { quota: Some(40_000), ..Extent::default() };
         let mut writer = PartsWriter::create(&folder, &description, extent).unwrap();
-        (1..=3000).for_each(|cycle| writer.write(&[record(cycle)]).unwrap());
+        (1..=3000).for_each(|cycle| write(&mut writer, &[record(cycle)]));
         writer.finish().unwrap();
         let cycles = cycles(folder.path());
         assert!(cycles[0] > 1500 && cycles.len() > 200, "{} from {}", cycles.len(), cycles[0]);
@@ -424,7 +461,7 @@ mod tests {
             let extent = Extent { level, quota: None };
             let mut writer = PartsWriter::create(&folder, &description, extent).unwrap();
             let records: Vec<_> = (1..=1000).map(record).collect();
-            writer.write(&records).unwrap();
+            write(&mut writer, &records);
             writer.finish().unwrap();
             let kept =
                 folder.file(run_folder::SAMPLES).exists().then(|| cycles(folder.path()).len());

@@ -1,15 +1,13 @@
 //! Reading a recording, record by record, in bounded memory.
 
-use super::{
-    CYCLES, Description, EVENTS, MACHINE, PROPERTIES, REQUESTS, RecordingError, SETPOINTS,
-};
+use super::{CYCLES, Description, EVENTS, LEAD, MACHINE, PROPERTIES, RecordingError};
 use crate::recording::CycleRecord;
 use crate::recording::events::Event;
-use crate::recording::message::{Message, Origin};
+use crate::recording::wire::Malformed;
 use mcap::records::{Record, op};
 use mcap::{MAGIC, parse_record};
 use messages::time::Period;
-use messages::{Nanoseconds, OperatorRequest, Setpoint};
+use messages::{Nanoseconds, Setpoint};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read};
@@ -21,14 +19,12 @@ const LONGEST: u64 = 64 << 20;
 /// What stands in a recording, in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entry {
-    /// A record.
-    Cycle(Box<CycleRecord>),
+    /// A cycle of before the job, with the setpoints that the controller took in it.
+    Lead(Box<CycleRecord>, Vec<Setpoint>),
+    /// A record, with the same.
+    Cycle(Box<CycleRecord>, Vec<Setpoint>),
     /// Something that happened.
     Event(Event),
-    /// A setpoint that the controller got in the cycle with this deadline [ns].
-    Setpoint(i64, Box<Setpoint>),
-    /// A request that it got in the cycle with this deadline [ns].
-    Request(i64, OperatorRequest),
 }
 
 /// A file between two of its records.
@@ -87,6 +83,8 @@ pub struct EntryReader<R: Read> {
     records: Records<R>,
     description: Description,
     topics: BTreeMap<u16, String>,
+    /// Whether setpoints are read too.
+    whole: bool,
     /// A message that was read with the description.
     pending: bool,
     /// The sequence number of the newest record.
@@ -101,8 +99,12 @@ impl EntryReader<BufReader<File>> {
     /// # Errors
     /// [`RecordingError`] when the file cannot be read, or is no recording.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        Self::new(BufReader::with_capacity(1 << 16, File::open(path)?))
+        Self::new(buffered(path)?)
     }
+}
+
+fn buffered(path: &Path) -> io::Result<BufReader<File>> {
+    Ok(BufReader::with_capacity(1 << 16, File::open(path)?))
 }
 
 impl<R: Read> EntryReader<R> {
@@ -123,6 +125,7 @@ impl<R: Read> EntryReader<R> {
             records: Records { reader, body: Vec::new() },
             description: Description::of(Period::OF_SETPOINTS),
             topics: BTreeMap::new(),
+            whole: true,
             pending: false,
             sequence: None,
             count: 0,
@@ -176,6 +179,11 @@ impl<R: Read> EntryReader<R> {
         Ok(false)
     }
 
+    /// The same for the records alone, or for setpoints and what was before the job too.
+    pub(super) fn reading(self, whole: bool) -> Self {
+        Self { whole, ..self }
+    }
+
     /// What the recording says of itself.
     pub fn description(&self) -> &Description {
         &self.description
@@ -222,19 +230,18 @@ impl<R: Read> EntryReader<R> {
         let record = parse_record(op::MESSAGE, &self.records.body).map_err(damaged)?;
         let Record::Message { header, data } = record else { return Ok(None) };
         let malformed = RecordingError::damaged(self.count);
-        let origin = Origin { deadline: header.log_time.cast_signed(), ..Origin::default() };
         let topic = self.topics.get(&header.channel_id).map(String::as_str);
+        let whole = self.whole;
+        let cycle = || -> Result<(Box<CycleRecord>, Vec<Setpoint>), Malformed> {
+            let record = CycleRecord::take(&data, header.log_time)?;
+            let setpoints = if whole { record.take_setpoints(&data)? } else { Vec::new() };
+            Ok((Box::new(record), setpoints))
+        };
         let entry = match topic {
-            Some(CYCLES) => CycleRecord::take(&data, header.log_time)
-                .map(|record| Entry::Cycle(Box::new(record))),
+            Some(CYCLES) => cycle().map(|(record, setpoints)| Entry::Cycle(record, setpoints)),
             Some(EVENTS) => Event::take(&data).map(Entry::Event),
-            Some(SETPOINTS) => {
-                let entry = |setpoint| Entry::Setpoint(origin.deadline, Box::new(setpoint));
-                Setpoint::read(&data, &origin).map(entry)
-            }
-            Some(REQUESTS) => {
-                let entry = |request| Entry::Request(origin.deadline, request);
-                OperatorRequest::read(&data, &origin).map(entry)
+            Some(LEAD) if whole => {
+                cycle().map(|(record, setpoints)| Entry::Lead(record, setpoints))
             }
             _ => return Ok(None),
         };
@@ -270,7 +277,7 @@ impl RecordingReader<BufReader<File>> {
     /// # Errors
     /// [`RecordingError`] when the file cannot be read, or is no recording.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        Ok(Self { entries: EntryReader::open(path)? })
+        Self::new(buffered(path)?)
     }
 }
 
@@ -280,7 +287,7 @@ impl<R: Read> RecordingReader<R> {
     /// # Errors
     /// [`RecordingError`] when this is no recording.
     pub fn new(reader: R) -> Result<Self, RecordingError> {
-        Ok(Self { entries: EntryReader::new(reader)? })
+        Ok(Self { entries: EntryReader::new(reader)?.reading(false) })
     }
 
     /// What the recording says of itself.
@@ -304,7 +311,7 @@ impl<R: Read> Iterator for RecordingReader<R> {
 
     fn next(&mut self) -> Option<Self::Item> {
         self.entries.find_map(|entry| match entry {
-            Ok(Entry::Cycle(record)) => Some(Ok(*record)),
+            Ok(Entry::Cycle(record, _)) => Some(Ok(*record)),
             Ok(_) => None,
             Err(error) => Some(Err(error)),
         })

@@ -6,8 +6,8 @@ use super::writer::RecordingWriter;
 use super::*;
 use crate::recording::CycleRecord;
 use crate::recording::level::Level;
+use messages::Setpoint;
 use messages::random::SplitMix64;
-use messages::{OperatorRequest, Setpoint};
 use zerocopy::{FromZeros as _, IntoBytes as _};
 
 /// A record of which every bit is random, but that its stamps say what cycle it is.
@@ -58,25 +58,33 @@ fn what_the_controller_got_comes_back_with_its_cycle() {
     let below = tempfile::tempdir().unwrap();
     let path = below.path().join("samples.mcap");
     let mut random = SplitMix64::new(9);
-    let mut setpoint = Setpoint::new_zeroed();
-    setpoint.as_mut_bytes().fill_with(|| random.below(256) as u8);
-    let request = OperatorRequest { verb: 8, value: 1.0, ..OperatorRequest::default() };
-    let record = noise(&mut random);
+    let mut setpoint = || {
+        let mut setpoint = Setpoint::new_zeroed();
+        setpoint.as_mut_bytes().fill_with(|| random.below(256) as u8);
+        setpoint
+    };
+    let setpoints = [setpoint(), setpoint(), setpoint()];
+    let [before, record] = [noise(&mut random), noise(&mut random)];
     let mut writer = RecordingWriter::create(&path, &description(), Level::Full).unwrap();
-    let origin = record.origin();
-    writer.write_inputs(&origin, &[setpoint], Some(&request)).unwrap();
-    writer.write(&[record]).unwrap();
+    let mut message = Vec::new();
+    before.put(&setpoints[2..], &mut message);
+    writer.write_lead(before.origin().deadline, &message).unwrap();
+    writer.write_cycle(&record, &setpoints[..2]).unwrap();
     writer.finish().unwrap();
     let entries = EntryReader::open(&path).unwrap().map(Result::unwrap);
     let entries: Vec<_> = entries.filter(|entry| !matches!(entry, Entry::Event(_))).collect();
-    let [Entry::Setpoint(first, read), Entry::Request(second, asked), Entry::Cycle(cycle)] =
-        &entries[..]
-    else {
+    let [Entry::Lead(lead, third), Entry::Cycle(cycle, taken)] = &entries[..] else {
         panic!("{entries:?}")
     };
-    assert_eq!((*first, *second), (origin.deadline, origin.deadline));
-    assert_eq!((read.as_bytes(), asked), (setpoint.as_bytes(), &request));
+    assert_eq!(lead.as_bytes(), before.as_bytes());
     assert_eq!(cycle.as_bytes(), record.as_bytes());
+    assert_eq!(
+        (third.as_bytes(), taken.as_bytes()),
+        (setpoints[2..].as_bytes(), setpoints[..2].as_bytes())
+    );
+    // Who asks for records gets those of the job.
+    let records: Vec<_> = RecordingReader::open(&path).unwrap().map(Result::unwrap).collect();
+    assert_eq!(records.as_bytes(), [record].as_bytes());
 }
 
 #[test]

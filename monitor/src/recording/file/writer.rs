@@ -1,14 +1,13 @@
 //! Writing a recording.
 
-use super::{CYCLES, Description, EVENTS, MACHINE, PROPERTIES, REQUESTS, SETPOINTS};
+use super::{CYCLES, Description, EVENTS, LEAD, MACHINE, PROPERTIES};
 use crate::recording::CycleRecord;
 use crate::recording::events::EventFinder;
 use crate::recording::level::Level;
 use crate::recording::message::schema::{CYCLE, EVENT, PACKAGE, descriptor_set};
-use crate::recording::message::{Message, Origin};
 use mcap::records::MessageHeader;
 use mcap::{Attachment, McapError, WriteOptions, Writer};
-use messages::{OperatorRequest, Sample, Setpoint};
+use messages::{Sample, Setpoint};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -22,8 +21,7 @@ pub struct RecordingWriter {
     description: Description,
     cycles: u16,
     events: u16,
-    /// Channels of what the controller got, where it is recorded.
-    inputs: Option<(u16, u16)>,
+    lead: u16,
     finder: EventFinder,
     /// Records before and in this part.
     count: u64,
@@ -76,12 +74,7 @@ impl RecordingWriter {
         };
         let cycles = channel(CYCLES, CYCLE).map_err(failed)?;
         let events = channel(EVENTS, EVENT).map_err(failed)?;
-        let inputs = if description.simulated {
-            let setpoints = channel(SETPOINTS, Setpoint::TITLE).map_err(failed)?;
-            Some((setpoints, channel(REQUESTS, OperatorRequest::TITLE).map_err(failed)?))
-        } else {
-            None
-        };
+        let lead = channel(LEAD, CYCLE).map_err(failed)?;
         writer.flush().map_err(failed)?;
         Ok(Self {
             writer,
@@ -89,7 +82,7 @@ impl RecordingWriter {
             description: description.clone(),
             cycles,
             events,
-            inputs,
+            lead,
             finder: EventFinder::default(),
             count,
             size: 0,
@@ -112,48 +105,44 @@ impl RecordingWriter {
         self.size
     }
 
-    /// Appends records, as many of them as the level keeps, and what happens in them.
+    /// Appends records, as many of them as the level keeps, and what happens in them; what the controller got in them is
+    /// not known.
     ///
     /// # Errors
     /// Whatever the operating system reports.
     pub fn write(&mut self, records: &[CycleRecord]) -> io::Result<()> {
-        for record in records {
-            let time = record.origin().deadline.cast_unsigned();
-            if self.level >= Level::Events {
-                for event in self.finder.push(record) {
-                    self.put(self.events, time, |out| event.put(out))?;
-                }
+        records.iter().try_for_each(|record| self.write_cycle(record, &[]))
+    }
+
+    /// Appends a record with the setpoints that the controller took in it, as far as the level keeps them.
+    ///
+    /// # Errors
+    /// Whatever the operating system reports.
+    pub fn write_cycle(&mut self, record: &CycleRecord, setpoints: &[Setpoint]) -> io::Result<()> {
+        let time = record.origin().deadline.cast_unsigned();
+        if self.level >= Level::Events {
+            for event in self.finder.push(record) {
+                self.put(self.events, time, |out| event.put(out))?;
             }
-            if self.level.keeps(record, self.description.period) {
-                self.put(self.cycles, time, |out| record.put(out))?;
-                self.count += 1;
-            }
+        }
+        if self.level.keeps(record, self.description.period) {
+            // Of some of the cycles nobody can play anything.
+            let setpoints = if self.level == Level::Full { setpoints } else { &[] };
+            self.put(self.cycles, time, |out| record.put(setpoints, out))?;
+            self.count += 1;
         }
         Ok(())
     }
 
-    /// Appends what the controller got in the cycle of the next record.
+    /// Appends a cycle of before the job, by its deadline [ns] and its message.
     ///
     /// # Errors
     /// Whatever the operating system reports.
-    pub fn write_inputs(
-        &mut self,
-        origin: &Origin,
-        setpoints: &[Setpoint],
-        request: Option<&OperatorRequest>,
-    ) -> io::Result<()> {
-        let Some((setpoint_channel, request_channel)) = self.inputs else { return Ok(()) };
+    pub fn write_lead(&mut self, deadline: i64, message: &[u8]) -> io::Result<()> {
         if self.level < Level::Full {
             return Ok(());
         }
-        let time = origin.deadline.cast_unsigned();
-        for setpoint in setpoints {
-            self.put(setpoint_channel, time, |out| setpoint.put(origin, out))?;
-        }
-        match request {
-            Some(request) => self.put(request_channel, time, |out| request.put(origin, out)),
-            None => Ok(()),
-        }
+        self.put(self.lead, deadline.cast_unsigned(), |out| out.extend(message))
     }
 
     fn put(

@@ -5,7 +5,7 @@ use super::{
     put_part, shape_of, wire,
 };
 use messages::{
-    Command, Fault, Feedback, GateEdge, LaserCycle, MAX_EDGES, OperatorRequest, Sample as _,
+    Command, Fault, Feedback, GateEdge, Given, LaserCycle, MAX_EDGES, OperatorRequest, Sample as _,
     Setpoint,
 };
 
@@ -62,6 +62,18 @@ message! {
         21 laser message "the laser in the next cycle",
         22 fault message "the latched fault",
         23 homing plain "actuators whose drives shall look for their references by themselves, one bit each",
+        24 number plain "answers of this controller so far, this one included",
+        25 given message "what it was made of, beside feedback and setpoints",
+    }
+}
+
+message! {
+    Given {
+        1 newest stamp "when the newest setpoint was published that was taken [ns after the log time]",
+        2 setpoints plain "how many setpoints were taken",
+        3 lost plain "peers that were lost: 1 planner, 2 drives, 4 supervisor",
+        4 slow plain "inputs that slow devices made active, one bit each",
+        5 request message "the request that was carried out or refused",
     }
 }
 
@@ -82,7 +94,6 @@ message! {
     Setpoint {
         1 stream plain "stream that it belongs to",
         2 sequence plain "position in the stream, from 0",
-        3 published plain "when the planner published it [ns on the clock of the log time]",
         4 flags plain "1 last, 2 pause, 4 lit for a frame",
         5 outputs plain "what the job has switched on, one bit each",
         6 stroke plain "stroke being marked from here on, from 1; 0 for none",
@@ -102,6 +113,7 @@ message! {
         20 momentum plain "motor torque per unit of rate change by actuator [N m s]",
         21 laser message "the laser from here to the next setpoint",
         22 line plain "line of the job file where the motion begins, from 1; 0 where it has none",
+        23 published stamp "when the planner published it [ns after the log time]",
     }
 }
 

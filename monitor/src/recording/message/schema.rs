@@ -3,7 +3,7 @@
 
 use super::{FieldDescription, Message as _, Shape};
 use crate::recording::wire::{put_bytes, put_message, put_number};
-use messages::{Command, Fault, Feedback, LaserCycle, OperatorRequest, Setpoint};
+use messages::{Command, Fault, Feedback, Given, LaserCycle, OperatorRequest, Setpoint};
 
 /// The package of the messages.
 pub const PACKAGE: &str = "graver";
@@ -32,6 +32,12 @@ fn described() -> Vec<(&'static str, Vec<FieldDescription>)> {
             Shape::Message(Command::TITLE),
             "what the controller answered; absent without an answer",
         ),
+        (
+            5,
+            "setpoint",
+            Shape::Messages(Setpoint::TITLE),
+            "setpoints that the controller took for its answer",
+        ),
     ];
     let event = [
         (1, "cycle", Shape::Number, "cycle in which it was told"),
@@ -54,6 +60,7 @@ fn described() -> Vec<(&'static str, Vec<FieldDescription>)> {
         (EVENT, event.map(field).into()),
         (Feedback::TITLE, Feedback::description()),
         (Command::TITLE, Command::description()),
+        (Given::TITLE, Given::description()),
         (LaserCycle::TITLE, LaserCycle::description()),
         (Fault::TITLE, Fault::description()),
         (Setpoint::TITLE, Setpoint::description()),
@@ -97,6 +104,7 @@ fn label_and_type(shape: Shape) -> (u64, u64) {
         Shape::Signeds => (LIST, SINT64),
         Shape::Text => (ONE, STRING),
         Shape::Message(_) => (ONE, MESSAGE),
+        Shape::Messages(_) => (LIST, MESSAGE),
     }
 }
 
@@ -126,7 +134,7 @@ fn put_field(field: &FieldDescription, out: &mut Vec<u8>) {
         put_number(FIELD_NUMBER, u64::from(field.number), out);
         put_number(FIELD_LABEL, label, out);
         put_number(FIELD_TYPE, kind, out);
-        if let Shape::Message(name) = field.shape {
+        if let Shape::Message(name) | Shape::Messages(name) = field.shape {
             put_bytes(FIELD_TYPE_NAME, format!(".{PACKAGE}.{name}").as_bytes(), out);
         }
     });

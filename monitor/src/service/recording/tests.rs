@@ -25,7 +25,7 @@ fn taken(recording: &mut Recording, from: u64, to: u64, stream: u64) -> Result<(
         |cycle: u64| Command { cycle: Cycle(cycle), stream, mode: 4, ..Command::default() };
     let feedbacks: Vec<_> = (from..to).map(feedback).collect();
     let commands: Vec<_> = (from..to).map(command).collect();
-    recording.take(&Inputs { feedbacks: &feedbacks, commands: &commands })
+    recording.take(&Came { feedbacks: &feedbacks, commands: &commands, setpoints: &[] })
 }
 
 fn take(recording: &mut Recording, from: u64, to: u64, stream: u64) {
@@ -57,7 +57,7 @@ fn begun(
     stream: u64,
     overruns_before: u64,
 ) -> Result<Recording, FileError> {
-    Recording::begin(stream, folder, overruns_before, &setup(below))
+    Recording::begin(stream, folder, overruns_before, &setup(below), Beginning::default())
 }
 
 fn cycles(folder: &RunFolder) -> Vec<u64> {
@@ -192,7 +192,8 @@ fn a_full_disk_costs_the_recording_and_no_record() {
     let below = tempfile::tempdir().unwrap();
     let folder = RunFolder::create_at(&below.path().join("run")).unwrap();
     let setup = setup(&below);
-    let mut recording = Recording::begin(STREAM, folder.clone(), 0, &setup).unwrap();
+    let mut recording =
+        Recording::begin(STREAM, folder.clone(), 0, &setup, Beginning::default()).unwrap();
     take(&mut recording, 0, 100, STREAM);
     // It fills up in the middle of the run.
     let source = io::Error::from_raw_os_error(28);
@@ -200,7 +201,8 @@ fn a_full_disk_costs_the_recording_and_no_record() {
     take(&mut recording, 100, 200, STREAM);
     std::mem::forget(recording);
     // A successor finds where it went.
-    let mut second = Recording::begin(STREAM, folder.clone(), 0, &setup).unwrap();
+    let mut second =
+        Recording::begin(STREAM, folder.clone(), 0, &setup, Beginning::default()).unwrap();
     take(&mut second, 190, 300, STREAM);
     second.finish().unwrap();
     let RecordingState::Complete(info) = RecordingState::of(&folder, STREAM) else { panic!() };
