@@ -22,6 +22,7 @@ pub mod outputs;
 pub mod planned;
 pub mod player;
 pub mod ramp;
+pub mod rapids;
 pub mod reference;
 pub mod safety;
 pub mod service;

@@ -18,6 +18,7 @@ use crate::light::Given;
 use crate::lookahead::Lookahead;
 use crate::motion_limits::{Course, MotionLimits};
 use crate::ramp::{Pace, Ramp, Rate, Slew};
+use crate::rapids::Rapids;
 use crate::stream_time::{ONE, StreamTime};
 use machine::Machine;
 use messages::delay::Recent;
@@ -111,6 +112,9 @@ pub struct Player {
     min_power: f64,
     /// The override asked for.
     asked: f64,
+    rapids: Rapids,
+    /// The most that the rate may be here, 1 outside slow rapids.
+    most: f64,
     /// The override of the power.
     power: f64,
     /// The most power of a frame, 0..=1.
@@ -121,8 +125,11 @@ impl Player {
     /// For this machine, before the first setpoint of a stream, at the planned rate.
     pub fn new(machine: &Machine) -> Self {
         let period = machine.realtime.period;
+        let pace = Pace::new(period);
         Self {
-            pace: Pace::new(period),
+            rapids: Rapids::new(&pace, STEADY),
+            most: 1.0,
+            pace,
             patience: period.cycles_for(PATIENCE),
             next: Instant::default(),
             after: Instant::default(),
@@ -152,6 +159,19 @@ impl Player {
         (self.activity, self.marking) = (Activity::Resting, false);
         (self.dark_until, self.unlit_from) = Default::default();
         (self.at_planned_rest, self.paused_until) = (true, 0);
+        self.rapids.forget();
+        self.most = 1.0;
+    }
+
+    /// Plays rapids at `rate` at most from now on. `false` and no change when it is not within 0.1..=1.
+    #[must_use]
+    pub fn ask_rapids(&mut self, rate: f64) -> bool {
+        self.rapids.ask(rate)
+    }
+
+    /// The rate of rapids asked for.
+    pub fn asked_rapids(&self) -> f64 {
+        self.rapids.asked()
     }
 
     /// Plays at `rate` from now on, or as planned where that is more: to plan faster is the planner's.
@@ -193,7 +213,7 @@ impl Player {
 
     /// The rate to play at.
     fn wanted(&self) -> Rate {
-        Rate::nearest(self.asked.min(1.0))
+        Rate::nearest(self.asked.min(self.most))
     }
 
     /// The instant of the feedback.
@@ -308,6 +328,7 @@ impl Player {
             self.after = Instant { time: from, rate: 0.0, rate_change: 0.0 };
             return Event::None;
         }
+        self.most = self.rapids.rate_at(from, lookahead);
         let before = self.ramp;
         let mut event = self.change_rate(lookahead, from);
         // There always is enough in hand to stop: nothing is played beyond it, whatever happens.
@@ -376,6 +397,8 @@ impl Player {
         let mut event = Event::None;
         self.ramp = match self.activity {
             Activity::Playing(slew) => {
+                // Rapids are dark: the rate may change as it does to and from rest.
+                let slew = if self.rapids.asked() < 1.0 { pace.stop } else { slew };
                 let ramp = toward(self.wanted(), slew);
                 if scarce && stops(ramp, HINDRANCE) > end {
                     event = Event::Starved;

@@ -208,7 +208,8 @@ impl Reporter {
         } else if self.until_overrides == 0 {
             self.overrides = Some(doing.overrides);
             self.until_overrides = OVERRIDES_EVERY[is_busy];
-            let _ = write!(text, "|Ov:{},100,{}", doing.overrides.rate, doing.overrides.power);
+            let Overrides { rate, rapid, power } = doing.overrides;
+            let _ = write!(text, "|Ov:{rate},{rapid},{power}");
             let accessories = doing.accessories();
             if !accessories.is_empty() {
                 let _ = write!(text, "|A:{accessories}");

@@ -103,13 +103,15 @@ struct OwnJob {
 pub struct Overrides {
     /// Of the rate.
     pub rate: u8,
+    /// Of rapids.
+    pub rapid: u8,
     /// Of the power.
     pub power: u8,
 }
 
 impl Overrides {
     /// As planned.
-    pub const NONE: Self = Self { rate: 100, power: 100 };
+    pub const NONE: Self = Self { rate: 100, rapid: 100, power: 100 };
 }
 
 /// One machine's grbl.

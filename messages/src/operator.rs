@@ -42,6 +42,9 @@ pub enum OperatorVerb {
     /// Override the power of the laser, `value` 0.1..=2: each power that the stream asks for is so many times as much, and
     /// full power at most, and a frame `safety.frame_power` of the machine file. It ends with the stream.
     Power = 16,
+    /// Override the rate of rapids, `value` 0.1..=1: what is flown between marks, as far as the rate is back where a mark
+    /// begins.
+    Rapid = 17,
 }
 
 impl OperatorVerb {
@@ -64,6 +67,7 @@ impl OperatorVerb {
             14 => Self::JogOn,
             15 => Self::Output,
             16 => Self::Power,
+            17 => Self::Rapid,
             _ => return None,
         })
     }

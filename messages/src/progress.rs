@@ -4,7 +4,7 @@ use crate::{Fault, Nanoseconds, sample};
 
 sample! {
     /// Published every few cycles; the planner's licence to send more.
-    Progress = "graver.Progress.v8" {
+    Progress = "graver.Progress.v9" {
         /// When it was published.
         published: Nanoseconds,
         /// The stream in the look-ahead, 0 for none.
@@ -28,6 +28,8 @@ sample! {
         override_rate: f64,
         /// So many times the power that the stream asks for is given, 0.1..=2; 1 again after each stream.
         power_override: f64,
+        /// The most of the rate that rapids are played at, 0.1..=1.
+        rapid_override: f64,
         /// Tool position the plan has now, machine frame [m].
         tool: [f64; 3],
         /// Speed that the plan gives the tool along its path now, at the rate at which it is played [m/s].

@@ -10,6 +10,8 @@ pub mod flags {
     pub const PAUSE: u64 = 1 << 1;
     /// What is lit shows where a job lies: the machine file's `safety.frame_power` bounds its power.
     pub const FRAME: u64 = 1 << 2;
+    /// On the way from one mark to the next, in the dark and as fast as may be: an override of rapids slows it.
+    pub const RAPID: u64 = 1 << 3;
 }
 
 sample! {

@@ -125,6 +125,8 @@ pub enum Verb {
     Output,
     /// Another power of the laser, until the job ends.
     Power,
+    /// Another rate of rapids.
+    Rapid,
 }
 
 /// The machine's answer to a verb, as `graver hold --json` and its like print it.
@@ -208,6 +210,7 @@ impl From<Verb> for OperatorVerb {
             Verb::JogOn => Self::JogOn,
             Verb::Output => Self::Output,
             Verb::Power => Self::Power,
+            Verb::Rapid => Self::Rapid,
         }
     }
 }

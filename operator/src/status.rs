@@ -53,6 +53,8 @@ pub struct Status {
     pub rate_override: f64,
     /// So many times the power that the job asks for is given, until it ends.
     pub power_override: f64,
+    /// The most of the rate at which the tool flies from mark to mark, 1 as planned.
+    pub rapid_override: f64,
     /// Where the plan has the tool [m].
     pub tool: [f64; 3],
     /// Axes that know their place; all of a machine without homing.

@@ -179,6 +179,7 @@ function startSwitches() {
 export function startHand() {
   on("status", ({ status: now }) => showAxes(now));
   startOverride("override", "override", "rate_override");
+  startOverride("rapid-override", "rapid", "rapid_override");
   startOverride("power-override", "power", "power_override");
   startProbe();
   startPulse();

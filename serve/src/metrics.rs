@@ -54,6 +54,7 @@ pub struct Metrics {
     lit: Gauge,
     rate_override: FloatGauge,
     power_override: FloatGauge,
+    rapid_override: FloatGauge,
     state: Family<StateLabel, Gauge>,
     faults: Family<CodeLabel, Counter>,
     jobs: Family<OutcomeLabel, Counter>,
@@ -127,6 +128,11 @@ impl Metrics {
                 "power_override",
                 "Multiple of the power that the job asks for, until it ends"
             ),
+            rapid_override: registered!(
+                FloatGauge::default(),
+                "rapid_override",
+                "Rate of rapids that is asked for, 1 as planned"
+            ),
             state: registered!(Family::default(), "state", "1 for the state of the controller"),
             faults: registered!(
                 Family::default(),
@@ -184,9 +190,11 @@ impl Metrics {
 
     pub(crate) fn status(&self, before: Option<&Value>, now: &Value) {
         self.up.set(1);
-        for (gauge, key) in
-            [(&self.rate_override, "rate_override"), (&self.power_override, "power_override")]
-        {
+        for (gauge, key) in [
+            (&self.rate_override, "rate_override"),
+            (&self.power_override, "power_override"),
+            (&self.rapid_override, "rapid_override"),
+        ] {
             gauge.set(now[key].as_f64().unwrap_or(1.0));
         }
         let state = now["state"].as_str().unwrap_or("unknown");

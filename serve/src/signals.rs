@@ -196,6 +196,7 @@ impl List {
         self.told("rate", "", |it| it.rate);
         self.told("override_rate", "", |it| it.override_rate);
         self.told("power_override", "", |it| it.power_override);
+        self.told("rapid_override", "", |it| it.rapid_override);
         self.told("homed", "", |it| f64::from(it.homed));
         self.told("probed", "", |it| it.probed);
         self.told("requests", "", |it| f64::from(it.requests));

@@ -203,12 +203,15 @@ pub struct StatusArguments {
 #[derive(Debug, Clone, Args)]
 pub struct OverrideArguments {
     /// Rate: "50 %" or 0.5, from 10 % to 200 %; no limit of the machine is broken for it.
-    #[arg(required_unless_present = "power")]
+    #[arg(required_unless_present_any = ["power", "rapid"])]
     pub rate: Option<String>,
     /// Power: "80 %" or 0.8 of what the job asks for, from 10 % to 200 %, never above full power; 100 % again when
     /// the job ends.
     #[arg(long, value_name = "POWER")]
     pub power: Option<String>,
+    /// Rate of what is flown between marks: "25 %" or 0.25, from 10 % to 100 %.
+    #[arg(long, value_name = "RATE")]
+    pub rapid: Option<String>,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub instance: InstanceArguments,

@@ -22,18 +22,21 @@ pub fn verb(verb: Verb, arguments: &InstanceArguments) -> Result<Exit, Failure> 
     ask(&Request::Verb { verb, value: 0.0 }, arguments)
 }
 
-/// Asks for another rate, another power, or both.
+/// Asks for another rate, another one of rapids, another power, or several of them.
 ///
 /// # Errors
 /// A rate or a power that is none, no pipeline, or one that refuses.
 pub fn overrides(arguments: &OverrideArguments) -> Result<Exit, Failure> {
-    let asked =
-        [("rate", Verb::Override, &arguments.rate), ("power", Verb::Power, &arguments.power)];
-    // Both are read before either is asked for.
+    let asked = [
+        ("rate", Verb::Override, &arguments.rate, 2.0),
+        ("rapid", Verb::Rapid, &arguments.rapid, 1.0),
+        ("power", Verb::Power, &arguments.power, 2.0),
+    ];
+    // All are read before any is asked for.
     let mut requests = Vec::new();
-    for (name, verb, text) in asked {
+    for (name, verb, text, most) in asked {
         let Some(text) = text else { continue };
-        requests.push(Request::Verb { verb, value: read_override(name, text)? });
+        requests.push(Request::Verb { verb, value: read_override(name, text, most)? });
     }
     let Some((last, others)) = requests.split_last() else { return Ok(Exit::Done) };
     for request in others {
@@ -49,14 +52,14 @@ pub fn overrides(arguments: &OverrideArguments) -> Result<Exit, Failure> {
     Ok(exit)
 }
 
-fn read_override(name: &str, text: &str) -> Result<f64, Failure> {
+fn read_override(name: &str, text: &str, most: f64) -> Result<f64, Failure> {
     let value = quantity::read_share(text)
         .map_err(|error| Failure::bad_input(format!("{name} {text:?}: {error}")))?;
-    if (0.1..=2.0).contains(&value) {
+    if (0.1..=most).contains(&value) {
         return Ok(value);
     }
-    let percent = value * 100.0;
-    Err(Failure::bad_input(format!("{name} {text}: {percent:.0} % is outside 10 % to 200 %")))
+    let [percent, most] = [value, most].map(|share| share * 100.0);
+    Err(Failure::bad_input(format!("{name} {text}: {percent:.0} % is outside 10 % to {most:.0} %")))
 }
 
 fn ask(request: &Request, arguments: &InstanceArguments) -> Result<Exit, Failure> {

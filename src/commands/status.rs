@@ -93,9 +93,10 @@ fn show(status: &Status) {
             if status.strokes > 0 { format!(" of {}", status.strokes) } else { String::new() };
         say!("stroke     {}{strokes}{line}", status.stroke);
         say!(
-            "rate       {:.0} %, override {:.0} %",
+            "rate       {:.0} %, override {:.0} %, of rapids {:.0} %",
             status.rate * 100.0,
-            status.rate_override * 100.0
+            status.rate_override * 100.0,
+            status.rapid_override * 100.0
         );
         let light = if status.lit { "lit" } else { "dark" };
         let power = status.power * 100.0;

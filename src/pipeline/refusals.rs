@@ -38,6 +38,9 @@ pub(super) fn words(
         Refusal::TooLarge if matches!(verb, Verb::Override | Verb::Power) => {
             format!("an override is from 10 % to 200 %, not {} %", short(found * 100.0))
         }
+        Refusal::TooLarge if verb == Verb::Rapid => {
+            format!("an override of rapids is from 10 % to 100 %, not {} %", short(found * 100.0))
+        }
         Refusal::TooLarge => format!("{found} is too much: at most {limit}"),
         Refusal::TooSmall => format!("a speed of {} leads nowhere", speed(found)),
         Refusal::NotANumber => "a way or speed of 0, or none, leads nowhere".to_owned(),

@@ -134,6 +134,7 @@ impl StatusBoard {
         status.rate = progress.rate;
         (status.rate_override, status.power_override) =
             (progress.override_rate, progress.power_override);
+        status.rapid_override = progress.rapid_override;
         status.tool = progress.tool;
         let fault = progress.fault;
         // A controller that has died says nothing more: drives has stopped the machine, and says why.

@@ -216,9 +216,16 @@ fn overrides_go_to_the_machine_within_their_range() {
     assert_eq!(bench.machine.asked.last(), Some(&Ask::Verb { verb: Verb::Power, value: 0.79 }));
     bench.ask("?");
     assert!(bench.ask("?")[0].contains("|Ov:101,100,79"));
+    for (byte, value) in [(0x97, 0.25), (0x95, 1.0), (0x96, 0.5)] {
+        bench.send([byte]);
+        assert_eq!(bench.machine.asked.last(), Some(&Ask::Verb { verb: Verb::Rapid, value }));
+    }
+    let reports: Vec<String> = (0..3).flat_map(|_| bench.ask("?")).collect();
+    assert!(reports.iter().any(|report| report.contains("|Ov:101,50,79")), "{reports:?}");
     bench.send("\x18");
-    let last = &bench.machine.asked[bench.machine.asked.len() - 2..];
+    let last = &bench.machine.asked[bench.machine.asked.len() - 3..];
     assert!(last.contains(&Ask::Verb { verb: Verb::Override, value: 1.0 }));
+    assert!(last.contains(&Ask::Verb { verb: Verb::Rapid, value: 1.0 }));
     assert!(last.contains(&Ask::Verb { verb: Verb::Power, value: 1.0 }));
 }
 

@@ -182,6 +182,7 @@ impl Controller {
             rate: command.rate,
             override_rate: self.player.asked_rate(),
             power_override: self.player.power_override(),
+            rapid_override: self.player.asked_rapids(),
             tool: command.tool,
             speed,
             power: power.fold(0.0, f64::max),

@@ -121,6 +121,11 @@ impl Controller {
                     return Err(Refused::from(Refusal::TooLarge).beyond(request.value, 2.0));
                 }
             }
+            (OperatorVerb::Rapid, _) => {
+                if !self.player.ask_rapids(request.value) {
+                    return Err(Refused::from(Refusal::TooLarge).beyond(request.value, 1.0));
+                }
+            }
             (
                 OperatorVerb::Start,
                 State::Disabled | State::Enabling { .. } | State::Squaring { .. } | State::Idle,

@@ -68,7 +68,12 @@ fn replaces(ask: &Ask, last: &Ask) -> bool {
             verb == before
                 && matches!(
                     verb,
-                    Verb::Stop | Verb::Hold | Verb::Resume | Verb::Override | Verb::Power
+                    Verb::Stop
+                        | Verb::Hold
+                        | Verb::Resume
+                        | Verb::Override
+                        | Verb::Rapid
+                        | Verb::Power
                 )
         }
         _ => false,

@@ -29,8 +29,8 @@ pub enum Realtime {
     JogCancel,
     /// 0x90 to 0x94: back to 100 %, or more or less by so many percent.
     Rate(Option<i8>),
-    /// 0x95 to 0x97.
-    Rapid,
+    /// 0x95 to 0x97: rapids at so many percent.
+    Rapid(u8),
     /// 0x99 to 0x9D, as of the rate.
     Power(Option<i8>),
     /// 0x9E.
@@ -54,7 +54,9 @@ impl Realtime {
             0x92 => Self::Rate(Some(-10)),
             0x93 => Self::Rate(Some(1)),
             0x94 => Self::Rate(Some(-1)),
-            0x95..=0x97 => Self::Rapid,
+            0x95 => Self::Rapid(100),
+            0x96 => Self::Rapid(50),
+            0x97 => Self::Rapid(25),
             0x99 => Self::Power(None),
             0x9A => Self::Power(Some(10)),
             0x9B => Self::Power(Some(-10)),
@@ -186,8 +188,12 @@ impl Session {
                 self.overrides.power = changed(self.overrides.power, change);
                 self.ask_override(Verb::Power, self.overrides.power);
             }
-            // A rapid is as fast as the machine may, and a hold is dark anyway.
-            Realtime::Rapid | Realtime::LaserStop => {}
+            Realtime::Rapid(percent) => {
+                self.overrides.rapid = percent;
+                self.ask_override(Verb::Rapid, percent);
+            }
+            // A hold is dark anyway.
+            Realtime::LaserStop => {}
             Realtime::Air => self.toggle_air(),
         }
     }
@@ -243,6 +249,7 @@ impl Session {
         if self.overrides != Overrides::NONE {
             self.overrides = Overrides::NONE;
             self.ask_override(Verb::Override, 100);
+            self.ask_override(Verb::Rapid, 100);
             self.ask_override(Verb::Power, 100);
         }
         self.reader.reset();
@@ -268,6 +275,7 @@ impl Session {
         };
         self.overrides = Overrides {
             rate: percent(status.rate_override, self.overrides.rate),
+            rapid: percent(status.rapid_override, self.overrides.rapid).min(100),
             power: percent(status.power_override, self.overrides.power),
         };
     }

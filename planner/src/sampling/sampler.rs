@@ -17,7 +17,7 @@ use crate::joint_space::configuration::{branches, follow, keeps_margins};
 use crate::joint_space::joint_move::{JointLine, JointMove, JointsAt};
 use crate::sampling::backlash::BacklashCompensation;
 use crate::sampling::deflection::Deflection;
-use crate::trajectory::{Cursor, Piece, Reference, Trajectory};
+use crate::trajectory::{Cursor, Motion, Piece, Reference, Trajectory};
 
 /// Looks at the trajectory in a cycle; even, so that a sample lies on one.
 const STEPS: usize = 4;
@@ -517,7 +517,11 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         }
         setpoint.stream = self.stream;
         setpoint.sequence = self.sequence;
-        setpoint.line = self.trajectory.pieces.get(self.cursor.piece).map_or(0, |it| it.line);
+        if let Some(piece) = self.trajectory.pieces.get(self.cursor.piece) {
+            setpoint.line = piece.line;
+            let flies = matches!(piece.motion, Motion::Flight(_) | Motion::Joints(_));
+            setpoint.flags |= if flies { flags::RAPID } else { 0 };
+        }
         self.light(setpoint);
         self.switch(setpoint, self.sequence as f64 * SETPOINT_TIME);
         if self.is_settled() {

@@ -45,7 +45,7 @@ pub(crate) enum Form {
 }
 
 /// All verbs by name.
-pub(crate) const VERBS: [(&str, Form); 16] = [
+pub(crate) const VERBS: [(&str, Form); 17] = [
     ("enable", Form::Plain(Verb::Enable)),
     ("disable", Form::Plain(Verb::Disable)),
     ("hold", Form::Plain(Verb::Hold)),
@@ -54,6 +54,7 @@ pub(crate) const VERBS: [(&str, Form); 16] = [
     ("reset", Form::Plain(Verb::Reset)),
     ("override", Form::Value(Verb::Override)),
     ("power", Form::Value(Verb::Power)),
+    ("rapid", Form::Value(Verb::Rapid)),
     ("home", Form::Axes(Verb::Home)),
     ("jog", Form::Axis(Verb::Jog, 1)),
     ("jog-on", Form::Axis(Verb::JogOn, 1)),

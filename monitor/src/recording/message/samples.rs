@@ -94,7 +94,7 @@ message! {
     Setpoint {
         1 stream plain "stream that it belongs to",
         2 sequence plain "position in the stream, from 0",
-        4 flags plain "1 last, 2 pause, 4 lit for a frame",
+        4 flags plain "1 last, 2 pause, 4 lit for a frame, 8 rapid",
         5 outputs plain "what the job has switched on, one bit each",
         6 stroke plain "stroke being marked from here on, from 1; 0 for none",
         7 tool plain "tool centre point in the machine frame [m]",
