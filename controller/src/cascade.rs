@@ -153,8 +153,8 @@ impl Cascade {
         measured: &Measurement,
         integrating: bool,
     ) -> Drive {
-        let velocity_error =
-            self.speed(reference.velocity, reference, measured) - measured.velocity;
+        let behind = reference.position - measured.position;
+        let velocity_error = self.speed(reference.velocity, behind) - measured.velocity;
         let (current, current_excess) = self.velocity.output(velocity_error, reference.current);
         let current_error = current - measured.current;
         let (voltage, voltage_excess) = self.current.output(current_error, reference.voltage);
@@ -168,27 +168,28 @@ impl Cascade {
         Drive { current, voltage }
     }
 
-    /// One cycle of the outer two loops, for a drive that closes the current loop: the current that it shall
-    /// drive [A]; `reference.current` is that of the plan in the cycle in which it acts.
+    /// One cycle of the outer two loops, for a drive that closes the current loop, of a motor that will be so much
+    /// `behind` the plan and so much `slower` [rad, rad/s] when it acts: the current that it shall drive, and what of that
+    /// is from neither plan nor integral [A]. `reference.current` is that of the plan in the cycle in which it acts.
     pub fn outer(
         &mut self,
         reference: &Reference,
-        measured: &Measurement,
+        [behind, slower]: [f64; 2],
         integrating: bool,
-    ) -> f64 {
-        let velocity_error =
-            self.speed(reference.velocity, reference, measured) - measured.velocity;
+    ) -> [f64; 2] {
+        let wanted = self.speed(reference.velocity, behind);
+        let velocity_error = wanted - (reference.velocity - slower);
         let (current, excess) = self.velocity.output(velocity_error, reference.current);
+        let correction = current - reference.current - self.velocity.accumulated;
         if integrating && excess * velocity_error <= 0.0 {
             self.velocity.integrate(velocity_error, reference.current, self.cycle_time);
         }
-        current
+        [current, correction]
     }
 
-    /// The speed that brings a motor from where it was measured to its reference, beside that of the plan
-    /// [rad/s].
-    pub fn speed(&self, planned: f64, reference: &Reference, measured: &Measurement) -> f64 {
-        let wanted = planned + self.position * (reference.position - measured.position);
+    /// The speed that brings a motor that is so much `behind` [rad] to its reference, beside that of the plan [rad/s].
+    pub fn speed(&self, planned: f64, behind: f64) -> f64 {
+        let wanted = planned + self.position * behind;
         wanted.clamp(-self.speed_limit, self.speed_limit)
     }
 

@@ -60,6 +60,7 @@ use crate::light::Light;
 use crate::outputs::Switching;
 use crate::planned::Planned;
 use crate::player::{Event, Player};
+use crate::prediction::Prediction;
 use crate::reference::Reference;
 use crate::safety::Safety;
 use crate::squaring::Squaring;
@@ -108,6 +109,8 @@ pub struct Controller {
     feedforward: Feedforward,
     /// None for steppers. A drive closes those loops that its mode leaves to it.
     cascades: [Option<Cascade>; MAX_ACTUATORS],
+    /// What drives that follow torques have been told beside the plan.
+    predictions: Vec<Prediction>,
     /// Whether drives follow positions, which know no step.
     follows_positions: bool,
     supervision: Supervision,
@@ -167,6 +170,9 @@ impl Controller {
             catch_up: CatchUp::default(),
             feedforward: Feedforward::new(machine),
             cascades: core::array::from_fn(|index| machine.actuators.get(index).and_then(cascade)),
+            predictions: (machine.actuators.iter().take(MAX_ACTUATORS))
+                .map(|actuator| Prediction::new(actuator, period))
+                .collect(),
             follows_positions: (machine.actuators.iter())
                 .any(|actuator| actuator.mode == ActuatorMode::Position),
             supervision: Supervision::new(machine),
@@ -439,6 +445,7 @@ impl Controller {
             for cascade in self.cascades.iter_mut().flatten() {
                 cascade.reset();
             }
+            self.predictions.iter_mut().for_each(Prediction::reset);
             (self.catch_up, self.squaring) = (CatchUp::default(), Squaring::default());
             self.travel.reset();
             return;

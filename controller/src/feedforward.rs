@@ -238,16 +238,17 @@ impl Feedforward {
 
     /// Targets for the actuator with this index.
     pub fn target(&self, index: usize, actuator: &Actuator) -> Target {
-        let ends @ [from, to] = self.ends(index);
-        let [_, mean, _] = directions(ends);
-        let torque = (from.torque + to.torque) / 2.0;
+        let [from, to] = self.ends(index);
+        let torques = self.torque_ends(index);
+        let [_, mean, _] = directions(torques);
+        let [first, last] = torques.map(|end| end.torque);
         Target {
             position: to.angle,
             velocity: match actuator.mode {
                 ActuatorMode::Position => to.speed,
                 _ => (to.angle - from.angle) / self.cycle_time,
             },
-            effort: torque + actuator.friction.coulomb * mean,
+            effort: (first + last) / 2.0 + actuator.friction.coulomb * mean,
         }
     }
 
@@ -264,6 +265,16 @@ impl Feedforward {
         [1, 0].map(|back| {
             let off = self.off.back(back);
             self.planned(index, back).off(off.angle[index], off.speed[index])
+        })
+    }
+
+    /// The motor with this index at the start and at the end of the cycle in which the torque of the command is
+    /// there.
+    fn torque_ends(&self, index: usize) -> [Point; 2] {
+        let behind = self.latencies.actuators[index].torque;
+        [1, 0].map(|back| {
+            let off = self.off.back(back);
+            self.plan_before(index, back, behind).off(off.angle[index], off.speed[index])
         })
     }
 

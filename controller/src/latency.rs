@@ -8,7 +8,7 @@
 //!
 //! The player is ahead by whole cycles, as many as the longest latency takes. Each actuator is given the plan
 //! of the cycle in which its target acts: as much behind the player as its own latency is shorter. The gate
-//! has a latency too.
+//! has a latency too. A torque is there later than the rest of a target, by what a drive's current loop takes.
 
 use machine::Machine;
 use messages::delay::Delay;
@@ -21,6 +21,8 @@ pub struct Latency {
     pub acts: Delay,
     /// From there to the instant that the player has come to.
     pub behind: Delay,
+    /// From when its torque is there to the instant that the player has come to.
+    pub torque: Delay,
     /// From the measurement that is told at a deadline to that deadline.
     pub measured: Delay,
     /// From the deadline at which that was sent which acted at the measurement, to the one at which it is told.
@@ -43,20 +45,25 @@ impl Latencies {
     pub fn of(machine: &Machine) -> Self {
         let period = machine.realtime.period;
         let gate = machine.drives.gate_latency;
-        let times = || machine.actuators.iter().map(|actuator| actuator.latency);
-        let longest = times().fold(gate, Nanoseconds::max);
+        let none = Nanoseconds(0);
+        let times = machine.actuators.iter().map(|it| it.latency + it.torque_delay);
+        let longest = times.fold(gate, Nanoseconds::max);
         let ahead = Delay::of(longest, period).whole_cycles();
-        let latency = |time: Nanoseconds, age: Nanoseconds| Latency {
-            acts: Delay::of(time, period),
-            behind: Delay::of(period.of(ahead as u64) - time, period),
-            measured: Delay::of(age, period),
-            answered: Delay::of(time + age, period),
+        let latency = |[time, torque_delay, age]: [Nanoseconds; 3]| {
+            let behind = |time| Delay::of(period.of(ahead as u64) - time, period);
+            Latency {
+                acts: Delay::of(time, period),
+                behind: behind(time),
+                torque: behind(time + torque_delay),
+                measured: Delay::of(age, period),
+                answered: Delay::of(time + age, period),
+            }
         };
-        let mut actuators = [latency(longest, Nanoseconds(0)); MAX_ACTUATORS];
+        let mut actuators = [latency([longest, none, none]); MAX_ACTUATORS];
         for (slot, actuator) in actuators.iter_mut().zip(&machine.actuators) {
-            *slot = latency(actuator.latency, actuator.age);
+            *slot = latency([actuator.latency, actuator.torque_delay, actuator.age]);
         }
-        Self { ahead, actuators, gate: latency(gate, Nanoseconds(0)) }
+        Self { ahead, actuators, gate: latency([gate, none, none]) }
     }
 
     /// The longest time from a command to what is told of it, in whole cycles.

@@ -21,6 +21,7 @@ pub mod motion_limits;
 pub mod outputs;
 pub mod planned;
 pub mod player;
+mod prediction;
 pub mod ramp;
 pub mod rapids;
 pub mod reference;

@@ -26,7 +26,7 @@ pub trait Hardware: Send {
     /// From when to when there was light so far, in order; light that is there at `now` ends there.
     fn lit(&self, now: Nanoseconds) -> Vec<[Nanoseconds; 2]>;
 
-    /// Where the tool is, as its motors were when the plant went on last [m].
+    /// Where the tool is [m].
     fn tool(&self) -> Option<[f64; 3]>;
 }
 

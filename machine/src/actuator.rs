@@ -98,6 +98,8 @@ pub struct Actuator {
     pub mode: ActuatorMode,
     /// From the deadline at which a target is sent until the motor follows it [ns].
     pub latency: Nanoseconds,
+    /// From when a target acts until the drive's own current loop gives the torque that it asks for [ns].
+    pub torque_delay: Nanoseconds,
     /// How long before a deadline its place was measured that is told then [ns].
     pub age: Nanoseconds,
     /// How far it stands beyond its place where its home reference is, in joint units [m or rad]: what

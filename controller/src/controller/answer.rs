@@ -137,12 +137,16 @@ impl Controller {
             let drive = match actuator.mode {
                 ActuatorMode::Voltage => cascade.step(&reference, &measured, !held_by_friction),
                 ActuatorMode::Torque => {
-                    let current = cascade.outer(&planned, &measured, !held_by_friction);
+                    let prediction = &mut self.predictions[index];
+                    let slower = reference.velocity - measured.velocity;
+                    let off = prediction.error(error, slower);
+                    let [current, correction] = cascade.outer(&planned, off, !held_by_friction);
+                    prediction.send(correction * constant);
                     command.effort[index] = current * constant;
                     Drive { current, voltage: 0.0 }
                 }
                 ActuatorMode::Velocity => {
-                    command.velocity[index] = cascade.speed(target.velocity, &reference, &measured);
+                    command.velocity[index] = cascade.speed(target.velocity, error);
                     Drive { current: planned.current, voltage: 0.0 }
                 }
                 ActuatorMode::Position => Drive { current: planned.current, voltage: 0.0 },

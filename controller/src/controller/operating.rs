@@ -103,6 +103,9 @@ impl Controller {
             if let Some(cascade) = &mut self.cascades[index] {
                 cascade.reset();
             }
+            if let Some(prediction) = self.predictions.get_mut(index) {
+                prediction.reset();
+            }
         }
     }
 

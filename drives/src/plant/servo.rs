@@ -5,7 +5,8 @@
 //! far above the bridge's: position P, velocity PI with the torque as feedforward, then the current's voltage
 //! from the motor's data. A torque and a velocity are held over the cycle. A position is reached at its end,
 //! along the cubic with the velocities at both ends. Nobody said where to in a stale cycle: a position then goes on at
-//! the speed it had. Targets act by the latency of the actuator after they are sent.
+//! the speed it had. Targets act by the latency of the actuator after they are sent, a torque by the delay of the
+//! current loop later.
 
 use machine::{Actuator, ActuatorMode};
 use messages::delay::{Delay, Recent};
@@ -61,6 +62,8 @@ pub(super) struct Servo {
     /// Of the velocity error [rad/s].
     integral: f64,
     latency: Delay,
+    /// The same of a torque.
+    torque_latency: Delay,
     told: Recent<Told>,
 }
 
@@ -68,6 +71,7 @@ impl Servo {
     /// The drive of `actuator` in cycles of this `period`; `None` of a stepper.
     pub(super) fn of(actuator: &Actuator, period: Period) -> Option<Self> {
         let latency = Delay::of(actuator.latency, period);
+        let torque_latency = Delay::of(actuator.latency + actuator.torque_delay, period);
         Some(Self {
             mode: actuator.mode,
             cycle_time: period.seconds(),
@@ -77,7 +81,8 @@ impl Servo {
             inertia: actuator.gains.inertia,
             integral: 0.0,
             latency,
-            told: Recent::of(Told::default(), latency.cycles + 2),
+            torque_latency,
+            told: Recent::of(Told::default(), torque_latency.cycles + 2),
         })
     }
 
@@ -106,16 +111,16 @@ impl Servo {
     /// The voltage for the substep of `step` [s] that begins at `share` of the cycle, with the motor in `state`
     /// [V], unlimited.
     pub(super) fn voltage(&mut self, [share, step]: [f64; 2], state: MotorState) -> f64 {
-        let held = |target: fn(&Told) -> f64| self.held(target, [share, step]);
+        let held = |target: fn(&Told) -> f64| self.held(target, self.latency, [share, step]);
+        let effort = self.held(|told| told.effort, self.torque_latency, [share, step]);
         let torque = match self.mode {
             ActuatorMode::Voltage => return held(|told| told.voltage),
-            ActuatorMode::Torque => held(|told| told.effort),
+            ActuatorMode::Torque => effort,
             ActuatorMode::Velocity => {
-                let [wanted, effort] = [held(|told| told.velocity), held(|told| told.effort)];
+                let wanted = held(|told| told.velocity);
                 self.velocity_loop(wanted, effort, step, state)
             }
             ActuatorMode::Position => {
-                let effort = held(|told| told.effort);
                 let [angle, speed] = self.reference(share);
                 let wanted = speed + self.position_gain * (angle - state.angle);
                 self.velocity_loop(wanted, effort, step, state)
@@ -127,9 +132,10 @@ impl Servo {
         self.motor.voltage(target, rate, state.speed)
     }
 
-    /// A target that is held over a cycle, in the mean of the substep of `step` [s] that begins at `share`.
-    fn held(&self, target: fn(&Told) -> f64, [share, step]: [f64; 2]) -> f64 {
-        let Delay { cycles, part, .. } = self.latency;
+    /// A target that is held over a cycle and acts by `latency` after it is sent, in the mean of the substep of `step`
+    /// [s] that begins at `share`.
+    fn held(&self, target: fn(&Told) -> f64, latency: Delay, [share, step]: [f64; 2]) -> f64 {
+        let Delay { cycles, part, .. } = latency;
         let later = target(self.told.back(cycles));
         if share >= part {
             return later;
@@ -226,7 +232,7 @@ mod tests {
             actuation.voltage[0] = voltage;
             servo.engage(&actuation, 0, state);
         }
-        let at = |share: f64| servo.held(|told| told.voltage, [share, 50e-6]);
+        let at = |share: f64| servo.held(|told| told.voltage, servo.latency, [share, 50e-6]);
         let found = [0.0, 0.2, 0.25, 0.3, 0.95].map(at);
         let expected = [2.0, 2.0, 2.0 + 4.0 * 0.8, 6.0, 6.0];
         let differs = found.iter().zip(expected).any(|(found, it)| (found - it).abs() > 1e-9);

@@ -139,6 +139,7 @@ pub(crate) fn actuator(inertia: f64, friction: Friction) -> machine::Actuator {
         gains: LoopGains { position: 40.0, velocity: 160.0, current: 349.0, inertia },
         mode: machine::ActuatorMode::Voltage,
         latency: messages::Nanoseconds(0),
+        torque_delay: messages::Nanoseconds(0),
         age: messages::Nanoseconds(0),
         square: 0.0,
     }

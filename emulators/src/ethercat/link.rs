@@ -123,6 +123,6 @@ impl Hardware for Link {
     }
 
     fn tool(&self) -> Option<[f64; 3]> {
-        self.segment.plant().tool()
+        self.segment.tool()
     }
 }

@@ -30,6 +30,8 @@ pub struct Plant {
     back_emf: Vec<f64>,
     /// Counts a step ago.
     before: [i64; MAX_ACTUATORS],
+    /// Where the tool was a step ago [m].
+    tool_before: Option<[f64; 3]>,
 }
 
 impl core::fmt::Debug for Plant {
@@ -55,7 +57,7 @@ impl Plant {
         let mut motors = Machine { realtime, ..machine.clone() };
         for actuator in &mut motors.actuators {
             (actuator.mode, actuator.latency) = (ActuatorMode::Voltage, Nanoseconds(0));
-            actuator.age = Nanoseconds(0);
+            (actuator.age, actuator.torque_delay) = (Nanoseconds(0), Nanoseconds(0));
         }
         motors.drives.gate_latency = Nanoseconds(0);
         let port = SimulatedPlant::new(&motors, options).map_err(PlantError::Plant)?;
@@ -66,7 +68,8 @@ impl Plant {
         });
         let back_emf = back_emf.collect();
         let measurement = Measurement::default();
-        Ok(Self { port, measurement, period, back_emf, before: [0; MAX_ACTUATORS] })
+        let (before, tool_before) = ([0; MAX_ACTUATORS], None);
+        Ok(Self { port, measurement, period, back_emf, before, tool_before })
     }
 
     /// From one step to the next.
@@ -89,7 +92,7 @@ impl Plant {
                 Phases::Open => (now - before) as f64 * back_emf,
             };
         }
-        self.before = self.measurement.counts;
+        (self.before, self.tool_before) = (self.measurement.counts, self.measurement.tool);
         self.port.exchange(&actuation, &mut self.measurement);
         let measured = self.measurement.counts.iter().zip(&self.measurement.current);
         for (motor, (counts, current)) in wires.motors.iter_mut().zip(measured) {
@@ -102,9 +105,16 @@ impl Plant {
         self.measurement.inputs
     }
 
-    /// Tool centre point in the machine frame [m], where the plant knows it.
-    pub fn tool(&self) -> Option<[f64; 3]> {
-        self.measurement.tool
+    /// Tool centre point in the machine frame [m], where the plant knows it: `later` than the newest step, up to a
+    /// step, as it goes on at its speed.
+    pub fn tool(&self, later: Nanoseconds) -> Option<[f64; 3]> {
+        let tool = self.measurement.tool?;
+        let before = self.tool_before.unwrap_or(tool);
+        let steps = later.seconds() / self.period.seconds();
+        let moved = tool.iter().zip(before).map(|(now, before)| now + steps * (now - before));
+        let mut carried = tool;
+        carried.iter_mut().zip(moved).for_each(|(carried, moved)| *carried = moved);
+        Some(carried)
     }
 
     /// Motor positions [rad].

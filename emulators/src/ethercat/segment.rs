@@ -257,6 +257,11 @@ impl Segment {
         &self.slaves
     }
 
+    /// Where the tool is [m], where the plant knows it.
+    pub fn tool(&self) -> Option<[f64; 3]> {
+        self.plant.tool(self.now - (self.tick - self.plant.period()))
+    }
+
     /// The machine behind the drives.
     pub fn plant(&self) -> &Plant {
         &self.plant

@@ -219,6 +219,7 @@ pub(super) fn axis(
             },
             mode: follows,
             latency: Nanoseconds(0),
+            torque_delay: Nanoseconds(0),
             age: Nanoseconds(0),
             square: drive.square,
         };

@@ -13,7 +13,7 @@ use crate::actuator::Actuator;
 use crate::document::{
     Diagnostics, Named, NonNegative, Number, ProblemKind, Quantity, Span, Spanned, nearest,
 };
-use crate::drives::{Drives, DrivesKind};
+use crate::drives::{ActuatorMode, Drives, DrivesKind};
 use crate::operating::{InputFunction, Operating};
 use crate::quantity::Duration;
 use crate::table;
@@ -27,6 +27,8 @@ pub(super) struct Built {
     pub(super) gate_latency: Nanoseconds,
     /// Of each actuator.
     pub(super) latency: Vec<Nanoseconds>,
+    /// Of the drive of each actuator, how long its current loop takes.
+    pub(super) torque_delay: Vec<Nanoseconds>,
     /// How old the measurement of an actuator is whose targets act by such a latency.
     pub(super) age: Age,
 }
@@ -76,6 +78,7 @@ macro_rules! drives_tables {
                     kind: DrivesKind::Simulated,
                     gate_latency: Nanoseconds(0),
                     latency: vec![Nanoseconds(0); actuators.len()],
+                    torque_delay: vec![Nanoseconds(0); actuators.len()],
                     age: Age::None,
                 })
             }
@@ -109,18 +112,32 @@ pub(super) fn build(
             &format!("keep either [drives.{first}] or [drives.{second}]"),
         );
     }
-    let Some(Built { mut kind, gate_latency, latency, age }) = table.build(actuators, diagnostics)
-    else {
+    let Some(built) = table.build(actuators, diagnostics) else {
         return Drives::default();
     };
-    for (actuator, latency) in actuators.iter_mut().zip(latency) {
+    let Built { mut kind, gate_latency, latency, torque_delay, age } = built;
+    let is_delayed = torque_delay.iter().any(|time| *time > Nanoseconds(0));
+    for (actuator, (latency, torque_delay)) in
+        actuators.iter_mut().zip(latency.into_iter().zip(torque_delay))
+    {
         actuator.latency = latency;
-        // A stepper is counted by the pulses that it is told.
-        if actuator.motor.dc().is_some() {
-            actuator.age = age.of(latency, period);
+        // A stepper is counted by the pulses that it is told, and its driver is told no torque.
+        if actuator.motor.dc().is_none() {
+            continue;
+        }
+        actuator.age = age.of(latency, period);
+        if actuator.mode != ActuatorMode::Voltage {
+            actuator.torque_delay = torque_delay;
         }
     }
     for (_, span) in table.declared() {
+        if is_delayed && actuators.iter().all(|it| it.torque_delay == Nanoseconds(0)) {
+            diagnostics.contradict(
+                span,
+                "`torque_delay` has no effect: no drive is told a torque".to_owned(),
+                "remove it, or give an axis with a servo motor the `mode` torque, velocity or position",
+            );
+        }
         drive_homing::refuse(&kind, operating, span, diagnostics);
     }
     match (table, &mut kind) {
@@ -135,8 +152,8 @@ pub(super) fn build(
     Drives { kind, gate_latency }
 }
 
-/// The latency of each of `actuators`: its own where its table has one, else that of all.
-fn latencies<T>(
+/// The time of each of `actuators`, as its latency: its own where its table has one, else that of all.
+fn times<T>(
     all: &Latency,
     tables: Option<&Named<T>>,
     own: impl Fn(&T) -> Option<Latency>,

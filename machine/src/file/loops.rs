@@ -10,6 +10,10 @@ use crate::motor::{DcMotor, Motor};
 use messages::Nanoseconds;
 use messages::time::Period;
 
+/// How much longer a loop may wait for its answer that reckons with those which are on their way: as sure not to swing as
+/// others where the inertia is a third of what the file has, to three times as much.
+const PREDICTED: f64 = 2.0;
+
 /// What a loop waits for its own answer.
 #[derive(Debug, Clone, Copy)]
 struct DeadTime {
@@ -17,35 +21,50 @@ struct DeadTime {
     latency: Nanoseconds,
     /// How old the measurement is.
     age: Nanoseconds,
+    /// How long the drive's current loop takes, around which this loop is closed.
+    torque_delay: Nanoseconds,
+    /// How much longer than others it may wait.
+    borne: f64,
 }
 
 impl DeadTime {
     /// In cycles of `period`, with a drive that measures and acts at the deadline.
     fn at_once(period: Period) -> Self {
-        Self { period, latency: Nanoseconds(0), age: Nanoseconds(0) }
+        let none = Nanoseconds(0);
+        Self { period, latency: none, age: none, torque_delay: none, borne: 1.0 }
     }
 
     /// In cycles of `period`, with the drive of `actuator`.
     fn of(period: Period, actuator: &Actuator) -> Self {
-        Self { period, latency: actuator.latency, age: actuator.age }
+        let Actuator { latency, age, torque_delay, .. } = *actuator;
+        match actuator.mode {
+            ActuatorMode::Torque => Self { period, latency, age, torque_delay, borne: PREDICTED },
+            // What is inside the drive's own velocity loop is the drive's.
+            _ => Self { latency, age, ..Self::at_once(period) },
+        }
     }
 
     /// From a measurement to the start of the cycle in which its answer acts [s].
     fn seconds(self) -> f64 {
-        self.period.seconds() + self.latency.seconds() + self.age.seconds()
+        let late = self.latency + self.age + self.torque_delay;
+        self.period.seconds() + late.seconds()
     }
 
     /// What makes a loop swing, in words.
     fn words(self) -> String {
         let milliseconds = |time: f64| format!("{} ms", time * 1e3);
         let cycle = milliseconds(self.period.seconds());
-        let [latency, age] = [self.latency, self.age].map(|time| milliseconds(time.seconds()));
+        let late = [self.latency, self.age, self.torque_delay];
+        let [latency, age, delay] = late.map(|time| milliseconds(time.seconds()));
         let mut words = format!("in a control cycle of {cycle}");
         if self.latency != Nanoseconds(0) {
             words += &format!(" with a drive that acts {latency} after it is told");
         }
         if self.age != Nanoseconds(0) {
             words += &format!(" and measures {age} before it tells");
+        }
+        if self.torque_delay != Nanoseconds(0) {
+            words += &format!(" and has a torque {delay} after it is asked for");
         }
         words
     }
@@ -76,7 +95,7 @@ pub(super) fn slow_down(
     diagnostics: &mut Diagnostics,
 ) {
     let Motor::Dc(motor) = actuator.motor else { return };
-    if actuator.latency + actuator.age == Nanoseconds(0) {
+    if actuator.latency + actuator.age + actuator.torque_delay == Nanoseconds(0) {
         return;
     }
     let by_drive = DeadTime::at_once(period);
@@ -104,7 +123,7 @@ pub(super) struct Driven<'a> {
 }
 
 /// The gains of the loops. Defaults suit 1 ms without latency; with a longer dead time they are slower by as
-/// much. What is written stays as it is, unless the loops that are closed here would swing in a period of more than
+/// much, those that reckon with their answers on the way from twice that time on. What is written stays as it is, unless the loops that are closed here would swing in a period of more than
 /// 1 ms: then it is slower in proportion to that, with a warning. A loop that answers within its dead time swings without
 /// end: it is refused.
 pub(super) fn gains(
@@ -127,7 +146,7 @@ pub(super) fn gains(
     // The place of a default is that of its table.
     let in_time = |value: f64, span: Span, dead: DeadTime| Spanned {
         value: if span == loops.span {
-            value * (usual / dead.seconds()).min(1.0)
+            value * (dead.borne * usual / dead.seconds()).min(1.0)
         } else {
             value * slower
         },

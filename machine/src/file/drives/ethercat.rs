@@ -1,6 +1,6 @@
 //! Drives on an EtherCAT bus.
 
-use super::{Age, Built, Latency, each, latencies, whole};
+use super::{Age, Built, Latency, each, times, whole};
 use crate::actuator::Actuator;
 use crate::document::{
     Diagnostics, Named, NonNegative, Number, Positive, ProblemKind, Quantity, Spanned,
@@ -34,7 +34,9 @@ table! {
         pub watchdog: Quantity<Duration, Positive> = "20 ms",
         /// From the deadline at which a command is sent until a motor follows it.
         pub latency: Latency = "500 us",
-        /// The same of the laser's gate.
+        /// From when a command acts until a drive's current loop gives the torque that it asks for.
+        pub torque_delay: Latency = "0 s",
+        /// How late the laser's gate acts, as `latency`.
         pub gate_latency: Latency = "500 us",
         /// What opens the laser's gate.
         pub gate: Option<EthercatGateTable>,
@@ -103,6 +105,8 @@ table! {
         pub slave: Whole,
         /// From the deadline at which a command is sent until this motor follows it.
         pub latency: Option<Latency>,
+        /// From when a command acts until this drive's current loop gives the torque that it asks for.
+        pub torque_delay: Option<Latency>,
     }
 }
 
@@ -134,11 +138,15 @@ pub(super) fn build(
     let tables = each(&table.actuators, "ethercat", actuators, diagnostics)?;
     let slave = |own: &EthercatActuatorTable| whole(&own.slave, LAST_SLAVE, diagnostics) as u16;
     let slaves = tables.into_iter().map(slave).collect();
-    let own = |own: &EthercatActuatorTable| own.latency;
+    let own: [fn(&EthercatActuatorTable) -> Option<Latency>; 2] =
+        [|own| own.latency, |own| own.torque_delay];
+    let [latency, torque_delay] = [(&table.latency, own[0]), (&table.torque_delay, own[1])]
+        .map(|(all, own)| times(all, Some(&table.actuators), own, actuators));
     let identities = identities(table, diagnostics);
     Some(Built {
         gate_latency: Nanoseconds::from_seconds(table.gate_latency.value),
-        latency: latencies(&table.latency, Some(&table.actuators), own, actuators),
+        latency,
+        torque_delay,
         age: Age::Latched,
         kind: DrivesKind::Ethercat(Ethercat {
             link: link?,

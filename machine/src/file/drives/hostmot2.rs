@@ -1,6 +1,6 @@
 //! An FPGA card with HostMot2 firmware as drives.
 
-use super::{Age, Built, Latency, each, find, latencies, refuse_index, refuse_others, whole};
+use super::{Age, Built, Latency, each, find, refuse_index, refuse_others, times, whole};
 use crate::actuator::Actuator;
 use crate::document::{
     Diagnostics, Named, NonNegative, Number, Positive, ProblemKind, Quantity, Span, Spanned,
@@ -102,7 +102,9 @@ pub(super) fn build(
     let own = |own: &Hostmot2ActuatorTable| own.latency;
     Some(Built {
         gate_latency: Nanoseconds::from_seconds(table.gate_latency.value),
-        latency: latencies(&table.latency, Some(&table.actuators), own, actuators),
+        latency: times(&table.latency, Some(&table.actuators), own, actuators),
+        // An amplifier is told voltages, and has no current loop.
+        torque_delay: vec![Nanoseconds(0); actuators.len()],
         age: Age::None,
         kind: DrivesKind::Hostmot2(Hostmot2 {
             address: table.address.value.clone(),
