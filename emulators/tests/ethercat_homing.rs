@@ -135,7 +135,9 @@ fn each_method_leads_to_the_place_of_its_reference() {
         (17, "-10 mm", LOWER),
         (18, "410 mm", LOWER),
         (19, "380 mm", UPPER),
+        (20, "380 mm", UPPER),
         (21, "20 mm", LOWER),
+        (22, "20 mm", LOWER),
         (33, "200 mm", LOWER),
         (34, "210 mm", LOWER),
         (35, "202 mm", LOWER),
@@ -249,11 +251,90 @@ fn what_no_drive_can_do_is_refused_in_the_machine_file() {
         ("drive_method = 17\n", "", "nothing is said of how the drive of axis `x` finds"),
         ("drive_method = 17", "drive_method = 17.5", "17.5 is no method of homing"),
         ("method = \"drive\"", "method = \"switch\"", "`drive_method` has no effect"),
-        ("[axis.x.homing]", "[axis.y.homing]", "axis `y` has 2 drives, which would look for it"),
         ("mode = \"position\"", "mode = \"voltage\"", "its drive closes no loop"),
     ] {
         assert!(plain.contains(from), "{from}");
         let told = parse(&plain.replace(from, to)).err().unwrap_or_default();
         assert!(told.contains(words), "{told}");
     }
+    let odd = plain.replace("[axis.x.homing]", "[axis.y.homing]");
+    let odd = odd.replace("drive_method = 17", "drive_method = -3");
+    let told = parse(&odd).err().unwrap_or_default();
+    assert!(told.contains("`y.right` is mirrored") && told.contains("method -3"), "{told}");
+}
+
+/// The gantry, whose y axis is homed by both of its drives, by the `number` of their method, each at a switch of its own: that on
+/// the right stands `apart` [m] beyond that on the left. What is between the two gives way.
+fn gantry(number: i32, [side, at]: [&str; 2], apart: f64) -> String {
+    let soft = "stiffness = \"500 N m/rad\" # of both together";
+    let limits = "[axis.y.limits]\n";
+    let text = line::shipped("servo_gantry");
+    assert!(text.contains(soft) && text.contains(limits));
+    let right: f64 = at.parse().unwrap();
+    let wired = "x_max = { slave = 0, bit = 1 }\ny_left = { slave = 1, bit = 2 }\ny_right = { slave = 2, bit = 2 }\n";
+    let text = text
+        .replace(soft, "stiffness = \"20 N m/rad\"")
+        .replace(limits, "[axis.y.limits]\nracking = \"0.1 mm\"\n")
+        .replace("x_max = { slave = 0, bit = 1 }\n", wired);
+    let mut text = text;
+    for (name, place) in [("left", right), ("right", right + apart * 1e3)] {
+        text += &format!(
+            "
+[inputs.y_{name}]
+function = \"home\"
+axis = \"y\"
+actuator = \"{name}\"
+side = \"{side}\"
+at = \"{place} mm\"
+"
+        );
+    }
+    text + &format!(
+        "
+[axis.y.homing]
+method = \"drive\"
+drive_method = {number}
+position = \"{at} mm\"
+speed = \"50 mm/s\"
+latch_speed = \"5 mm/s\"
+"
+    )
+}
+
+/// Where the left and the right motor of the gantry's y truly are [m].
+fn sides(bus: &Bus) -> [f64; 2] {
+    let counts = |motor| bus.cable.with(|link, _| link.segment.wires().motor(motor).counts) as f64;
+    [counts(1), -counts(2)].map(|counts| 0.15 + counts / 131_072.0 * 10e-3)
+}
+
+#[test]
+fn a_gantry_is_homed_by_both_of_its_drives_and_squared() {
+    for (number, switch) in [(21, ["lower", "20"]), (22, ["lower", "20"]), (19, ["upper", "280"])] {
+        let mut bus = Bus::new(&gantry(number, switch, 60e-6));
+        assert_eq!(bus.cell.refuse(Start, 0, 1.0, 0.0), Refusal::NotHomed);
+        bus.cell.accept(Home, 0, 0.0, 0.0);
+        bus.until(State::Idle);
+        assert_eq!((bus.cell.end(), bus.cell.progress.homed & 2), (MotionEnd::Reached, 2));
+        // Each is at home by its own switch, the right one so much farther.
+        let [left, right] = sides(&bus);
+        assert!((left - 0.15).abs() < PLACE, "method {number}: {left}");
+        assert!((right - left - 60e-6).abs() < 5e-6, "method {number}: {left} {right}");
+        bus.cell.run(10);
+        assert!((bus.cell.place(1) - 0.15).abs() < 1e-9, "method {number}");
+    }
+}
+
+#[test]
+fn switches_of_a_gantry_that_are_too_far_apart_are_told_by_the_side_that_stands_off() {
+    let mut bus = Bus::new(&gantry(21, ["lower", "20"], 2e-3));
+    bus.cell.accept(Home, 0, 0.0, 0.0);
+    bus.until(State::Faulted);
+    let fault = bus.cell.outputs.command.fault;
+    assert_eq!(fault.code(), FaultCode::Racking);
+    assert!(fault.actuator == 2 || fault.actuator == 3, "{fault:?}");
+    bus.cell.run(300);
+    let rest = sides(&bus);
+    bus.cell.run(200);
+    assert!((sides(&bus)[0] - rest[0]).abs() < PLACE, "{rest:?}");
+    assert_eq!(bus.cell.progress.homed & 2, 0);
 }

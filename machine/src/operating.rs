@@ -1,6 +1,7 @@
 //! What a person needs to operate a machine: its switches and outputs, how its axes find their reference,
 //! and what an open door or an emergency stop does.
 
+use crate::actuator::Actuator;
 use crate::modbus::Device;
 
 /// The most digital inputs, and the most outputs: one bit each in a sample.
@@ -234,10 +235,33 @@ pub enum HomingMethod {
 /// What a drive is told that finds its reference by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DriveHoming {
-    /// The number of its method, by CiA 402.
+    /// The number of its method, by CiA 402, as the axis counts.
     pub method: i8,
     /// Acceleration of its motion [m/s² or rad/s²].
     pub acceleration: f64,
+}
+
+impl DriveHoming {
+    /// The number of the method that `actuator`'s drive is told: a mirrored one counts against its axis.
+    pub fn method_of(&self, actuator: &Actuator) -> i8 {
+        let mirrored = Self::mirrored(self.method).filter(|_| actuator.ratio < 0.0);
+        mirrored.unwrap_or(self.method)
+    }
+
+    /// The number of the `method` with lower and upper exchanged; `None` where none is known.
+    pub fn mirrored(method: i8) -> Option<i8> {
+        // Pairs of CiA 402-2, 11.3: those of 1 to 14 are by an index pulse, those of 17 to 30 the same without.
+        match method {
+            1 | 17 | 33 => Some(method + 1),
+            2 | 18 | 34 => Some(method - 1),
+            3 | 4 | 19 | 20 => Some(method + 2),
+            5 | 6 | 21 | 22 => Some(method - 2),
+            7..=10 | 23..=26 => Some(method + 4),
+            11..=14 | 27..=30 => Some(method - 4),
+            35 | 37 => Some(method),
+            _ => None,
+        }
+    }
 }
 
 /// What an emergency stop does, by the categories of IEC 60204-1.

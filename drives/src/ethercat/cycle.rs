@@ -4,7 +4,7 @@ use ethercrab::{Command, SubDeviceState};
 use machine::Machine;
 use machine::drives::Ethercat;
 use machine::operating::HomingMethod;
-use messages::{CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, Nanoseconds};
+use messages::{CommandMode, Fault, FaultCode, FaultQuantity, LaserCycle, MAX_AXES, Nanoseconds};
 
 use super::cia402::Wanted;
 use super::digital::Digital;
@@ -104,8 +104,7 @@ impl BusCycle {
             let joint = machine.home_joints.get(actuator.axis).copied().unwrap_or(0.0);
             let homing = machine.operating.homing(actuator.axis);
             let homing = homing.filter(|homing| homing.method == HomingMethod::Drive);
-            let reference = homing.map(|homing| homing.position / actuator.ratio);
-            Drive::new(facts.clone(), actuator, joint / actuator.ratio, reference, period)
+            Drive::new(facts.clone(), actuator, joint / actuator.ratio, homing, period)
         });
         let drives = drives.collect();
         let fired =
@@ -353,6 +352,7 @@ impl BusCycle {
                 lost.get_or_insert((index, status));
             }
         }
+        self.refer();
         self.inputs = self.digital.active(&self.network, &self.drives);
         if let Some((index, error)) = faulty
             && self.mode != CommandMode::Disabled
@@ -366,6 +366,18 @@ impl BusCycle {
         {
             let fault = Fault::new(FaultCode::HomingFailed).on_actuator(index);
             self.fault = fault.with(FaultQuantity::HomingStatus, f64::from(status));
+        }
+    }
+
+    /// The drives of an axis tell their places from the references that they have found by themselves, as soon as all of
+    /// them have.
+    fn refer(&mut self) {
+        for axis in 0..MAX_AXES {
+            let own = |drive: &&mut Drive| drive.axis == axis;
+            if self.drives.iter().any(|it| it.axis == axis && !it.has_found()) {
+                continue;
+            }
+            self.drives.iter_mut().filter(own).for_each(Drive::refer);
         }
     }
 

@@ -9,6 +9,10 @@ use super::homing::{Heard, Homing};
 use super::image::{Said, Told};
 use super::network::DriveFacts;
 use crate::port::Actuation;
+use machine::operating::Homing as Search;
+
+/// How much farther than its speed takes it a drive that looks for its reference may come in a cycle: by a late frame.
+const MOST_STEP: f64 = 2.0;
 
 /// The drive of an actuator.
 #[derive(Debug, Clone)]
@@ -26,9 +30,13 @@ pub(super) struct Drive {
     zero: Option<i64>,
     /// Position without the wrap of its 32 bits [counts].
     counts: i64,
+    /// The axis that it moves.
+    pub(super) axis: usize,
     homing: Homing,
     /// The angle of the reference that it finds by itself, if it does [rad].
     reference: Option<f64>,
+    /// The most that it moves in a cycle while it looks for that [counts].
+    most: u64,
     /// Whether it has failed to.
     is_lost: bool,
     said: Said,
@@ -36,26 +44,31 @@ pub(super) struct Drive {
 }
 
 impl Drive {
-    /// The drive that told `facts`, of an actuator that stands at `home` [rad], in cycles of `period`; the angle of its
-    /// `reference`, if it finds that by itself [rad].
+    /// The drive that told `facts`, of an actuator that stands at `home` [rad], in cycles of `period`; how it looks for its
+    /// reference by itself, if it does.
     pub(super) fn new(
         facts: DriveFacts,
         actuator: &Actuator,
         home: f64,
-        reference: Option<f64>,
+        looks: Option<&Search>,
         period: Nanoseconds,
     ) -> Self {
+        let resolution = actuator.encoder.resolution();
+        let counts = |joint: f64| (joint / (actuator.ratio * resolution)).abs();
+        let most = looks.map_or(0.0, |it| MOST_STEP * counts(it.speed) * period.seconds());
         Self {
             facts,
             mode: actuator.mode,
             code: cia402::mode(actuator.mode).map_or(0, |(code, _)| code),
-            resolution: actuator.encoder.resolution(),
+            resolution,
             torque_constant: actuator.motor.dc().map_or(1.0, |motor| motor.torque_constant),
             home,
             zero: None,
             counts: 0,
+            axis: actuator.axis,
             homing: Homing::new(period),
-            reference,
+            reference: looks.map(|it| it.position / actuator.ratio),
+            most: most.ceil() as u64,
             is_lost: false,
             said: Said::default(),
             told: Told::default(),
@@ -171,20 +184,32 @@ impl Drive {
                 self.zero = Some(self.counts);
             }
             Some(_) => {
-                let moved = said.position.wrapping_sub(self.counts as i32);
-                self.counts += i64::from(moved);
+                let moved = i64::from(said.position.wrapping_sub(self.counts as i32));
+                self.counts += moved;
+                // A drive that has found its reference counts from there on before it says so: what is more than it can
+                // have moved is that, and the place is told as before until all drives of the axis have found theirs.
+                if self.homing.is_away() && moved.unsigned_abs() > self.most {
+                    self.zero = self.zero.map(|zero| zero + moved);
+                }
             }
         }
         match self.homing.hear(&said, self.code) {
-            Heard::Nothing => {}
-            Heard::Found => {
-                // From here on it tells places from its reference.
-                self.counts = i64::from(said.position);
-                self.zero = Some(0);
-                self.home = self.reference.unwrap_or(self.home);
-            }
+            Heard::Nothing | Heard::Found => {}
             Heard::Failed => self.is_lost = true,
         }
         self.said = said;
+    }
+
+    /// Whether it has found its reference by itself, and waits.
+    pub(super) fn has_found(&self) -> bool {
+        self.homing.has_found()
+    }
+
+    /// From here on it tells places from the reference that it has found.
+    pub(super) fn refer(&mut self) {
+        self.counts = i64::from(self.said.position);
+        self.zero = Some(0);
+        self.home = self.reference.unwrap_or(self.home);
+        self.homing.leave();
     }
 }

@@ -1,13 +1,14 @@
 //! How a drive finds its reference by itself (CiA 402-2, homing mode), seen from the bus.
 //!
 //! ```text
-//! Following ──asked──► Entering ──6061h = 6──► Looking ──found──► Leaving ──6061h = the mode before──► Done
-//!     ▲                    │                      │ taken back       ▲                                  │
-//!     │                    └──taken back──► Leaving    └─► Halting ──┘                                  │
-//!     └───────────────────────────────────taken back────────────────────────────────────────────────────┘
+//! Following ──asked──► Entering ──6061h = 6──► Looking ──found──► Found ──►  Leaving ──6061h = the mode before──► Done
+//!     ▲                    │                      │ taken back                ▲                                  │
+//!     │                    └──taken back──► Leaving    └────────► Halting ────┘                                  │
+//!     └───────────────────────────────────taken back─────────────────────────────────────────────────────────────┘
 //! ```
 //!
-//! Until it has come back to its mode, its target is where it is.
+//! Of an axis with several drives those that have found theirs wait, at rest, for the others: places that are told from
+//! the reference by one and not yet by another would be of no axis. Until it has come back to its mode, its target is where it is.
 
 use messages::Nanoseconds;
 
@@ -39,6 +40,7 @@ enum Phase {
     Following,
     Entering(u32),
     Looking(u32),
+    Found,
     Halting(u32),
     Leaving(u32),
     Done,
@@ -49,7 +51,7 @@ enum Phase {
 pub(super) enum Heard {
     /// Nothing more.
     Nothing,
-    /// Its position counts from its reference from now on.
+    /// It has found its reference.
     Found,
     /// It has given up, or does not do as it is told.
     Failed,
@@ -82,15 +84,27 @@ impl Homing {
         self.phase = match (self.phase, asked) {
             (Phase::Following, true) => Phase::Entering(0),
             (Phase::Done, false) => Phase::Following,
-            (Phase::Entering(_), false) => Phase::Leaving(0),
+            (Phase::Entering(_) | Phase::Found, false) => Phase::Leaving(0),
             (Phase::Looking(_), false) => Phase::Halting(0),
             (phase, _) => phase,
         };
         match self.phase {
             Phase::Following | Phase::Done | Phase::Leaving(_) => (0, None),
             Phase::Entering(_) => (0, Some(MODE)),
-            Phase::Looking(_) => (START, Some(MODE)),
+            Phase::Looking(_) | Phase::Found => (START, Some(MODE)),
             Phase::Halting(_) => (HALT, Some(MODE)),
+        }
+    }
+
+    /// Whether it has found its reference, and waits.
+    pub(super) fn has_found(&self) -> bool {
+        self.phase == Phase::Found
+    }
+
+    /// It waits no longer.
+    pub(super) fn leave(&mut self) {
+        if self.has_found() {
+            self.phase = Phase::Leaving(0);
         }
     }
 
@@ -117,7 +131,7 @@ impl Homing {
             }
             Phase::Looking(_) if said.status & ATTAINED != 0 && is_at_rest => {
                 heard = Heard::Found;
-                Phase::Leaving(0)
+                Phase::Found
             }
             Phase::Halting(answers)
                 if answers >= ANSWERED && is_at_rest || answers >= self.rest =>
@@ -169,6 +183,13 @@ mod tests {
             assert_eq!(homing.ask(true), (0x10, Some(6)));
         }
         assert_eq!(homing.hear(&said(6, 0x1637), 8), Heard::Found);
+        // It waits for whoever looks beside it.
+        for _ in 0..20 {
+            assert_eq!(homing.ask(true), (0x10, Some(6)));
+            assert_eq!(homing.hear(&said(6, 0x1637), 8), Heard::Nothing);
+            assert!(homing.has_found() && homing.is_away());
+        }
+        homing.leave();
         assert_eq!((homing.ask(true), homing.is_away()), ((0, None), true));
         for _ in 0..=ANSWERED {
             assert_eq!(homing.hear(&said(8, 0x1237), 8), Heard::Nothing);

@@ -329,7 +329,8 @@ async fn set_up_homing<S>(
 where
     S: core::ops::Deref<Target = ethercrab::SubDevice>,
 {
-    let DriveHoming { method, acceleration } = homing.drive;
+    let DriveHoming { acceleration, .. } = homing.drive;
+    let method = homing.drive.method_of(actuator);
     let refused = |found: String| PortError::Mismatch {
         found,
         expected: format!(

@@ -30,16 +30,6 @@ pub(super) fn drive_homing(
         return None;
     }
     let (span, name) = (table.method.span, &axis.name);
-    if actuators.len() > 1 {
-        diagnostics.contradict(
-            span,
-            format!(
-                "axis `{name}` has {} drives, which would look for it without each other",
-                actuators.len()
-            ),
-            "home it by a `switch` at each of them",
-        );
-    }
     if actuators.iter().any(|actuator| actuator.mode == ActuatorMode::Voltage) {
         diagnostics.contradict(
             span,
@@ -53,7 +43,7 @@ pub(super) fn drive_homing(
             table.span,
             format!("nothing is said of how the drive of axis `{name}` finds its reference"),
             Some(
-                "add `drive_method`, by CiA 402: 17 or 18 by a limit switch, 19 or 21 by the home switch, 33 or 34 by \
+                "add `drive_method`, by CiA 402: 17 or 18 by a limit switch, 19 to 22 by the home switch, 33 or 34 by \
                  the index pulse, 37 where it stands"
                     .to_owned(),
             ),
@@ -67,11 +57,25 @@ pub(super) fn drive_homing(
             "write a whole number, as 17 or 37",
         );
     }
+    let method = number.value as i8;
+    if DriveHoming::mirrored(method).is_none()
+        && let Some(actuator) = actuators.iter().find(|actuator| actuator.ratio < 0.0)
+    {
+        diagnostics.contradict(
+            number.span,
+            format!(
+                "`{}` is mirrored, and nothing is known of what the method {method} is the other way round",
+                actuator.name
+            ),
+            "write a method of CiA 402 from 1 to 37, or turn the drive's direction round in the drive and leave \
+             `mirrored` out",
+        );
+    }
     let acceleration = match &table.acceleration {
         Some(own) => unit.expect(own, name, diagnostics).then_some(own.value)?,
         None => speed / RISE,
     };
-    Some(DriveHoming { method: number.value as i8, acceleration })
+    Some(DriveHoming { method, acceleration })
 }
 
 /// Refuses axes that a drive shall home, of drives that cannot.

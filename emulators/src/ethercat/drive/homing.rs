@@ -15,6 +15,8 @@ pub enum Method {
     LimitIndex(Way),
     /// Where the home switch opens that is closed from its edge on in this direction.
     Switch(Way),
+    /// Where the same closes.
+    SwitchEdge(Way),
 }
 
 /// How a homing has ended.
@@ -52,7 +54,9 @@ impl Method {
             17 => Some(Self::Limit(Way::Down)),
             18 => Some(Self::Limit(Way::Up)),
             19 => Some(Self::Switch(Way::Up)),
+            20 => Some(Self::SwitchEdge(Way::Up)),
             21 => Some(Self::Switch(Way::Down)),
+            22 => Some(Self::SwitchEdge(Way::Down)),
             33 => Some(Self::Index(Way::Down)),
             34 => Some(Self::Index(Way::Up)),
             35 | 37 => Some(Self::Here),
@@ -66,6 +70,7 @@ impl Method {
 enum Stage {
     Approach(Way),
     Leave(Way),
+    Return(Way),
     Index(Way),
 }
 
@@ -80,11 +85,22 @@ pub enum Step {
     Failed,
 }
 
+/// What a homing does where its switch has opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum After {
+    /// That is home.
+    Nothing,
+    /// It goes back until the switch closes.
+    Return,
+    /// It goes on to the next index pulse.
+    Index,
+}
+
 /// A homing that is under way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Homing {
     stage: Option<Stage>,
-    index_after: bool,
+    after: After,
     /// Whether it is the home switch that is looked for, not a limit switch.
     by_switch: bool,
     revolution: i64,
@@ -97,13 +113,18 @@ impl Homing {
         let stage = match method {
             Method::Here => None,
             Method::Index(way) => Some(Stage::Index(way)),
-            Method::Limit(way) | Method::LimitIndex(way) | Method::Switch(way) => {
-                Some(Stage::Approach(way))
-            }
+            Method::Limit(way)
+            | Method::LimitIndex(way)
+            | Method::Switch(way)
+            | Method::SwitchEdge(way) => Some(Stage::Approach(way)),
         };
-        let by_switch = matches!(method, Method::Switch(_));
-        let index_after = matches!(method, Method::LimitIndex(_));
-        Self { stage, index_after, by_switch, revolution: revolution.max(1), before: counts }
+        let by_switch = matches!(method, Method::Switch(_) | Method::SwitchEdge(_));
+        let after = match method {
+            Method::LimitIndex(_) => After::Index,
+            Method::SwitchEdge(_) => After::Return,
+            _ => After::Nothing,
+        };
+        Self { stage, after, by_switch, revolution: revolution.max(1), before: counts }
     }
 
     /// Goes on at `counts` with these switches `closed`.
@@ -118,12 +139,13 @@ impl Homing {
             Stage::Approach(way) if switches.limit(way) => return Step::Failed,
             Stage::Leave(way) if switches.limit(other(way)) => return Step::Failed,
             Stage::Index(way) if switches.limit(way) => return Step::Failed,
-            Stage::Leave(way) if !closed(way) => {
-                if !self.index_after {
-                    return Step::Found(counts);
-                }
-                self.stage = Some(Stage::Index(other(way)));
-            }
+            Stage::Leave(way) if !closed(way) => match self.after {
+                After::Nothing => return Step::Found(counts),
+                After::Return => self.stage = Some(Stage::Return(way)),
+                After::Index => self.stage = Some(Stage::Index(other(way))),
+            },
+            Stage::Return(way) if closed(way) => return Step::Found(counts),
+            Stage::Return(way) if switches.limit(way) => return Step::Failed,
             Stage::Index(_) => {
                 let turns = [before, counts].map(|it| it.div_euclid(self.revolution));
                 if let [from, to] = turns
@@ -137,7 +159,7 @@ impl Homing {
         match self.stage {
             Some(Stage::Approach(way)) => Step::Move(way.sign(), true),
             Some(Stage::Leave(way)) => Step::Move(other(way).sign(), false),
-            Some(Stage::Index(way)) => Step::Move(way.sign(), false),
+            Some(Stage::Return(way) | Stage::Index(way)) => Step::Move(way.sign(), false),
             None => Step::Found(counts),
         }
     }
@@ -171,6 +193,9 @@ mod tests {
         assert_eq!(home(19, 1500, Some((700, Way::Up))), Some(698));
         assert_eq!(home(21, 1500, Some((-700, Way::Down))), Some(-698));
         assert_eq!(home(21, 1500, Some((700, Way::Down))), Some(702), "it stands on its switch");
+        assert_eq!(home(20, 1500, Some((700, Way::Up))), Some(700));
+        assert_eq!(home(22, 1500, Some((-700, Way::Down))), Some(-700));
+        assert_eq!(home(22, 1500, Some((700, Way::Down))), Some(700), "it stands on its switch");
         assert_eq!(home(1, 1500, None), Some(-1000));
         assert_eq!(home(2, 1500, None), Some(1000));
         assert_eq!(home(34, 5000, None), Some(1000));
