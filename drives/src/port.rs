@@ -20,8 +20,8 @@
 //! - [`Port::receive`] follows it. The measurement is that of this deadline, but for places, which may be older by the
 //!   [age](ActuatorProfile::age) that the port declares of each actuator; its `laser` tells what was fired
 //!   between the deadline before and this one, by our clock. A port waits for it within a time of its own,
-//!   a small part of the period. Where nothing came, it gives the measurement before as it was, and counts
-//!   that; from how many in a row on that is a fault is the port's to say.
+//!   a small part of the period. Where nothing came, it gives the measurement before, with places that go on at
+//!   the speed before for some cycles, as the motors do, and counts that; from how many in a row on that is a fault is the port's to say.
 //! - Where drives was too late for deadlines, it says so by [`Port::pass`] for each of them, before the send
 //!   of the one that it is in time for. Hardware has done by then what the next point asks of it.
 //! - The gate opens only inside a cycle whose actuation is [`Freshness::Fresh`]. With

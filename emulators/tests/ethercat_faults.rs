@@ -16,8 +16,14 @@ const WHEN: i64 = 1_400_000_000;
 /// How long the axes may take to rest [ns].
 const STOPPING: i64 = 300_000_000;
 
+/// How long a frame is on its way along the slaves at most [ns].
+const FLIGHT: i64 = 10_000;
+
 /// The first and the third drive, the gate, and the power.
 const SLAVES: [usize; 4] = [0, 2, 4, 5];
+
+/// What is counted of a kind of fault.
+type Count = fn(&LinkCounters) -> u64;
 
 /// What became of the job.
 struct Ended {
@@ -26,6 +32,8 @@ struct Ended {
     link: LinkCounters,
     /// How long after the event there was light for the last time [ns].
     lit_for: i64,
+    /// Light that no command had asked for [ns].
+    wrong: Vec<[i64; 2]>,
 }
 
 /// Marks the letters on `machine`, with `event` in the midst of them. The axes rest at the end.
@@ -37,6 +45,12 @@ fn disturbed(
     let at = bench.deadline.0 + WHEN;
     let played = job::play(bench, &job::letters(machine), Some((WHEN, Box::new(event))));
     let cable = &played.cable;
+    let asked = job::asked(&played.records, machine, machine.drives.gate_latency.0);
+    let most = played.resolution / 2 + FLIGHT;
+    let is_asked = |span: &[i64; 2]| {
+        asked.iter().any(|asked| span[0] + most >= asked[0] && span[1] <= asked[1] + most)
+    };
+    let wrong = cable.lit().into_iter().filter(|span| !is_asked(span)).collect();
     assert!(cable.lit().iter().any(|span| span[0] < at), "it is in the midst of the job");
     let now = drives::link::Link::now(cable);
     let places = || cable.with(|link, _| link.segment.plant().positions().to_vec());
@@ -49,6 +63,7 @@ fn disturbed(
         words: words(&played.report.fault, machine),
         link: played.drives.link,
         lit_for: cable.lit().last().map_or(0, |span| span[1]) - at,
+        wrong,
     }
 }
 
@@ -64,6 +79,7 @@ fn words(fault: &Fault, machine: &Machine) -> String {
 fn assert_stopped(ended: &Ended, machine: &Machine, words: &str) {
     assert!(!ended.completed);
     assert!(ended.words.contains(words), "{}", ended.words);
+    assert_eq!(ended.wrong, [[0; 2]; 0], "light that was not asked for");
     let machine::DrivesKind::Ethercat(bus) = &machine.drives.kind else { panic!("no bus") };
     assert!(ended.lit_for <= bus.watchdog.0, "lit for {} ns", ended.lit_for);
 }
@@ -106,13 +122,24 @@ fn a_slave_that_leaves_its_operational_state() {
 }
 
 #[test]
-fn one_in_a_hundred_frames_damaged_costs_no_order() {
+fn one_in_a_hundred_frames_lost_late_doubled_or_damaged_costs_no_job() {
     let machine = line::gantry("position");
-    let rates = Rates { corrupted: 0.01, ..Rates::default() };
-    let ended = disturbed(&machine, move |link, _| link.set_rates(rates));
-    assert!(ended.completed, "{}", ended.words);
-    // Most are refused by a slave, or come back as the answer to no question of this cycle.
-    let LinkCounters { lost, corrupted, bridged, .. } = ended.link;
-    assert!(corrupted > 0 && lost + corrupted > 10, "{:?}", ended.link);
-    assert_eq!(bridged, lost + corrupted);
+    let (part, delay) = (0.01, Nanoseconds(3_000_000));
+    // Most of the damaged are refused by a slave, or come back as the answer to no question of this cycle.
+    let kinds: [(&str, Rates, Count); 4] = [
+        ("lost", Rates { lost: part, ..Rates::default() }, |link| link.lost),
+        ("late", Rates { late: part, delay, ..Rates::default() }, |link| link.late),
+        ("doubled", Rates { duplicated: part, ..Rates::default() }, |link| link.duplicated),
+        ("damaged", Rates { corrupted: part, ..Rates::default() }, |link| {
+            link.corrupted + link.lost
+        }),
+    ];
+    for (kind, rates, count) in kinds {
+        let ended = disturbed(&machine, move |link, _| link.set_rates(rates));
+        assert!(ended.completed, "{kind}: {}", ended.words);
+        assert_eq!(ended.wrong, [[0; 2]; 0], "{kind}: light that was not asked for");
+        assert!(count(&ended.link) > 10, "{kind}: {:?}", ended.link);
+        let LinkCounters { lost, corrupted, bridged, .. } = ended.link;
+        assert_eq!(bridged, lost + corrupted, "{kind}");
+    }
 }

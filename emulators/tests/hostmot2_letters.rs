@@ -51,6 +51,17 @@ fn assert_marked(marks: &Marks) {
     assert!(all.iter().all(|error| *error <= ERROR), "{marks:#?}");
 }
 
+/// Asserts that the commands of the job mean the same as on the simulated machine of the same latencies: nothing is closed
+/// around what was measured.
+fn assert_simulated(played: &Played, machine: &Machine, plan: &Plan) {
+    let simulated = job::simulate(machine, plan);
+    assert_eq!(simulated.report.completed, 1, "{:?}", simulated.report.fault);
+    for targets in [false, true] {
+        let [own, other] = [&played.records, &simulated.records];
+        assert_eq!(job::digest(own, targets), job::digest(other, targets), "targets: {targets}");
+    }
+}
+
 /// How far the true marks are off [m], by the board alone and the delays of the laser.
 fn truth(played: &Played, machine: &Machine, artwork: &Artwork) -> f64 {
     let later = [machine.laser.on_delay, machine.laser.off_delay].map(Nanoseconds::from_seconds);
@@ -80,6 +91,8 @@ fn steppers_mark_the_letters() {
     for (lit, asked) in lit.iter().flatten().zip(asked.iter().flatten()) {
         assert!((lit - asked).abs() <= most, "an edge at {lit} ns instead of {asked}");
     }
+    assert_simulated(&played, &machine, &plan);
+
     let link = played.drives.link;
     assert_eq!((link.lost, link.late, link.duplicated, link.corrupted), (0, 0, 0, 0));
     assert!(link.sent > played.report.cycles && played.cable.bites().is_empty());
@@ -93,6 +106,7 @@ fn a_scan_head_marks_the_letters() {
     assert_marked(&judged(&played, &machine, &plan));
     let truth = truth(&played, &machine, &plan.artwork);
     assert!(truth <= ERROR, "{truth} m by the board");
+    assert_simulated(&played, &machine, &plan);
 }
 
 #[test]

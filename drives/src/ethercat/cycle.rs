@@ -72,6 +72,8 @@ pub struct BusCycle {
     stage: Stage,
     /// Cycles in a row without an answer of all slaves, and how many are a fault.
     silent: u64,
+    /// Cycles since the drives were heard.
+    unheard: u64,
     tolerated: u64,
     /// What that is as a fault: nobody answers, or some slaves do not take part.
     lack: f64,
@@ -123,6 +125,7 @@ impl BusCycle {
             period,
             stage: Stage::Starting(0),
             silent: 0,
+            unheard: 0,
             tolerated,
             lack: NO_ANSWER,
             fired,
@@ -191,10 +194,11 @@ impl BusCycle {
         self.put();
     }
 
-    /// The light of the cycle that ends here is told with the next measurement: what was not acknowledged may have
+    /// A cycle begins. The light of the one that ends here is told with the next measurement: what was not acknowledged may have
     /// been fired all the same, since outputs come before inputs.
     fn begin_light(&mut self, laser: LaserCycle) {
         self.fired.pass(&self.laser);
+        self.unheard = self.unheard.saturating_add(1);
         self.before = core::mem::replace(&mut self.laser, laser);
     }
 
@@ -277,7 +281,8 @@ impl BusCycle {
         }
         if is_measured {
             self.silent = 0;
-            self.take();
+            let cycles = core::mem::take(&mut self.unheard);
+            self.take(cycles);
         } else {
             self.wire.bridged();
             self.silent += 1;
@@ -337,14 +342,14 @@ impl BusCycle {
         }
     }
 
-    /// Takes in what the drives say.
-    fn take(&mut self) {
+    /// Takes in what the drives say, so many `cycles` after they were heard before.
+    fn take(&mut self, cycles: u64) {
         let Network { main, group, .. } = &self.network;
         let (mut faulty, mut lost) = (None, None);
         for (index, drive) in self.drives.iter_mut().enumerate() {
             let Ok(slave) = group.subdevice(main, drive.facts.slave) else { continue };
             let Some(said) = Said::read(slave.io_raw().inputs()) else { continue };
-            drive.hear(said);
+            drive.hear(said, cycles);
             if let Some(error) = drive.error() {
                 faulty.get_or_insert((index, error));
             }
@@ -386,13 +391,16 @@ impl BusCycle {
         let is_powered =
             is_ready && !self.drives.is_empty() && self.drives.iter().all(Drive::is_powered);
         measurement.power = if is_powered { Power::On } else { Power::Off };
+        // Who is not heard goes on at its speed, as drives do without a target.
+        let coasted = self.unheard.min(BORNE);
         for (index, drive) in self.drives.iter().enumerate() {
             if let (Some(counts), Some(position), Some(current)) = (
                 measurement.counts.get_mut(index),
                 measurement.position.get_mut(index),
                 measurement.current.get_mut(index),
             ) {
-                (*counts, *position, *current) = (drive.moved(), drive.position(), drive.current());
+                (*counts, *position) = (drive.moved(coasted), drive.position(coasted));
+                *current = drive.current();
             }
         }
         measurement.inputs = self.inputs;

@@ -30,6 +30,8 @@ pub(super) struct Drive {
     zero: Option<i64>,
     /// Position without the wrap of its 32 bits [counts].
     counts: i64,
+    /// How far it moved in a cycle when it was heard last [counts].
+    speed: f64,
     /// The axis that it moves.
     pub(super) axis: usize,
     homing: Homing,
@@ -65,6 +67,7 @@ impl Drive {
             home,
             zero: None,
             counts: 0,
+            speed: 0.0,
             axis: actuator.axis,
             homing: Homing::new(period),
             reference: looks.map(|it| it.position / actuator.ratio),
@@ -161,14 +164,16 @@ impl Drive {
         self.said.digital
     }
 
-    /// Counts since the first measurement, or from the reference that it has found by itself.
-    pub(super) fn moved(&self) -> i64 {
-        self.counts - self.zero.unwrap_or(self.counts)
+    /// Counts since the first measurement, or from the reference that it has found by itself, having gone on at its speed for
+    /// so many cycles since it was heard.
+    pub(super) fn moved(&self, coasted: u64) -> i64 {
+        let moved = self.counts - self.zero.unwrap_or(self.counts);
+        moved + (self.speed * coasted as f64).round() as i64
     }
 
-    /// The motor's angle [rad].
-    pub(super) fn position(&self) -> f64 {
-        self.home + self.moved() as f64 * self.resolution
+    /// The motor's angle, likewise [rad].
+    pub(super) fn position(&self, coasted: u64) -> f64 {
+        self.home + self.moved(coasted) as f64 * self.resolution
     }
 
     /// What flows in the motor [A].
@@ -176,8 +181,8 @@ impl Drive {
         f64::from(self.said.torque) * 1e-3 * self.facts.rated / self.torque_constant
     }
 
-    /// Takes in what it says.
-    pub(super) fn hear(&mut self, said: Said) {
+    /// Takes in what it says, so many `cycles` after it was heard before.
+    pub(super) fn hear(&mut self, said: Said, cycles: u64) {
         match self.zero {
             None => {
                 self.counts = i64::from(said.position);
@@ -188,8 +193,11 @@ impl Drive {
                 self.counts += moved;
                 // A drive that has found its reference counts from there on before it says so: what is more than it can
                 // have moved is that, and the place is told as before until all drives of the axis have found theirs.
-                if self.homing.is_away() && moved.unsigned_abs() > self.most {
+                if self.homing.is_away() && moved.unsigned_abs() > self.most.saturating_mul(cycles)
+                {
                     self.zero = self.zero.map(|zero| zero + moved);
+                } else {
+                    self.speed = moved as f64 / cycles.max(1) as f64;
                 }
             }
         }

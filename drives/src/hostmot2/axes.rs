@@ -273,13 +273,16 @@ impl Drive {
         (self.counts, self.position, self.speed) = (0, self.origin, 0.0);
     }
 
-    /// Counts from home, the motor's angle [rad] and its current [A].
-    pub fn measured(&self) -> (i64, f64, f64) {
+    /// Counts from home, the motor's angle [rad] and its current [A], having gone on at its speed for `coasted` [s] since
+    /// they were read.
+    pub fn measured(&self, coasted: f64) -> (i64, f64, f64) {
         let current = match &self.kind {
             DriveKind::Bridge { winding, .. } => winding.current(),
             _ => 0.0,
         };
-        (self.counts, self.position, current)
+        let way = self.speed * coasted;
+        let counts = self.counts + (way / self.resolution).round() as i64;
+        (counts, self.position + way, current)
     }
 }
 

@@ -20,7 +20,7 @@ use crate::watchdog::impossible_light;
 pub struct Counters {
     /// Requests.
     pub sent: u64,
-    /// Those without a reply in their cycle; the measurement before stood in.
+    /// Those without a reply in their cycle; places that go on at their speed stood in.
     pub lost: u64,
     /// Replies that came in a later cycle.
     pub late: u64,
@@ -145,7 +145,7 @@ impl Session {
     pub fn new(parts: Parts) -> Self {
         let grid = Grid::new(parts.clock.turn, parts.period.seconds());
         let mut measurement = Measurement::default();
-        fill(&mut measurement, &parts.drives);
+        fill(&mut measurement, &parts.drives, 0.0);
         Self {
             parts,
             grid,
@@ -207,7 +207,7 @@ impl Session {
         self.until = self.parts.link.now() + budget;
     }
 
-    /// Waits for the reply, and gives what it tells, or what was told before.
+    /// Waits for the reply, and gives what it tells, or where the motors are that went on at their speed.
     pub fn receive(&mut self, measurement: &mut Measurement) {
         let mut answered = false;
         while !answered {
@@ -223,7 +223,9 @@ impl Session {
                 self.stop(Trouble::Silent);
             }
         }
-        fill(&mut self.measurement, &self.parts.drives);
+        // What is not told goes on at its speed.
+        let coasted = f64::from(self.elapsed.min(SILENT_CYCLES)) * self.parts.period.seconds();
+        fill(&mut self.measurement, &self.parts.drives, coasted);
         self.measurement.power =
             if self.mode == CommandMode::Disabled { Power::Off } else { Power::On };
         self.measurement.laser = self.parts.fired.take();
@@ -494,10 +496,10 @@ fn bit(unit: u32) -> u32 {
     1_u32.checked_shl(unit).unwrap_or(0)
 }
 
-/// Puts what the drives have measured into `measurement`.
-fn fill(measurement: &mut Measurement, drives: &[Drive]) {
+/// Puts what the drives have measured into `measurement`, and that they went on for `coasted` [s] since.
+fn fill(measurement: &mut Measurement, drives: &[Drive], coasted: f64) {
     for (row, drive) in drives.iter().enumerate() {
-        let (counts, position, current) = drive.measured();
+        let (counts, position, current) = drive.measured(coasted);
         let places = (
             measurement.counts.get_mut(row),
             measurement.position.get_mut(row),
