@@ -121,7 +121,7 @@ fn a_pin_that_is_taken_or_not_there_is_named() {
 #[test]
 fn a_pin_of_nothing_a_switch_without_one_and_an_index_pulse_are_refused() {
     let without = machine(&PINS.replace("estop = { pin = 42 }", "")).expect_err("refused");
-    assert!(without.contains("nothing is said of the pin of the input `estop`"), "{without}");
+    assert!(without.contains("nothing is said of where the input `estop` is"), "{without}");
     let unknown = machine(&format!("{PINS}dorr = {{ pin = 12 }}\n")).expect_err("refused");
     assert!(unknown.contains("the machine has no output `dorr`"), "{unknown}");
     let index = PINS.replace("function = \"door\"", "function = \"index\"\naxis = \"x\"");

@@ -155,7 +155,7 @@ pub struct Ethercat {
 }
 
 /// A bit of what a slave exchanges.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct EthercatBit {
     /// Its position on the bus.
     pub slave: u16,

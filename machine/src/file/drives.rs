@@ -1,6 +1,7 @@
 //! From the table of the drives to [`Drives`], and what each actuator's drive is.
 
 pub mod ethercat;
+mod ethercat_wiring;
 pub mod hostmot2;
 pub mod simulated;
 mod wiring;
@@ -145,7 +146,7 @@ pub(super) fn build(
             hostmot2::connect(table, card, (operating, switched), diagnostics);
         }
         (DrivesTable { ethercat: Some(table), .. }, DrivesKind::Ethercat(bus)) => {
-            wiring::connect(table, bus, (operating, switched), diagnostics);
+            ethercat_wiring::connect(table, bus, (operating, switched), diagnostics);
         }
         _ => {}
     }

@@ -1,10 +1,9 @@
 //! An FPGA card with HostMot2 firmware as drives.
 
-use super::{Age, Built, Latency, each, find, refuse_index, refuse_others, times, whole};
+use super::wiring::Wiring;
+use super::{Age, Built, Latency, each, refuse_index, times, whole};
 use crate::actuator::Actuator;
-use crate::document::{
-    Diagnostics, Named, NonNegative, Number, Positive, ProblemKind, Quantity, Span, Spanned,
-};
+use crate::document::{Diagnostics, Named, NonNegative, Number, Positive, Quantity, Spanned};
 use crate::drives::{DrivesKind, Hostmot2, Hostmot2Actuator, Xy2Frame};
 use crate::operating::Operating;
 use crate::quantity::{Angle, Duration};
@@ -166,33 +165,15 @@ pub(super) fn connect(
     diagnostics: &mut Diagnostics,
 ) {
     refuse_index(operating, "pin of a card", table.span, diagnostics);
-    let inputs: Vec<&str> = operating.inputs.iter().map(|input| input.name.as_str()).collect();
-    let outputs: Vec<&str> = operating.outputs.iter().map(|output| output.name.as_str()).collect();
-    let [wired_in, wired_out] = [table.inputs.as_ref(), table.outputs.as_ref()];
-    let inputs = pins((wired_in, "input", table.span), &inputs, &[], diagnostics);
-    card.inputs = inputs.into_iter().flatten().collect();
-    card.outputs = pins((wired_out, "output", table.span), &outputs, switched, diagnostics);
-}
-
-/// The pin of each of `names`, as `tables`, of which there should be some at `span`, have them; those in `elsewhere`
-/// need none.
-fn pins(
-    (tables, kind, span): (Option<&Named<Hostmot2PinTable>>, &str, Span),
-    names: &[&str],
-    elsewhere: &[&str],
-    diagnostics: &mut Diagnostics,
-) -> Vec<Option<u32>> {
-    refuse_others(tables, kind, names, diagnostics);
-    let pin = |name: &&str| match find(tables, name) {
-        Some(table) => Some(whole(&table.pin, LAST_CHANNEL, diagnostics)),
-        None if elsewhere.contains(name) => None,
-        None => {
-            // A switch that nobody reads would never be active.
-            let message = format!("nothing is said of the pin of the {kind} `{name}`");
-            let help = Some(format!("add [drives.hostmot2.{kind}s.{name}] with its `pin`"));
-            diagnostics.refuse(ProblemKind::MissingKey, span, message, help);
-            Some(0)
-        }
+    let wiring = Wiring {
+        drives: "hostmot2",
+        keys: "`pin`",
+        span: table.span,
+        inputs: table.inputs.as_ref(),
+        outputs: table.outputs.as_ref(),
     };
-    names.iter().map(pin).collect()
+    let pin = |table: &Hostmot2PinTable, diagnostics: &mut Diagnostics| {
+        whole(&table.pin, LAST_CHANNEL, diagnostics)
+    };
+    (card.inputs, card.outputs) = wiring.places(operating, switched, pin, diagnostics);
 }
