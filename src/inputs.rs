@@ -101,6 +101,11 @@ impl MachineSource {
         }
     }
 
+    /// The name of the file that the machine file has at the dotted `key`, without the changes of `--set`.
+    pub fn file_at(&self, key: &str) -> Option<String> {
+        Machine::file_at(self.file().1, key)
+    }
+
     /// The path of the machine file, as it holds from anywhere; `None` for the built-in machine.
     pub fn path(&self) -> Option<PathBuf> {
         let path = &self.file.as_ref()?.path;

@@ -103,3 +103,38 @@ fn the_same_is_chosen_every_time() {
     let one = place.graver(&[&arguments[..], &["--axis", "y"]].concat()).json(0);
     assert!(one["axes"][0]["chosen"].is_null() && !one["axes"][1]["chosen"].is_null());
 }
+
+#[test]
+fn the_machine_that_is_written_elsewhere_names_the_same_files() {
+    let place = Place::new();
+    let text = std::fs::read_to_string(source("machines/cartesian.toml")).unwrap();
+    let below = |name: &str, text: &str| {
+        std::fs::create_dir_all(place.path(name).parent().unwrap()).unwrap();
+        place.file(name, text)
+    };
+    let mut mesh = "x [mm],y [mm],dx [um],dy [um]\n".to_owned();
+    for (row, y) in [0, 100, 200].into_iter().enumerate() {
+        for (column, x) in [0, 100, 200].into_iter().enumerate() {
+            mesh += &format!("{x},{y},{},{}\n", 3 * row, 2 * column);
+        }
+    }
+    let [job, mesh, out] = [
+        below("jobs/s.toml", "letters.text = \"S\"\n"),
+        below("measured/mesh.csv", &mesh),
+        below("new/cartesian.toml", ""),
+    ];
+    let text = text.replace("../jobs/letters.toml", "../jobs/s.toml");
+    let text = format!("{text}\n[frame.mesh]\nfile = \"../measured/mesh.csv\"\n");
+    let machine =
+        below("machines/deep/of/it/cartesian.toml", &text.replace("\"../", "\"../../../../"));
+    let [machine, out] = [&machine, &out].map(|path| path.to_str().unwrap());
+    std::fs::remove_file(out).unwrap();
+    place.graver(&["size", "--machine", machine, "--out", out, "--json"]).json(0);
+    let written = std::fs::read_to_string(out).unwrap();
+    for (key, file) in [("sample", "../jobs/s.toml"), ("file", "../measured/mesh.csv")] {
+        assert!(written.contains(&format!("{key} = \"{file}\"")), "{written}");
+    }
+    assert!(job.exists() && mesh.exists());
+    let marked = place.graver(&["simulate", "--machine", out, "--json"]).json(0);
+    assert_eq!(marked["job"]["name"], "S");
+}

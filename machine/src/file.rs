@@ -32,10 +32,13 @@ const PREFIX: &str = "machine.";
 /// What stands before the keys that are other in the simulated plant, `--set plant.KEY=VALUE`.
 const PLANT_PREFIX: &str = "plant.";
 
-/// The keys that name a file beside the machine file.
-const FILES: [&str; 1] = ["frame.mesh.file"];
-
 impl Machine {
+    /// The keys that name a file beside the machine file which is a part of it.
+    pub const FILES: [&str; 1] = ["frame.mesh.file"];
+
+    /// The key that names the sample job.
+    pub const SAMPLE: &str = "job.sample";
+
     /// Reads the machine file at `path` and the files that it names, with `overrides` laid over it.
     ///
     /// # Errors
@@ -69,7 +72,12 @@ impl Machine {
     ) -> Vec<String> {
         let file = text.map(|text| ("", text));
         let Ok(document) = laid_over(file, overrides, plant) else { return Vec::new() };
-        FILES.iter().filter_map(|key| document.text_at(key)).map(str::to_owned).collect()
+        Self::FILES.iter().filter_map(|key| document.text_at(key)).map(str::to_owned).collect()
+    }
+
+    /// The name that the machine file with this `text` has at the dotted `key`; `None` of one that is no TOML.
+    pub fn file_at(text: &str, key: &str) -> Option<String> {
+        Document::parse("", text).ok()?.text_at(key).map(str::to_owned)
     }
 
     /// Reads a machine file from `text`; `file` is its path, beside which the files that it names are read, and its

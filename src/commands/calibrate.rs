@@ -31,7 +31,8 @@ pub fn run(arguments: &CalibrateArguments) -> Result<Exit, Failure> {
         let (_, text) = input.source.file();
         let written = write::machine_file(text, &report, &free).map_err(Failure::bad_input)?;
         // What is written must be sound.
-        Machine::parse(&out.display().to_string(), &written, &[])?;
+        let moved = super::size::moved(&input, &written, out)?;
+        Machine::parse(&out.display().to_string(), &moved, &[])?;
         let sources = [arguments.measurements.clone()];
         let mut sources = Sources::new(arguments.machine.machine.as_deref(), &sources);
         super::size::write_machine(&input, &written, out, &mut sources)?;

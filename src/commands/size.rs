@@ -7,6 +7,7 @@ use crate::exit::{Exit, Failure};
 use crate::files::Sources;
 use crate::inputs::{MachineInput, Overrides};
 use crate::{commands::figures, inputs, output};
+use machine::Machine;
 use std::io::Write;
 use std::path::{Component, Path, PathBuf};
 use workbench::catalogue::{self, Catalogue};
@@ -114,27 +115,42 @@ pub(crate) fn catalogue(names: &[String]) -> Result<(Catalogue, Vec<PathBuf>), F
     Ok((all, files))
 }
 
-/// Writes the machine file with what was found to `out`; its sample job is named from there.
+/// Writes the machine file with what was found to `out`.
 pub(super) fn write_machine(
     input: &MachineInput,
     machine: &str,
     out: &Path,
     sources: &mut Sources,
 ) -> Result<(), Failure> {
-    let sample = sample_from(input, out);
-    let text = write::with_sample(machine, sample.as_deref()).map_err(Failure::bad_input)?;
+    let text = moved(input, machine, out)?;
     let mut file = sources.create("--out", out)?;
     file.write_all(text.as_bytes())
         .map_err(|error| Failure::output(format!("{}: {error}", out.display())))
 }
 
-/// The sample job of the machine, by its path from the folder of `out`.
-fn sample_from(input: &MachineInput, out: &Path) -> Option<String> {
-    let sample = input.folder.as_ref()?.join(input.machine.sample_job.as_ref()?);
+/// `machine`, the text of a machine file in the folder of `input`, as it stands at `out`: it names the same files. A
+/// sample job that cannot be found is left out.
+pub(super) fn moved(input: &MachineInput, machine: &str, out: &Path) -> Result<String, Failure> {
+    let sample = input.machine.sample_job.as_ref().map(|sample| sample.display().to_string());
+    let sample = sample.map(|name| (Machine::SAMPLE, name_from(input, &name, out)));
+    // What cannot be found would have been refused.
+    let files = Machine::FILES.into_iter().filter_map(|key| {
+        let name = input.source.file_at(key)?;
+        Some((key, Some(name_from(input, &name, out).unwrap_or(name))))
+    });
+    let names: Vec<(&str, Option<String>)> = files.chain(sample).collect();
+    write::with_files(machine, &names).map_err(Failure::bad_input)
+}
+
+/// The file that the machine file calls `name`, by its path from the folder of `out`.
+fn name_from(input: &MachineInput, name: &str, out: &Path) -> Option<String> {
+    if Path::new(name).is_absolute() {
+        return Some(name.to_owned());
+    }
+    let path = input.folder.as_ref()?.join(name).canonicalize().ok()?;
     let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
-    let sample = sample.canonicalize().ok()?;
-    Some(relative(&folder, &sample).display().to_string())
+    Some(relative(&folder, &path).display().to_string())
 }
 
 /// `path` as it is called from `folder`, both absolute.

@@ -34,20 +34,23 @@ pub fn machine_file(
     Ok(document.to_string())
 }
 
-/// `text` with the sample job at `sample`, or without one.
+/// `text` with each of these dotted keys naming another file, or none.
 ///
 /// # Errors
 /// A text that is not TOML.
-pub fn with_sample(text: &str, sample: Option<&str>) -> Result<String, SizeError> {
+pub fn with_files(text: &str, names: &[(&str, Option<String>)]) -> Result<String, SizeError> {
     let mut document: DocumentMut =
         text.parse().map_err(|error: toml_edit::TomlError| SizeError::Write(error.to_string()))?;
-    match sample {
-        None => {
-            document.remove("job");
-        }
-        Some(sample) => {
-            if let Some(job) = document.get_mut("job").and_then(Item::as_table_like_mut) {
-                set(job, "sample", Value::from(sample));
+    for (key, name) in names {
+        let Some((path, last)) = key.rsplit_once('.') else { continue };
+        let root: Option<&mut dyn TableLike> = Some(document.as_table_mut());
+        let table =
+            path.split('.').fold(root, |table, key| table?.get_mut(key)?.as_table_like_mut());
+        let Some(table) = table.filter(|table| table.contains_key(last)) else { continue };
+        match name {
+            Some(name) => set(table, last, Value::from(name.as_str())),
+            None => {
+                table.remove(last);
             }
         }
     }
