@@ -30,6 +30,7 @@ macro_rules! by_joints {
         }
 
         /// Its solved chain.
+        #[allow(clippy::large_enum_variant, reason = "it is copied without an allocation")]
         #[derive(Debug, Clone, Copy)]
         enum $chain {
             $( $variant(<$mechanism as Mechanism<$joints>>::ChainState), )*
