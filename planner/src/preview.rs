@@ -12,7 +12,7 @@ use crate::error::PlanError;
 use crate::geometry::contour::{Contour, GAP};
 use crate::geometry::operation::{Operation, OperationKind};
 use crate::job::Job;
-use crate::planning::run::{operations, path_limits};
+use crate::planning::run::{path_limits, unplanned};
 use simplified::{FINEST, Simplified};
 
 /// What a job draws, by no more points than were asked for.
@@ -44,7 +44,7 @@ pub struct PreviewLine {
 /// # Errors
 /// A job that cannot be read on, or a place beyond an edge of its surface.
 pub fn preview(machine: &Machine, job: &Job, most: usize) -> Result<Preview, PlanError> {
-    let mut queue = operations(machine, job, &path_limits(machine, job))?;
+    let mut queue = unplanned(machine, job, &path_limits(machine, job))?;
     let mut pen = Pen::new(job.drawing.start, most);
     let mut number = 0;
     while let Some(operation) = queue.get(number)? {
@@ -76,7 +76,7 @@ pub(crate) enum NoOutline {
 pub(crate) fn flat_bounds(machine: &Machine, job: &Job) -> Result<Option<Bounds>, NoOutline> {
     let flat = Job { surface: None, ..job.clone() };
     let mut queue =
-        operations(machine, &flat, &path_limits(machine, job)).map_err(NoOutline::Refused)?;
+        unplanned(machine, &flat, &path_limits(machine, job)).map_err(NoOutline::Refused)?;
     let mut bounds = None;
     let mut number = 0;
     while let Some(operation) = queue.get(number).map_err(NoOutline::Refused)? {

@@ -65,6 +65,21 @@ pub(crate) struct Joining {
     pub(crate) tolerance: f64,
     /// The limits that a constant speed must keep in a rounded corner.
     pub(crate) limits: PathLimits,
+    /// The speed that is asked for before and after the joint, where it is [m/s].
+    pub(crate) asked: Option<f64>,
+    /// The speed that a corner of lines that leave it open must allow [m/s].
+    pub(crate) open: f64,
+}
+
+/// How a curve goes on from a contour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Joint {
+    /// Without a stop: it is part of the contour now.
+    Passed,
+    /// It does not.
+    Ends,
+    /// It would at this speed, which is less than open lines have [m/s].
+    Slower(f64),
 }
 
 /// Curves that are gone in one go.
@@ -90,6 +105,20 @@ pub(crate) struct Contour {
     is_flown: bool,
     /// How the tool is turned along it, and where on that it begins [m]; `None` where it says nothing.
     turning: Option<(Arc<Turning>, f64)>,
+}
+
+impl Joining {
+    /// Whether the corner that `blend` rounds can be passed at the one speed of both sides.
+    fn at_one_speed(&self, blend: &Blend) -> Joint {
+        let PathLimits { speed, acceleration, jerk, .. } = self.limits;
+        let most = blend.sharpest(blend.room).speed(acceleration, jerk);
+        match self.asked {
+            Some(asked) if most >= asked.min(speed) => Joint::Passed,
+            Some(_) => Joint::Ends,
+            None if most >= self.open.min(speed) => Joint::Passed,
+            None => Joint::Slower(most),
+        }
+    }
 }
 
 impl Contour {
@@ -140,11 +169,11 @@ impl Contour {
     }
 
     /// Goes on with `track` and its `demands`, counted from its start, if it starts where the contour
-    /// ends and the corner between them may be passed without a stop. Says whether it does.
-    pub(crate) fn extend(&mut self, track: &Track, demands: &[Demand], joining: &Joining) -> bool {
+    /// ends and the corner between them may be passed without a stop.
+    pub(crate) fn extend(&mut self, track: &Track, demands: &[Demand], joining: &Joining) -> Joint {
         let (before, after) = (self.end(), track.at(0.0));
         if (after.point - before.point).norm() > GAP {
-            return false;
+            return Joint::Ends;
         }
         let cosine = before.first.normalize().dot(&after.first.normalize());
         // The first and last curve of a contour have no other joint to leave room for, but may get
@@ -156,27 +185,19 @@ impl Contour {
         let blend = Blend::new(&before, &after, room, joining.tolerance / nearer, &joining.limits);
         // A direction that is no number goes on into nothing.
         if cosine < CORNER || cosine.is_nan() {
-            let passes = joining.rounds
-                && cosine > REVERSAL
-                && (self.policy == Policy::Proportional || self.is_even(&blend, demands, joining));
-            if !passes {
-                return false;
+            if !joining.rounds || cosine <= REVERSAL || cosine.is_nan() {
+                return Joint::Ends;
+            }
+            let found = match self.policy {
+                Policy::Proportional => Joint::Passed,
+                Policy::Constant => joining.at_one_speed(&blend),
+            };
+            if found != Joint::Passed {
+                return found;
             }
         }
         self.append(track, blend, demands);
-        true
-    }
-
-    /// Whether the corner that `blend` rounds can be passed at the speed asked for on both sides.
-    fn is_even(&self, blend: &Blend, demands: &[Demand], joining: &Joining) -> bool {
-        let limits = &joining.limits;
-        let asked = |demand: Option<&Demand>| demand.and_then(|demand| demand.speed);
-        let speed = asked(self.demands.last())
-            .into_iter()
-            .chain(asked(demands.first()))
-            .fold(0.0, f64::max);
-        let speed = if speed > 0.0 { speed.min(limits.speed) } else { limits.speed };
-        blend.sharpest(blend.room).speed(limits.acceleration, limits.jerk) >= speed
+        Joint::Passed
     }
 
     fn append(&mut self, track: &Track, blend: Blend, demands: &[Demand]) {
@@ -439,8 +460,8 @@ mod tests {
         let tolerance = 5e-6;
         let limits =
             PathLimits { speed: 0.1, rapid: 0.2, acceleration: 5.0, jerk: 500.0, tolerance };
-        let joining = Joining { rounds: true, tolerance, limits };
+        let joining = Joining { rounds: true, tolerance, limits, asked: None, open: limits.speed };
         let mut contour = Contour::new(tracks[0].clone(), &[demand], Policy::Proportional);
-        assert!(!contour.extend(&tracks[1], &[demand], &joining));
+        assert_eq!(contour.extend(&tracks[1], &[demand], &joining), Joint::Ends);
     }
 }

@@ -19,7 +19,7 @@ use rasters::{Extent, RowStep};
 use super::operation::{Dot, OffSurface, Operation, OperationKind};
 use crate::drawing::{Action, Corners, Curve, Note, Power, Step};
 use crate::geometry::bezier;
-use crate::geometry::contour::{Contour, Demand, GAP, Joining};
+use crate::geometry::contour::{Contour, Demand, GAP, Joining, Joint};
 use crate::geometry::polyline::{Chord, Polyline, goes_straight};
 use crate::geometry::posed_path::PosedPath;
 use crate::geometry::projected;
@@ -45,6 +45,9 @@ const SURFACE_CHORD: f64 = 5e-5;
 
 /// A path that weighs more is handed on in parts, which are gone without a stop between them.
 const LONG_PATH: usize = 1 << 15;
+
+/// Of so many corners it is kept what they allow.
+const MOST_SHARP: usize = 10_000;
 
 /// Makes operations of steps.
 #[derive(Debug)]
@@ -72,6 +75,10 @@ pub(crate) struct Operations<'a> {
     is_finished: bool,
     /// Whether some power was raised to the least that the source gives.
     is_raised: bool,
+    /// The speed that a corner must allow to be passed by lines whose speed is open [m/s].
+    corners_at: f64,
+    /// The speeds at which corners of open lines could be passed that are not: what they allow [m/s].
+    pub(crate) sharp: Vec<f64>,
     /// What a person should know.
     pub(crate) notes: Vec<Note>,
 }
@@ -101,6 +108,8 @@ impl<'a> Operations<'a> {
             leaves_dark_end: false,
             is_finished: false,
             is_raised: false,
+            corners_at: limits.speed,
+            sharp: Vec::new(),
             notes: Vec::new(),
         }
     }
@@ -108,6 +117,11 @@ impl<'a> Operations<'a> {
     /// Lit by `source` in control cycles of `period`, as `marking` has it.
     pub(crate) fn lit_by(self, source: LaserSource, period: Period, marking: Marking) -> Self {
         Self { source, period, marking, ..self }
+    }
+
+    /// With corners that lines whose speed is open pass where they allow `speed` [m/s].
+    pub(crate) fn corners_at(self, speed: f64) -> Self {
+        Self { corners_at: speed, ..self }
     }
 
     /// The next operation that nothing to come changes; after [`Self::finish`] whatever is left.
@@ -390,21 +404,21 @@ impl<'a> Operations<'a> {
 
     /// Adds a curve to the path, or begins another path with it.
     fn add(&mut self, track: &Track, demands: &[Demand], policy: Option<Policy>) {
-        let joining = Joining {
-            rounds: self.tolerance > 0.0,
-            tolerance: if self.tolerance > 0.0 { self.tolerance } else { self.limits.tolerance },
-            limits: self.limits,
-        };
+        let joining = self.joining(demands);
         if let Some(contour) = &mut self.contour {
             let fits = policy.is_none_or(|policy| policy == contour.policy);
-            if fits && contour.extend(track, demands, &joining) {
-                if contour.weight() > LONG_PATH {
-                    let next = contour.split_last();
-                    if let Some(part) = core::mem::replace(&mut self.contour, next) {
-                        self.end(part, true);
+            match if fits { contour.extend(track, demands, &joining) } else { Joint::Ends } {
+                Joint::Passed => {
+                    if contour.weight() > LONG_PATH {
+                        let next = contour.split_last();
+                        if let Some(part) = core::mem::replace(&mut self.contour, next) {
+                            self.end(part, true);
+                        }
                     }
+                    return;
                 }
-                return;
+                Joint::Slower(speed) if self.sharp.len() < MOST_SHARP => self.sharp.push(speed),
+                Joint::Slower(_) | Joint::Ends => {}
             }
         }
         if let Some(contour) = self.contour.take() {
@@ -412,6 +426,20 @@ impl<'a> Operations<'a> {
         }
         let policy = policy.unwrap_or(Policy::Proportional);
         self.contour = Some(Contour::new(track.clone(), demands, policy));
+    }
+
+    /// How a curve with these demands may be joined to the contour that is open.
+    fn joining(&self, demands: &[Demand]) -> Joining {
+        let before = self.contour.as_ref().and_then(|contour| contour.demands().last());
+        let asked = before.into_iter().chain(demands.first());
+        let asked = asked.filter_map(|demand| self.asked_of(demand)).reduce(f64::max);
+        Joining {
+            rounds: self.tolerance > 0.0,
+            tolerance: if self.tolerance > 0.0 { self.tolerance } else { self.limits.tolerance },
+            limits: self.limits,
+            asked: asked.filter(|asked| *asked > 0.0),
+            open: self.corners_at,
+        }
     }
 
     /// Hands on a path, or a part of one that `goes_on`.
@@ -456,12 +484,16 @@ impl<'a> Operations<'a> {
 
     /// The speed that a demand asks for, as far as the machine has it [m/s]; `None` where it is left open.
     fn speed_of(&self, demand: &Demand) -> Option<f64> {
-        let asked = match self.marking.speed {
+        self.asked_of(demand).map(|speed| speed.min(self.limits.speed))
+    }
+
+    /// The speed that a demand asks for [m/s]; `None` where it is left open.
+    fn asked_of(&self, demand: &Demand) -> Option<f64> {
+        match self.marking.speed {
             Some(MarkingSpeed::Constant(speed)) => Some(speed),
             Some(MarkingSpeed::Optimum) => None,
             None => demand.speed,
-        };
-        asked.map(|speed| speed.min(self.limits.speed))
+        }
     }
 
     /// The power asked for, or the least that the source gives.

@@ -96,6 +96,11 @@ impl<'a> OperationQueue<'a> {
         &self.operations.notes
     }
 
+    /// What corners of open lines that are not passed would allow, of what has been made so far [m/s].
+    pub(crate) fn sharp(&self) -> &[f64] {
+        &self.operations.sharp
+    }
+
     fn make(&mut self) -> Result<Option<Operation>, PlanError> {
         loop {
             if let Some(operation) = self.operations.next() {

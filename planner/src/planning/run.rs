@@ -5,7 +5,7 @@ use machine::{Machine, Mechanism, MechanismVisitor, PathLimits};
 use messages::plan::{LayerFacts, PlanFacts};
 
 use super::ahead::Ahead;
-use super::open_speeds::{all, held, leaves_speeds_open};
+use super::open_speeds::{Chosen, choose};
 use super::operations::{OperationQueue, Steps};
 use super::outlet::Outlet;
 use super::refusals::at_its_step;
@@ -17,8 +17,6 @@ use crate::geometry::attitude::AttitudeLaw;
 use crate::geometry::operations::Operations;
 use crate::job::composition::Composition;
 use crate::job::{Job, JobError};
-use crate::joint_space::directions::directions_near;
-use crate::law::optimum::Speeds;
 use crate::limits::motion_limits::Scope;
 
 /// Plans `job` for `machine` within `scope` and hands each window to `outlet`, checked; its setpoints
@@ -39,14 +37,7 @@ pub(crate) fn plan_windows(
     let drawing = &job.drawing;
     let limits = path_limits(machine, job);
     let mut notes = drawing.notes.clone();
-    let open = if leaves_speeds_open(job) {
-        all(OperationQueue::new(held(job), of_steps(machine, job, &limits)))?
-    } else {
-        Vec::new()
-    };
-    let near = directions_near(machine, limits, job.attitude, scope);
-    let speeds = Speeds::choose(drawing.start, &open, &limits, &near, &job.marking, &mut notes);
-    drop(open);
+    let Chosen { speeds, corners_at } = choose(machine, job, &limits, scope, &mut notes)?;
     let standing = job
         .standing
         .unwrap_or_else(|| machine.mechanism.visit(Start { machine, start: drawing.start }));
@@ -69,7 +60,7 @@ pub(crate) fn plan_windows(
         is_frame: job.shows_frame(),
         start: drawing.start,
     };
-    let source = operations(machine, job, &limits)?;
+    let source = operations(machine, job, &limits, corners_at)?;
     let (stroke, along) = (job.marking.from_stroke, job.marking.from_along);
     if stroke > 1 || along > 0.0 {
         let along = match along {
@@ -102,26 +93,53 @@ pub(crate) fn path_limits(machine: &Machine, job: &Job) -> PathLimits {
     }
 }
 
-/// What `job` does on `machine`, from the stroke on that it begins with.
+/// What `job` does on `machine`, from the stroke on that it begins with, with corners that open lines pass
+/// where they allow `corners_at` [m/s].
 ///
 /// # Errors
 /// A job whose file cannot be opened.
-pub(crate) fn operations<'a>(
+fn operations<'a>(
     machine: &Machine,
     job: &'a Job,
     limits: &PathLimits,
+    corners_at: f64,
 ) -> Result<OperationQueue<'a>, PlanError> {
     let unreadable =
         |error: JobError| PlanError::Unreadable { line: 0, message: error.to_string() };
     let steps: Steps<'a> = Box::new(job.steps().map_err(unreadable)?);
-    let queue = OperationQueue::new(steps, of_steps(machine, job, limits));
+    let queue = OperationQueue::new(steps, of_steps(machine, job, limits, corners_at));
     Ok(queue.beginning_with(job.marking.from_stroke, job.marking.from_along, limits))
 }
 
-/// What makes operations of the steps of `job`.
-fn of_steps<'a>(machine: &Machine, job: &'a Job, limits: &PathLimits) -> Operations<'a> {
+/// As [`operations`], before any of it is planned. Where the job begins with a stroke other than the first, lines
+/// end at the corners at which a plan ends them, so that strokes are counted alike.
+///
+/// # Errors
+/// As of [`operations`], and a job that cannot be read.
+pub(crate) fn unplanned<'a>(
+    machine: &Machine,
+    job: &'a Job,
+    limits: &PathLimits,
+) -> Result<OperationQueue<'a>, PlanError> {
+    let begins_later = job.marking.from_stroke > 1 || job.marking.from_along > 0.0;
+    let corners_at = match begins_later {
+        true => choose(machine, job, limits, Scope::Machine, &mut Vec::new())?.corners_at,
+        false => limits.speed,
+    };
+    operations(machine, job, limits, corners_at)
+}
+
+/// What makes operations of the steps of `job`, with corners that open lines pass where they allow
+/// `corners_at` [m/s].
+pub(super) fn of_steps<'a>(
+    machine: &Machine,
+    job: &'a Job,
+    limits: &PathLimits,
+    corners_at: f64,
+) -> Operations<'a> {
     let (start, surface) = (job.drawing.start, job.surface.as_ref());
-    let operations = Operations::new(start, limits, machine.corners, surface);
+    let operations =
+        Operations::new(start, limits, machine.corners, surface).corners_at(corners_at);
     operations.lit_by(machine.laser, machine.realtime.period, job.marking)
 }
 

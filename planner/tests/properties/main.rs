@@ -4,12 +4,13 @@
 //! Ten thousand cases by default, the same ones each time; as many as are asked for, and others, by
 //! `GRAVER_CASES=1000000 GRAVER_SEED=7 cargo test --release -p planner --test properties`. Of those that
 //! compare two plans few are looked at by default: more limits still cost some per cent of the time in one
-//! case of a thousand or so, which a longer run shows.
+//! case of a thousand or so, which `survey` lists (see there).
 
 #![allow(missing_docs, unreachable_pub, clippy::unwrap_used)]
 
 mod cases;
 mod checks;
+mod survey;
 
 use cases::{CURVED, Case, Element, LINEAR, Limits, case};
 use machine::Machine;
@@ -39,11 +40,19 @@ fn for_cases(
     number: u8,
     test: impl Fn(&Case, &Change) -> Result<(), TestCaseError>,
 ) {
-    let of = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
-    let all = of("GRAVER_CASES").unwrap_or(u64::from(CASES));
+    let all = asked_for("GRAVER_CASES").unwrap_or(u64::from(CASES));
+    let count = (all * u64::from(count)).div_ceil(u64::from(CASES));
+    let mut runner = runner(u32::try_from(count).unwrap_or(u32::MAX), number);
+    let found = runner.run(&(case(range), change()), |(case, change)| test(&case, &change));
+    if let Err(failure) = found {
+        panic!("{failure}");
+    }
+}
+
+/// What makes `cases` cases, of a test of this `number`.
+fn runner(cases: u32, number: u8) -> TestRunner {
     let config = Config {
-        cases: u32::try_from((all * u64::from(count)).div_ceil(u64::from(CASES)))
-            .unwrap_or(u32::MAX),
+        cases,
         failure_persistence: None,
         max_shrink_iters: 3000,
         max_shrink_time: 15_000,
@@ -51,13 +60,14 @@ fn for_cases(
         ..Config::default()
     };
     let mut seed = [number; 32];
-    seed[..8].copy_from_slice(&of("GRAVER_SEED").unwrap_or(0).to_le_bytes());
+    seed[..8].copy_from_slice(&asked_for("GRAVER_SEED").unwrap_or(0).to_le_bytes());
     let random = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
-    let mut runner = TestRunner::new_with_rng(config, random);
-    let found = runner.run(&(case(range), change()), |(case, change)| test(&case, &change));
-    if let Err(failure) = found {
-        panic!("{failure}");
-    }
+    TestRunner::new_with_rng(config, random)
+}
+
+/// A number of the environment.
+fn asked_for(name: &str) -> Option<u64> {
+    std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok())
 }
 
 fn linear() -> std::ops::Range<usize> {
