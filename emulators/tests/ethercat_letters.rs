@@ -6,8 +6,9 @@ mod line;
 
 use emulators::ethercat::faults::Rates;
 
-/// How far a mark may lie from its line, and its end from that of the stroke [m].
-const ERROR: f64 = 20e-6;
+/// How far a mark may lie from its line, and its end from that of the stroke, by drives that follow positions,
+/// velocities and torques [m]: 7.4, 12.2 and 19.0 µm were seen, the first and the last with clocks that drift.
+const ERRORS: [(&str, f64); 3] = [("position", 10e-6), ("velocity", 15e-6), ("torque", 20e-6)];
 
 /// How long a frame is on its way along the slaves at most [ns].
 const FLIGHT: i64 = 10_000;
@@ -47,7 +48,8 @@ fn check(mode: &str, seed: u64) {
     }
     let error = played.error(&lit, &plan.artwork);
     println!("{mode}, clocks by {seed}: {error} m");
-    assert!(error <= ERROR, "{error} m");
+    let own = ERRORS.iter().find(|(own, _)| *own == mode);
+    assert!(own.is_some_and(|(_, most)| error <= *most), "{error} m");
 }
 
 #[test]
