@@ -2,6 +2,7 @@
 
 use machine::kinematics::KinematicsError;
 
+use crate::job::TooLarge;
 use crate::verify::checker::{LimitViolation, Quantity};
 
 /// Why a job was refused.
@@ -57,6 +58,9 @@ pub enum PlanError {
         /// How long it lasts [s].
         duration: f64,
     },
+    /// The area holds the drawing nowhere.
+    #[error("{}", too_large(.0))]
+    TooLarge(TooLarge),
     /// The laser source cannot switch on and off in the time of a dot.
     #[error(
         "this light lasts {:.3} ms, too short for the laser's switching delays or too close to the \
@@ -124,6 +128,18 @@ impl core::fmt::Display for Place {
     }
 }
 
+/// What a person reads of a drawing for which there is no room.
+fn too_large(found: &TooLarge) -> String {
+    let size =
+        |[width, height]: [f64; 2]| format!("{:.3} mm × {:.3} mm", width * 1e3, height * 1e3);
+    let turned = if found.fits_turned() { ", or turn it by 90 degrees" } else { "" };
+    format!(
+        "what is drawn is {}, and the area of the machine {}: make it smaller{turned}",
+        size(found.drawing),
+        size(found.area),
+    )
+}
+
 /// What a person reads of a limit that is broken.
 fn beyond(place: &Place, violation: &LimitViolation, zero: Option<&[f64; 3]>) -> String {
     let LimitViolation { axis, quantity, value, limit, unit, .. } = violation;
@@ -171,7 +187,8 @@ impl PlanError {
             | Self::Abandoned
             | Self::NoStroke { .. }
             | Self::NoPlace { .. }
-            | Self::TooLong { .. } => 0,
+            | Self::TooLong { .. }
+            | Self::TooLarge(_) => 0,
             Self::TooShort { line, .. }
             | Self::Unreadable { line, .. }
             | Self::Unreachable { line, .. }

@@ -19,6 +19,7 @@ pub mod path_table;
 pub mod points;
 pub mod points_table;
 pub mod program_table;
+mod room;
 mod whole;
 mod within_reach;
 pub mod workpiece_table;
@@ -33,6 +34,7 @@ use crate::light::Policy;
 pub use drawing_error::DrawingError;
 use files::JobFiles;
 use gcode::GcodeError;
+pub(crate) use room::TooLarge;
 
 /// A job, read and understood, but not planned.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +55,10 @@ pub struct Job {
     pub rest: Option<gcode::ProgramFile>,
     /// Drawings whose steps follow those of `drawing`; `None` for other jobs.
     pub composition: Option<composition::Composition>,
+    /// How far from home a drawing was put that says no place of its own and has no room there, in x and y [m].
+    pub placed: Option<[f64; 2]>,
+    /// What is drawn where the area holds it nowhere; `None` where it does, or where that is not known.
+    pub too_large: Option<TooLarge>,
     /// Why this job can be planned but not run on a machine, if so.
     pub ideal_only: Option<&'static str>,
     /// How the joints stand before the job, load side [m or rad], on a machine that is planned by
@@ -77,6 +83,8 @@ impl Job {
             survey: None,
             rest: None,
             composition: None,
+            placed: None,
+            too_large: None,
             ideal_only: None,
             standing: None,
             surface: None,

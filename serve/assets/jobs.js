@@ -4,7 +4,7 @@ import { byId, make, note, setAttribute, setText, show } from "./dom.js";
 import { http, on } from "./connection.js";
 import { Drawing, offerOrbit } from "./drawing.js";
 import { bytes, duration, fixed, percent } from "./format.js";
-import { buildForm, frameSettings, kindOf, readForm, settings } from "./placement.js";
+import { buildForm, frameSettings, kindOf, readForm, saysPlace, settings } from "./placement.js";
 import { announce, attempt, locked, operates, refuse } from "./requests.js";
 
 const LARGEST = 64 * 1024 * 1024;
@@ -108,6 +108,15 @@ function showCheck(result) {
       ...(result.notes ?? []).map((text) => make("li", {}, said(text)))));
 }
 
+/** Keeps and shows where the job lies, from home [m], as long as nobody says it. */
+function showPlaced(file, placed) {
+  file.placed = placed ?? null;
+  ["x", "y"].forEach((name, axis) => {
+    const field = byId("job-form").elements[name];
+    if (field) field.placeholder = String(Number(((placed?.[axis] ?? 0) * 1e3).toFixed(2)));
+  });
+}
+
 /** Asks for a plan; while the server plans another one, it is asked again. */
 async function planned(path, set, isWanted) {
   for (let tries = 0; ; tries++) {
@@ -126,13 +135,14 @@ async function check() {
   if (!file) return;
   const mine = ++asked;
   const isWanted = () => mine === asked;
-  const set = settings(file.kind, file.values);
+  const set = settings(file.kind, file.values, file.placed);
   byId("check-result").replaceChildren(make("p", { class: "check-word wait" }, "… Checking"));
   let drawing = null;
   try {
     const result = await planned(`jobs/${file.id}/check`, set, isWanted);
     if (!isWanted()) return;
     showCheck(result);
+    if (result.ok && !saysPlace(file.values)) showPlaced(file, result.placed);
     if (result.ok) drawing = await planned(`jobs/${file.id}/preview`, set, isWanted);
   } catch (error) {
     if (isWanted()) showCheck({ ok: false, error: { message: error.message } });
@@ -146,7 +156,7 @@ async function submit(button, extra, what) {
   const noteElement = byId("submit-note");
   button.setAttribute("aria-busy", "true");
   await attempt(noteElement, async () => {
-    const { number } = await http("POST", `jobs/${file.id}/submit`, { set: [...settings(file.kind, file.values), ...extra(file.values)] });
+    const { number } = await http("POST", `jobs/${file.id}/submit`, { set: [...settings(file.kind, file.values, file.placed), ...extra(file.values)] });
     note(noteElement, `${what} is No. ${number} in the queue`, "done");
     announce(`${what} of ${file.name} is number ${number} in the queue`);
   });
@@ -204,9 +214,11 @@ export function startJobs() {
   });
   form.addEventListener("submit", (event) => event.preventDefault());
   placed = (shift) => {
+    const own = files.get(chosen).placed;
     ["x", "y"].forEach((name, axis) => {
       const field = form.elements[name];
-      field.value = Number((Number(field.value) + shift[axis] * 1e3).toFixed(2));
+      const from = field.value === "" ? (own?.[axis] ?? 0) * 1e3 : Number(field.value);
+      field.value = Number((from + shift[axis] * 1e3).toFixed(2));
     });
     form.dispatchEvent(new Event("input"));
   };

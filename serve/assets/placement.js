@@ -87,12 +87,18 @@ export function readForm(form) {
   return Object.fromEntries([...new FormData(form)].filter(([, value]) => String(value).trim() !== ""));
 }
 
-/** The settings that these values mean. */
-export function settings(kind, values) {
+/** Whether these values say where the job lies. */
+export function saysPlace(values) {
+  return values.x !== undefined || values.y !== undefined;
+}
+
+/** The settings that these values mean, of a job that lies at `placed` from home [m] where they say no place. */
+export function settings(kind, values, placed = null) {
   const set = [];
-  if (AT[kind] && (values.x !== undefined || values.y !== undefined)) {
+  if (AT[kind] && saysPlace(values)) {
+    const at = (name, axis) => quoted(length(values[name] ?? (placed?.[axis] ?? 0) * 1e3));
     const rest = kind === "cloud" || kind === "path" ? ', "0 mm"' : "";
-    set.push(`${AT[kind]}=[${quoted(length(values.x ?? 0))}, ${quoted(length(values.y ?? 0))}${rest}]`);
+    set.push(`${AT[kind]}=[${at("x", 0)}, ${at("y", 1)}${rest}]`);
   }
   for (const field of fieldsOf(kind)) {
     const value = values[field.name];

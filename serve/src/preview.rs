@@ -56,6 +56,9 @@ pub struct CheckAnswer {
     pub power: Option<[f64; 2]>,
     /// The box around what it marks.
     pub bounds: Option<Box3>,
+    /// How far from home it was put where it says no place of its own and has no room there, in x and y [m]; null of
+    /// any other.
+    pub placed: Option<[f64; 2]>,
     /// Warnings about the machine that bear on it.
     pub warnings: Vec<String>,
     /// Remarks on the job.
@@ -72,6 +75,7 @@ impl CheckAnswer {
             length: None,
             power: None,
             bounds: None,
+            placed: None,
             warnings: Vec::new(),
             notes: Vec::new(),
         }
@@ -89,6 +93,7 @@ impl CheckAnswer {
             length: told["length"].as_f64(),
             power: serde_json::from_value(told["power"].clone()).unwrap_or_default(),
             bounds: serde_json::from_value(told["bounds"].clone()).unwrap_or_default(),
+            placed: serde_json::from_value(told["placed"].clone()).unwrap_or_default(),
             warnings: warnings.map(str::to_owned).collect(),
             notes: list("notes"),
         }

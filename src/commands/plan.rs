@@ -39,6 +39,9 @@ pub struct PlanReport {
     pub first_setpoint: Option<f64>,
     /// What a G-code program asks for; null for other jobs.
     pub program: Option<planner::job::gcode::ProgramFacts>,
+    /// How far from home a drawing was put that says no place of its own and has no room there, in x and y [m]; null of
+    /// any other job.
+    pub placed: Option<[f64; 2]>,
     /// With `--path-check`, how far the tool strays from all strokes; else null.
     pub path_check: Option<PathCheckFacts>,
     /// With `--profile`, the same job on paper; else null.
@@ -149,6 +152,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Exit, Failure> {
         plan_time,
         first_setpoint,
         program: job.program,
+        placed: job.placed,
         path_check: checked,
         paper,
         pulses,

@@ -20,6 +20,13 @@ test("quantities are said in the units of the field", () => {
   assert.equal(format.place(NaN), "– mm");
 });
 
+test("a place that is written in part is counted from where the job lies", () => {
+  const at = (values, placed) => settings("drawing", values, placed);
+  assert.deepEqual(at({}, [-0.29, -0.19]), []);
+  assert.deepEqual(at({ x: "-100" }, [-0.29, -0.19]), ['drawing.at=["-100 mm", "-190 mm"]']);
+  assert.deepEqual(at({ y: "5" }), ['drawing.at=["0 mm", "5 mm"]']);
+});
+
 test("a step is 1, 2 or 5 times a power of ten", () => {
   assert.deepEqual([0.03, 1, 1.1, 2.1, 6, 76].map(format.roundStep), [0.05, 1, 2, 5, 10, 100]);
 });

@@ -5,6 +5,7 @@ mod compose;
 mod fill;
 mod frame;
 mod layers;
+mod middle;
 mod placement;
 mod recipe;
 mod rows;
@@ -20,6 +21,7 @@ use messages::plan::LayerFacts;
 use nalgebra::Vector3;
 
 pub(super) use compose::{Composed, Part, Parts, compose};
+pub(super) use middle::moved;
 pub(super) use recipe::Defaults;
 use rows::Rows;
 pub(super) use source::is_font_file;

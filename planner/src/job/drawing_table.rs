@@ -62,6 +62,7 @@ fn of_tables<'a>(
         order: beside.order.as_ref(),
         frame: beside.frame.as_ref(),
         defaults: defaults(&beside.marking, machine),
+        is_level: beside.surface.is_none() && beside.attitude.is_none(),
     };
     of_drawings(&parts, &name, &beside.marking, diagnostics, files, machine)
 }
@@ -79,6 +80,7 @@ pub(super) fn drawing(
     table.marking.check(machine, &mut diagnostics);
     table.marking.refuse_line(&mut diagnostics);
     let home = Vector3::from(machine.home);
+    let is_level = table.surface.is_none() && table.attitude.is_none();
     let surface =
         table.surface.and_then(|table| workpiece_table::surface(&table, &mut diagnostics));
     let on_surface = workpiece_table::flat(machine, surface.as_ref());
@@ -88,6 +90,7 @@ pub(super) fn drawing(
         order: table.order.as_ref(),
         frame: table.frame.as_ref(),
         defaults: defaults(&table.marking, machine),
+        is_level,
     };
     let name = gcode::name(&path.display().to_string());
     let job = of_drawings(&parts, &name, &table.marking, diagnostics, files, &on_surface)?;
@@ -125,11 +128,14 @@ fn of_drawings(
     if let Some(power) = parts.frame.and_then(|frame| frame.power.as_ref()) {
         check_frame_power(power, machine, &mut diagnostics);
     }
-    let Composed { composition, notes, files } = compose(parts, files, machine, &mut diagnostics)?;
+    let composed = compose(parts, files, machine, &mut diagnostics)?;
+    let Composed { composition, room, notes, files } = composed;
     let start = Vector3::from(machine.home);
     let drawing = Drawing { name: name.to_owned(), start, steps: Vec::new(), notes };
     let mut job = Job {
         composition: Some(composition),
+        placed: room.shift(),
+        too_large: room.too_large(),
         files,
         marking: marking.marking(),
         ..Job::of(drawing)

@@ -39,6 +39,8 @@ impl Job {
             marking,
             rapid: self.rapid,
             standing: self.standing,
+            placed: self.placed,
+            too_large: self.too_large,
             surface: self.surface,
             attitude: self.attitude,
             files: self.files,

@@ -6,6 +6,7 @@
 
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use kurbo::{Point, Rect};
 use nalgebra::Vector3;
 
 use crate::drawing::{Action, Curve, Drawing, Power, Step};
@@ -191,6 +192,29 @@ pub fn draw(
     }
     let name = text.iter().map(|letter| format!("{letter:?}")).collect();
     Drawing { name, start, steps, notes: Vec::new() }
+}
+
+/// Points along the lines of `drawing` [m].
+pub(super) fn points(drawing: &Drawing) -> impl Iterator<Item = Point> + '_ {
+    /// Chords of a curve: as many to a quarter turn of every arc.
+    const CHORDS: u8 = 96;
+    let curves = drawing.steps.iter().filter_map(|step| match &step.action {
+        Action::Mark { curve, .. } => Some(curve),
+        _ => None,
+    });
+    curves.flat_map(|curve| {
+        (0..=CHORDS).map(|chord| {
+            let point = curve.point(f64::from(chord) / f64::from(CHORDS));
+            Point::new(point.x, point.y)
+        })
+    })
+}
+
+/// The smallest upright rectangle around the lines of `drawing` [m]; `None` where it has none.
+pub(super) fn bounds(drawing: &Drawing) -> Option<Rect> {
+    points(drawing)
+        .map(|point| Rect::from_points(point, point))
+        .reduce(|one, other| one.union(other))
 }
 
 #[cfg(test)]

@@ -5,10 +5,12 @@ use machine::quantity::Length;
 use machine::table;
 use nalgebra::Vector3;
 
+use super::composition::moved;
 use super::file::Reading;
 use super::letters::{self, Letter, Style};
+use super::room::{Room, room};
 use super::{Job, JobError};
-use crate::drawing::{Power, Turns};
+use crate::drawing::{Note, Power, Turns};
 
 table! {
     /// Letters of the thesis, in a row around the machine's home.
@@ -19,7 +21,8 @@ table! {
         pub height: Quantity<Length, Positive> = "20 mm",
         /// curves: no stop on a curve; h1, h2: chord by chord, the thesis's conventions.
         pub style: Spanned<Style> = "curves",
-        /// Where the middle of the row lies as seen from the machine's home.
+        /// Where the middle of the row lies as seen from the machine's home; left out, at home or, where there
+        /// is no room for it there, in the middle of the area.
         pub at: Option<Point>,
     }
 }
@@ -56,7 +59,21 @@ pub(super) fn read(table: &LettersTable, mut reading: Reading<'_>) -> Result<Job
     let (style, home) = (table.style.value, Vector3::from(reading.machine.home));
     let power = Power { level: reading.beside.marking.level(), follows_speed: false };
     let middle = home + table.at.as_ref().map_or(Vector3::zeros(), |at| Vector3::from(at.value));
-    let mut drawing = letters::draw(&text, table.height.value, style, power, middle, line);
+    let draw = |middle| letters::draw(&text, table.height.value, style, power, middle, line);
+    let mut drawing = draw(middle);
+    let is_level = reading.beside.surface.is_none() && reading.beside.attitude.is_none();
+    let mut found = Room::AtHome;
+    if let (true, Some(bounds)) = (is_level, letters::bounds(&drawing)) {
+        found = room(reading.machine, bounds, &|| Box::new(letters::points(&drawing)));
+    }
+    if let Room::Middle(shift) = found {
+        if table.at.is_none() {
+            drawing = draw(middle + Vector3::new(shift.x, shift.y, 0.0));
+            drawing.notes.push(Note { line: 0, text: moved(shift) });
+        } else {
+            found = Room::AtHome;
+        }
+    }
     // Style h2 begins beside its letters, wherever they are.
     if style != Style::H2 {
         drawing.start = home;
@@ -70,5 +87,6 @@ pub(super) fn read(table: &LettersTable, mut reading: Reading<'_>) -> Result<Job
     // The printed times have a rest between two strokes; and a hold next to a letter is as accurate as
     // at rest.
     job.marking.turns = Turns::Stop;
-    reading.finish(Job { rapid, ideal_only, ..job })
+    let (placed, too_large) = (found.shift(), found.too_large());
+    reading.finish(Job { rapid, ideal_only, placed, too_large, ..job })
 }

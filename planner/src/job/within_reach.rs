@@ -133,7 +133,7 @@ impl Extent {
 }
 
 /// What the joints of a machine can reach.
-struct Reach<'a, const N: usize, M: Mechanism<N>> {
+pub(super) struct Reach<'a, const N: usize, M: Mechanism<N>> {
     branches: Vec<M::Branch>,
     mechanism: M,
     area: &'a WorkArea,
@@ -141,12 +141,15 @@ struct Reach<'a, const N: usize, M: Mechanism<N>> {
     is_linear: bool,
     /// How far a smoothed path may go beyond the drawn one [m].
     margin: f64,
+    /// What is forgiven at a soft limit [m or rad].
+    rounding: f64,
+    home: Joints<N>,
     /// The joints at the last point.
     near: Joints<N>,
 }
 
 impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
-    fn new(mechanism: M, machine: &'a Machine) -> Self {
+    pub(super) fn new(mechanism: M, machine: &'a Machine) -> Self {
         let home = Joints::<N>::from_fn(|axis, _| machine.home_joints[axis]);
         Self {
             branches: branches(&mechanism, &home),
@@ -155,8 +158,15 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
             area: &machine.area,
             axes: &machine.axes,
             margin: DIGITS,
+            rounding: 0.0,
+            home,
             near: home,
         }
+    }
+
+    /// Leaves no room, and forgives `rounding` at the edges of the area and at soft limits [m or rad].
+    pub(super) fn rounding(self, rounding: f64) -> Self {
+        Self { margin: -rounding, rounding, ..self }
     }
 
     /// Leaves room for a path that may be `tolerance` from the drawn line [m].
@@ -219,6 +229,12 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
         self.is_linear || self.holds_point(point)
     }
 
+    /// Whether the tool can be at a point [m], level, and with the joints in the turns of home.
+    pub(super) fn holds_from_home(&mut self, point: &Vector3<f64>) -> bool {
+        self.near = self.home;
+        self.holds_point(point)
+    }
+
     fn holds_point(&mut self, point: &Vector3<f64>) -> bool {
         let inside = (0..3).all(|row| {
             let margin =
@@ -233,8 +249,10 @@ impl<'a, const N: usize, M: Mechanism<N>> Reach<'a, N, M> {
                 else {
                     return false;
                 };
+                let rounding = self.rounding;
                 let within = |(axis, joint): (&Axis, &f64)| {
-                    (axis.limits.position[0]..=axis.limits.position[1]).contains(joint)
+                    let [lower, upper] = axis.limits.position;
+                    (lower - rounding..=upper + rounding).contains(joint)
                 };
                 let holds = self.axes.iter().zip(joints.iter()).all(within);
                 if holds {

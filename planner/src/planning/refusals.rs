@@ -56,9 +56,25 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     }
 }
 
+/// `error` with its cause: a drawing that is larger than the area; or the very step that leaves the area, of all
+/// that are followed in one go.
+pub(super) fn explained(error: PlanError, job: &Job) -> PlanError {
+    let is_of_place = match &error {
+        PlanError::Unreachable { .. } | PlanError::NoConfiguration { .. } => true,
+        PlanError::Limit { violation, .. } => {
+            matches!(violation.quantity, Quantity::ToolPosition(0 | 1) | Quantity::JointPosition)
+        }
+        _ => false,
+    };
+    match job.too_large {
+        Some(found) if is_of_place => PlanError::TooLarge(found),
+        _ => at_its_step(error, job),
+    }
+}
+
 /// `error` with the line of the very step that leaves the area, of all that are followed in one go, how far
 /// that leads, and where the program has its zero.
-pub(super) fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
+fn at_its_step(mut error: PlanError, job: &Job) -> PlanError {
     /// How far a chord may lie from the curve [m].
     const CHORD: f64 = 1e-5;
     let PlanError::Limit { line, violation, zero, .. } = &mut error else { return error };

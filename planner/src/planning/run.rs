@@ -8,7 +8,7 @@ use super::ahead::Ahead;
 use super::open_speeds::{Chosen, choose};
 use super::operations::{OperationQueue, Steps};
 use super::outlet::Outlet;
-use super::refusals::at_its_step;
+use super::refusals::explained;
 use super::standing::Start;
 use super::{Planning, Task};
 use crate::drawing::Note;
@@ -81,7 +81,7 @@ pub(crate) fn plan_windows(
     let layers = job.composition.as_ref().map(Composition::layers).unwrap_or_default();
     let facts = Facts { name: &drawing.name, notes, is_dark, nothing, layers };
     let done = machine.mechanism.visit(Run { task: &task, source, stream, outlet, facts });
-    done.map_err(|error| at_its_step(error, job))
+    done.map_err(|error| explained(error, job))
 }
 
 /// The limits of `machine` along paths, as `job` has them.

@@ -15,10 +15,11 @@ use super::rows::Rows;
 use super::serial::Serial;
 use super::source::Source;
 use super::tables::{DrawingTable, FrameTable, LayerTable, OrderTable, OrderWord};
-use super::{Composition, Mark, MarkShape, Recipe, Section, frame, placement};
+use super::{Composition, Mark, MarkShape, Recipe, Section, frame, middle, placement};
 use crate::drawing::{Note, Power};
 use crate::job::JobError;
 use crate::job::files::JobFiles;
+use crate::job::room::Room;
 use crate::job::whole::whole;
 
 /// The most repetitions of a job.
@@ -31,6 +32,8 @@ pub(in crate::job) struct Parts<'a> {
     pub(in crate::job) order: Option<&'a OrderTable>,
     pub(in crate::job) frame: Option<&'a FrameTable>,
     pub(in crate::job) defaults: Defaults,
+    /// Whether it lies on the machine as it is drawn, with a level tool: not on a surface, nor turned.
+    pub(in crate::job) is_level: bool,
 }
 
 /// One drawing.
@@ -43,6 +46,8 @@ pub(in crate::job) struct Part<'a> {
 /// What came of it.
 pub(in crate::job) struct Composed {
     pub(in crate::job) composition: Composition,
+    /// Where it has room, where it says no place of its own.
+    pub(in crate::job) room: Room,
     pub(in crate::job) notes: Vec<Note>,
     /// The files that were read.
     pub(in crate::job) files: Vec<PathBuf>,
@@ -104,7 +109,7 @@ pub(in crate::job) fn compose(
             .empty()
             .map(|name| Note { line: 0, text: format!("nothing is on the layer `{name}`") }),
     );
-    let contents = layers.take();
+    let mut contents = layers.take();
     let repeat = parts
         .order
         .and_then(|order| whole(&order.repeat, 1..=MOST_REPEATS, "repeat", diagnostics))
@@ -121,6 +126,20 @@ pub(in crate::job) fn compose(
             recipe(Some(table), None, &parts.defaults, machine, diagnostics, &mut maker.notes)
         })
         .collect();
+    let outward = |layer: Layer| match layer {
+        Layer::Declared(index) => declared[index].kerf.max(0.0) / 2.0,
+        Layer::OfFile(drawing, index) => {
+            let recipe = recipes.get(drawing).and_then(|all| all.get(index));
+            recipe.and_then(|recipe| recipe.kerf).map_or(0.0, |offset| offset.max(0.0))
+        }
+        Layer::Rest => 0.0,
+    };
+    let is_placed = parts.drawings.iter().any(|part| part.table.at.is_some());
+    let room = match (parts.is_level, is_placed) {
+        (false, _) => Room::AtHome,
+        (true, true) => middle::too_large(&contents, outward, machine),
+        (true, false) => middle::find_room(&mut contents, outward, machine, &mut maker.notes),
+    };
     let mut sections = Vec::new();
     if let Some(table) = parts.frame {
         sections.extend(maker.frame(table, contents.values(), &parts.defaults));
@@ -151,7 +170,7 @@ pub(in crate::job) fn compose(
         frequency: parts.defaults.frequency,
         repeat: repeat as u32,
     };
-    Ok(Composed { composition, notes: maker.notes, files })
+    Ok(Composed { composition, room, notes: maker.notes, files })
 }
 
 /// The layer that the drawing of `table` says it is on.

@@ -21,7 +21,8 @@ table! {
         /// The layer that all of it is on, of those under `layers`; left out, colours and the file's own
         /// layers say it.
         pub layer: Option<Spanned<String>>,
-        /// Where the anchor comes to lie, as seen from the machine's home.
+        /// Where the anchor comes to lie, as seen from the machine's home; left out, at home or, where there is
+        /// no room for it there, in the middle of the area.
         pub at: Option<Point>,
         /// The point of the drawing that comes to lie at `at`: of the rectangle around what is drawn, or
         /// `page`, the lower left corner of the file's page, from which its coordinates are counted.
