@@ -53,7 +53,7 @@ fn judge(machine: Option<&Path>, job: &Path, set: &[&str]) -> Verdict {
     };
     let mut setpoints = 0;
     let planned = planner::plan_while(&input.machine, &read, |window| {
-        setpoints += window.len();
+        setpoints += window.setpoints.len();
         setpoints as f64 * SETPOINT_TIME <= LONGEST
     });
     match planned {

@@ -115,7 +115,7 @@ enum Verdict {
 fn is_long(machine: &Machine, job: &Job) -> bool {
     let mut setpoints = 0;
     let planned = planner::plan_while(machine, job, |window| {
-        setpoints += window.len();
+        setpoints += window.setpoints.len();
         setpoints as f64 * SETPOINT_TIME <= LONGEST
     });
     planned.is_ok_and(|facts| facts.is_none())

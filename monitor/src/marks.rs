@@ -12,12 +12,14 @@
 //! What passed while nobody recorded is *unrecorded*, from where the job had come before a gap to
 //! where light first fell or was due after it: missing, because nobody saw it marked.
 //!
-//! The [`MarkEvaluator`] takes records as they come; it remembers runs of light, not samples.
+//! The [`MarkEvaluator`] takes records as they come; it remembers runs of light, not samples, and of strokes that lie
+//! far behind only what they came to.
 
 pub mod coverage;
 mod frontier;
 pub mod line;
 mod sight;
+mod tally;
 pub mod tool_path;
 
 use crate::recording::CycleRecord;
@@ -26,11 +28,14 @@ use coverage::Coverage;
 use frontier::{Frontier, Place, Unseen, first_light, last_light};
 use line::{Foot, Line};
 use messages::ControllerReport;
-use messages::artwork::{Artwork, Stroke, distance};
+use messages::artwork::{Artwork, ArtworkLine, Stroke, distance};
 use messages::time::{Period, SETPOINT_TIME};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::collections::VecDeque;
+use tally::Tally;
 use tool_path::{Interval, LitSpan, Moment, ToolPath};
 
 /// How the tool's true position was known.
@@ -175,11 +180,14 @@ pub enum Unevaluated {
 /// Evaluates marks record by record.
 #[derive(Debug)]
 pub struct MarkEvaluator<'a> {
-    artwork: &'a Artwork,
     period: Period,
     path: ToolPath,
     newest: Option<Moment>,
-    strokes: Vec<StrokeState>,
+    /// The strokes that are known and not yet far behind.
+    strokes: VecDeque<StrokeState<'a>>,
+    /// How many strokes were before those, and what they came to.
+    behind: u64,
+    tally: Tally,
     line: Option<(u64, Line)>,
     run: Option<Run>,
     whole_before: Option<u64>,
@@ -195,12 +203,20 @@ pub struct MarkEvaluator<'a> {
 }
 
 /// How far a stroke has come.
-#[derive(Debug, Clone, Default)]
-struct StrokeState {
+#[derive(Debug, Clone)]
+struct StrokeState<'a> {
+    shape: Cow<'a, Stroke>,
     coverage: Coverage,
     followed: Option<Followed>,
     /// Whether a gap has left it unknown where along the stroke the tool is.
     blind: bool,
+}
+
+impl<'a> StrokeState<'a> {
+    /// Before there was any light.
+    fn of(shape: Cow<'a, Stroke>) -> Self {
+        Self { shape, coverage: Coverage::default(), followed: None, blind: false }
+    }
 }
 
 /// Where along its stroke the tool was seen last.
@@ -272,15 +288,25 @@ const REACH: f64 = 1e-4;
 /// A run of light that begins farther from its stroke than this is looked for all along it [m].
 const LOST_TRACK: f64 = 2e-4;
 
+/// How many strokes behind the job may still get light: light comes a few cycles late, of a few strokes each.
+const LATE: u64 = 256;
+
 impl<'a> MarkEvaluator<'a> {
     /// An evaluator for `artwork` and cycles of this `period`, before the first record.
     pub fn new(artwork: &'a Artwork, period: Period) -> Self {
+        let strokes = artwork.strokes.iter().map(|stroke| StrokeState::of(Cow::Borrowed(stroke)));
+        Self { strokes: strokes.collect(), ..Self::growing(period) }
+    }
+
+    /// An evaluator for what [`MarkEvaluator::draw`] will tell, and cycles of this `period`, before the first record.
+    pub fn growing(period: Period) -> Self {
         Self {
-            artwork,
             period,
             path: ToolPath::default(),
             newest: None,
-            strokes: vec![StrokeState::default(); artwork.strokes.len()],
+            strokes: VecDeque::new(),
+            behind: 0,
+            tally: Tally::default(),
             line: None,
             run: None,
             whole_before: None,
@@ -298,6 +324,25 @@ impl<'a> MarkEvaluator<'a> {
     #[must_use]
     pub fn with_fastest(self, speed: f64) -> Self {
         Self { fastest: (speed > 0.0).then_some(speed), ..self }
+    }
+
+    /// Takes the next stroke, or what comes next of the last one: before the records in which that is marked, and those
+    /// just before them.
+    pub fn draw(&mut self, line: ArtworkLine) {
+        let ArtworkLine { goes_on, stroke } = line;
+        match self.strokes.back() {
+            Some(_) if goes_on => {
+                let number = self.behind + self.strokes.len() as u64;
+                if let Some((_, line)) = self.line.as_mut().filter(|(loaded, _)| *loaded == number)
+                {
+                    line.extend(&stroke);
+                }
+                if let Some(last) = self.strokes.back_mut() {
+                    last.shape.to_mut().points.extend(stroke.points.iter().skip(1));
+                }
+            }
+            _ => self.strokes.push_back(StrokeState::of(Cow::Owned(stroke))),
+        }
     }
 
     /// Takes the next record, with the tool where drives reported it. A record without a tool
@@ -328,62 +373,64 @@ impl<'a> MarkEvaluator<'a> {
         let completed = matches!(end, StreamEnd::Reported(report) if report.completed == 1);
         let (open_end, hidden) = self.hide_the_end(&newest, end);
         let due = match (completed, hidden) {
-            (true, _) => Place::end(self.artwork),
+            (true, _) => self.end(),
             (false, Some(hidden)) => self.frontier.place.max(hidden),
             (false, None) => self.frontier.place,
         };
         let (speed_min, speed_max) = self.sums.speed.or(self.sums.run_speed).unwrap_or((0.0, 0.0));
-        let mut marks = Marks {
+        let reached = self.frontier.place;
+        let mut left = Left { stroke: reached.stroke, ..Left::default() };
+        for (number, state) in (self.behind + 1..).zip(&self.strokes) {
+            let length = state.shape.length();
+            let come_to = due.along(number, length);
+            if number == reached.stroke {
+                left.begun = reached.along(number, length);
+                left.place = DrawnPlace::on(&state.shape, left.begun);
+            }
+            left.length += length - come_to;
+            self.tally.add(number, &state.coverage, (length, come_to), number < due.stroke);
+        }
+        let Tally { missing, unrecorded, double, missing_end_max, double_end_max, lost, hidden } =
+            self.tally;
+        let marks = Marks {
             length: self.sums.length,
-            missing: 0.0,
-            unrecorded: 0.0,
-            double: self.sums.stray,
+            missing,
+            unrecorded,
+            double: double + self.sums.stray,
             error_max: self.sums.error.largest,
             error_rms: self.sums.error.root(),
             tracking_max: self.sums.tracking.largest,
             tracking_rms: self.sums.tracking.root(),
-            missing_end_max: 0.0,
-            double_end_max: 0.0,
+            missing_end_max,
+            double_end_max,
             speed_min,
             speed_max,
             source: Source::Plant,
-            strokes_lost: 0,
+            strokes_lost: lost,
             stray: self.sums.stray,
         };
-        let mut unrecorded_strokes: Option<(u64, u64)> = None;
-        let reached = self.frontier.place;
-        let mut left = Left { stroke: reached.stroke, ..Left::default() };
-        for (number, (stroke, state)) in (1..).zip(self.artwork.strokes.iter().zip(&self.strokes)) {
-            let length = stroke.length();
-            let come_to = due.along(number, length);
-            if number == reached.stroke {
-                left.begun = reached.along(number, length);
-                left.place = DrawnPlace::on(stroke, left.begun);
-            }
-            left.length += length - come_to;
-            let extent = state.coverage.extent(length, come_to);
-            if number < due.stroke && state.coverage.is_lost() {
-                marks.strokes_lost += 1;
-            }
-            if state.coverage.is_hidden() {
-                let first = unrecorded_strokes.map_or(number, |(first, _)| first);
-                unrecorded_strokes = Some((first, number));
-            }
-            marks.missing += extent.missing + extent.unrecorded;
-            marks.unrecorded += extent.unrecorded;
-            // A dot has no length to mark twice; straying from it is its error.
-            if length > 0.0 {
-                marks.double += extent.double;
-                for end in extent.double_ends {
-                    marks.double_end_max = marks.double_end_max.max(end);
-                }
-            }
-            for end in extent.missing_ends {
-                marks.missing_end_max = marks.missing_end_max.max(end);
-            }
-        }
         let left = (!completed).then_some(left);
+        let unrecorded_strokes = hidden;
         Ok(MarkEvaluation { marks, unrecorded_strokes, unknown: self.unknown, open_end, left })
+    }
+
+    /// Lets go of strokes far behind, which get no light any more.
+    fn let_go(&mut self) {
+        if self.unseen.is_some() || self.run.is_some() {
+            return;
+        }
+        while self.behind + 1 + LATE < self.frontier.place.stroke
+            && let Some(state) = self.strokes.pop_front()
+        {
+            self.behind += 1;
+            let length = state.shape.length();
+            self.tally.add(self.behind, &state.coverage, (length, length), true);
+        }
+    }
+
+    /// The place behind the last stroke.
+    fn end(&self) -> Place {
+        Place { stroke: self.behind + self.strokes.len() as u64 + 1, at: 0.0 }
     }
 
     fn moment(&mut self, moment: Moment) {
@@ -443,6 +490,7 @@ impl<'a> MarkEvaluator<'a> {
         });
         self.frontier.advance(interval, at);
         self.measure_speed(interval, whole);
+        self.let_go();
     }
 
     fn measure_speed(&mut self, interval: &Interval, whole: bool) {
@@ -549,23 +597,23 @@ impl<'a> MarkEvaluator<'a> {
         Some(foot)
     }
 
-    /// The index of a stroke that the job has.
+    /// The index of a stroke that is known and not far behind.
     fn stroke_index(&self, stroke: u64) -> Option<usize> {
-        let index = usize::try_from(stroke).ok()?.checked_sub(1)?;
-        (index < self.artwork.strokes.len()).then_some(index)
+        let index = usize::try_from(stroke.checked_sub(self.behind + 1)?).ok()?;
+        (index < self.strokes.len()).then_some(index)
     }
 
     /// Lays the line of the stroke with this index.
     fn load_line(&mut self, index: usize) {
-        let number = index as u64 + 1;
+        let number = self.behind + index as u64 + 1;
         if self.line.as_ref().is_none_or(|(loaded, _)| *loaded != number)
-            && let Some(shape) = self.artwork.strokes.get(index)
+            && let Some(state) = self.strokes.get(index)
         {
-            self.line = Some((number, Line::new(shape)));
+            self.line = Some((number, Line::new(&state.shape)));
         }
     }
 
-    fn state(&mut self, stroke: u64) -> Option<&mut StrokeState> {
+    fn state(&mut self, stroke: u64) -> Option<&mut StrokeState<'a>> {
         let index = self.stroke_index(stroke)?;
         self.strokes.get_mut(index)
     }

@@ -10,7 +10,7 @@ use crate::tool::ToolFinder;
 use crate::trace::Trace;
 use machine::Machine;
 use messages::ControllerReport;
-use messages::artwork::Artwork;
+use messages::artwork::{Artwork, ArtworkLine};
 use messages::time::Period;
 
 /// Whether the stamps in the samples are those of a real clock.
@@ -54,11 +54,16 @@ impl<'a> RunAnalysis<'a> {
     /// An analysis of nothing yet, against what was to be marked, of cycles of this `period`; in virtual
     /// time there are no latencies.
     pub fn new(artwork: &'a Artwork, clock: Clock, period: Period) -> Self {
+        Self { evaluator: MarkEvaluator::new(artwork, period), ..Self::growing(clock, period) }
+    }
+
+    /// The same, against what [`RunAnalysis::draw`] will tell.
+    pub fn growing(clock: Clock, period: Period) -> Self {
         Self {
             clock,
             finder: None,
             source: Source::Plant,
-            evaluator: MarkEvaluator::new(artwork, period),
+            evaluator: MarkEvaluator::growing(period),
             histograms: HopHistograms::new(),
             trace: Trace::new(clock == Clock::Real, period),
             first: None,
@@ -84,6 +89,11 @@ impl<'a> RunAnalysis<'a> {
     #[must_use]
     pub fn with_actuators(self, actuators: usize) -> Self {
         Self { trace: self.trace.with_actuators(actuators), ..self }
+    }
+
+    /// Takes what was to be marked next: before the records in which that is marked, and those just before them.
+    pub fn draw(&mut self, line: ArtworkLine) {
+        self.evaluator.draw(line);
     }
 
     /// Takes the next record.

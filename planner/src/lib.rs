@@ -38,4 +38,7 @@ pub mod verify;
 
 pub use error::PlanError;
 pub use job::{Job, Marking, MarkingSpeed};
-pub use plan::{Plan, PlanFacts, plan, plan_ideal, plan_telling, plan_through, plan_while};
+pub use plan::{
+    Plan, PlanFacts, PlannedStretch, plan, plan_ideal, plan_telling, plan_through, plan_while,
+};
+pub use verify::margins::plan_with_margins;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use machine::{Actuator, Axis, Machine, Mechanism, MechanismKind, MechanismVisitor};
 use messages::Setpoint;
-use messages::artwork::Artwork;
+use messages::artwork::{Artwork, ArtworkLine};
 
 use crate::error::PlanError;
 use crate::job::Job;
@@ -80,24 +80,35 @@ pub fn plan_ideal(machine: &Machine, job: &Job) -> Result<Plan, PlanError> {
 pub fn plan_through(
     machine: &Machine,
     job: &Job,
-    take: impl FnMut(&[Setpoint]),
+    mut take: impl FnMut(&[Setpoint]),
 ) -> Result<PlanFacts, PlanError> {
+    let take = |stretch: PlannedStretch| take(&stretch.setpoints);
     plan_windows(machine, job, Scope::Machine, 1, &mut Through { take, has_ended: None })
 }
 
-/// Plans `job` as [`plan_through`] for as long as `take` says that it wants more; `None` where it did not.
+/// A stretch of a plan, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedStretch {
+    /// Its setpoints; each belongs to the stretch or to the one before.
+    pub setpoints: Vec<Setpoint>,
+    /// The lines and dots that begin in it, and parts of those that go on.
+    pub strokes: Vec<ArtworkLine>,
+}
+
+/// Plans `job` window by window, as [`plan_through`], for as long as `take` says that it wants more; `None` where it
+/// did not.
 ///
 /// # Errors
 /// As [`plan`]; what came before it has been handed over.
 pub fn plan_while(
     machine: &Machine,
     job: &Job,
-    mut take: impl FnMut(&[Setpoint]) -> bool,
+    mut take: impl FnMut(PlannedStretch) -> bool,
 ) -> Result<Option<PlanFacts>, PlanError> {
     let has_ended = Cell::new(false);
     let mut through = Through {
-        take: |setpoints: &[Setpoint]| {
-            let goes_on = !has_ended.get() && take(setpoints);
+        take: |stretch: PlannedStretch| {
+            let goes_on = !has_ended.get() && take(stretch);
             has_ended.set(!goes_on);
         },
         has_ended: Some(&has_ended),
@@ -108,20 +119,21 @@ pub fn plan_while(
     }
 }
 
-/// Hands setpoints on.
+/// Hands windows on.
 struct Through<'a, F> {
     take: F,
     /// Whether no more are wanted.
     has_ended: Option<&'a Cell<bool>>,
 }
 
-impl<F: FnMut(&[Setpoint])> Outlet for Through<'_, F> {
+impl<F: FnMut(PlannedStretch)> Outlet for Through<'_, F> {
     fn is_abandoned(&self) -> bool {
         self.has_ended.is_some_and(Cell::get)
     }
 
     fn take(&mut self, window: Box<Window>) -> Result<(), Box<Window>> {
-        (self.take)(&window.setpoints);
+        let Window { setpoints, strokes, .. } = *window;
+        (self.take)(PlannedStretch { setpoints, strokes });
         Ok(())
     }
 }

@@ -14,11 +14,12 @@ use crate::{inputs, output};
 use drives::port::{self, PortError};
 use drives::{PlantOptions, SimulatedPlant, ports};
 use machine::{DrivesKind, Machine};
-use messages::artwork::Artwork;
+use messages::artwork::{Artwork, ArtworkLine, Stroke};
 use monitor::conclusion::machine_summary;
 use monitor::report::workspace::Workspace;
 use monitor::summary::{DrivesSummary, MachineSummary};
-use planner::Plan;
+use planner::Job;
+use planner::preview::PreviewLine;
 use planner::request::JobRequest;
 use serde::Serialize;
 use std::io::Write;
@@ -70,17 +71,15 @@ pub fn run(arguments: &CheckArguments) -> Result<Exit, Failure> {
     let surveyed = reach::survey(machine)
         .map_err(|error| Failure::bad_input(format!("the machine at home: {error}")))?;
     if let Some(path) = &arguments.picture {
-        let artwork = planned.as_ref().map(|planned| &planned.plan.artwork);
-        let picture = picture(machine, &surveyed, artwork)?;
-        let job = planned.as_ref().map_or(&[][..], |planned| &planned.files);
+        let drawn = planned.as_ref().map(|planned| planned.drawn(machine)).transpose()?;
+        let picture = picture(machine, &surveyed, drawn.as_ref())?;
+        let job = planned.as_ref().map_or(&[][..], |planned| &planned.job.files);
         let mut file =
             Sources::new(arguments.machine.machine.as_deref(), job).create("--picture", path)?;
         file.write_all(picture.as_bytes())
             .map_err(|error| Failure::output(format!("{}: {error}", path.display())))?;
     }
-    let job = planned
-        .map(|Planned { request, plan, .. }| JobReport::new(machine, &request, plan))
-        .transpose()?;
+    let job = planned.map(|planned| planned.report);
     let report = CheckReport {
         machine: machine_summary(machine),
         axes: axes::axes(machine),
@@ -98,19 +97,37 @@ pub fn run(arguments: &CheckArguments) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// A job that was planned, with the files that it was read from.
+/// A job that was planned, and what it comes to.
 struct Planned {
     request: JobRequest,
-    files: Vec<PathBuf>,
-    plan: Plan,
+    job: Job,
+    report: JobReport,
+}
+
+/// The most points of a job in a picture.
+const DRAWN: usize = 40_000;
+
+impl Planned {
+    /// What it marks on `machine`, as a picture shows it.
+    fn drawn(&self, machine: &Machine) -> Result<Artwork, Failure> {
+        let preview = planner::preview::preview(machine, &self.job, DRAWN)
+            .map_err(|error| self.request.refuse(&error))?;
+        let mut artwork = Artwork::default();
+        for PreviewLine { points, goes_on, .. } in preview.marks {
+            artwork.add(ArtworkLine { goes_on, stroke: Stroke { points, line: 0 } });
+        }
+        Ok(artwork)
+    }
 }
 
 fn plan(input: &MachineInput, path: &Path) -> Result<Planned, Failure> {
     let mut request = inputs::job_request(Some(path), &input.machine, None, &input.job_overrides);
     request.offsets = input.source.offsets()?;
-    let job = request.read(&input.machine)?;
-    let plan = planner::plan(&input.machine, &job).map_err(|error| request.refuse(&error))?;
-    Ok(Planned { request, files: job.files, plan })
+    let job = request.open(&input.machine)?;
+    let (facts, margins) =
+        planner::plan_with_margins(&input.machine, &job).map_err(|error| request.refuse(&error))?;
+    let report = JobReport::new(&input.machine, facts, margins);
+    Ok(Planned { request, job, report })
 }
 
 /// The sample job, by a path that holds from here.

@@ -1,11 +1,16 @@
 //! `graver simulate`: the stages in one process, in virtual time.
 
+mod planned_ahead;
+
+use self::planned_ahead::PlannedAhead;
 use crate::arguments::SimulateArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::{Claim, Sources};
 use crate::{inputs, output};
 use drives::PlantOptions;
+use messages::artwork::ArtworkLine;
 use messages::run_folder;
+use monitor::conclusion::artwork::ArtworkWriter;
 use monitor::conclusion::{self, RunOutcome};
 use monitor::marks::StreamEnd;
 use monitor::recording::file::Description;
@@ -32,12 +37,17 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
         &input.job_overrides,
     );
     request.offsets = input.source.offsets()?;
-    let job = request.read(&input.machine)?;
+    let job = request.open(&input.machine)?;
     let sources = Sources::new(arguments.machine.machine.as_deref(), &job.files);
     sources.spare(arguments.out.as_deref())?;
     let refuse = |error| request.refuse(&error);
-    let plan = planner::plan(&input.machine, &job).map_err(refuse)?;
-    let plan_time = started.elapsed().as_secs_f64();
+    if !job.is_surely_within_reach(&input.machine) {
+        // Refused as a whole, then, before anything is simulated.
+        planner::plan_through(&input.machine, &job, |_| ()).map_err(refuse)?;
+    }
+    let reading = started.elapsed().as_secs_f64();
+    let mut planned = PlannedAhead::start(&input.machine, job)?;
+    planned.begin().map_err(refuse)?;
 
     let folder = arguments.out.as_deref().map(RunFolder::create_at).transpose();
     let folder = folder.map_err(Failure::bad_input)?;
@@ -56,26 +66,38 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     let recorded = folder.as_ref().filter(|_| arguments.record.level() > Level::Off);
     let begin = |folder| Recording::begin(folder, &description, arguments.record.level());
     let mut recording = recorded.map(begin);
-    let mut analysis = RunAnalysis::new(&plan.artwork, Clock::Virtual, period)
-        .with_actuators(input.machine.actuators.len());
+    let mut artwork = folder.as_ref().map(ArtworkWriter::create);
+    let mut analysis =
+        RunAnalysis::growing(Clock::Virtual, period).with_actuators(input.machine.actuators.len());
     let options = PlantOptions { seed: arguments.seed, ..PlantOptions::default() };
-    let simulated = simulate_all(&input.machine, &input.plant, &plan, options, |stretch| {
+    let mut draw = |analysis: &mut RunAnalysis<'_>, line: ArtworkLine| {
+        artwork.iter_mut().for_each(|artwork| artwork.add(&line));
+        analysis.draw(line);
+    };
+    let examine = |planned: &mut PlannedAhead, stretch: &Stretch<'_>| {
+        planned.strokes().into_iter().for_each(|line| draw(&mut analysis, line));
         if !stretch.is_power_up {
             stretch.records.iter().for_each(|record| analysis.push(record));
         }
         if let Some(recording) = &mut recording {
             recording.write(stretch);
         }
-    });
+    };
+    let simulated = simulate_all(&input.machine, &input.plant, &mut planned, options, examine);
+    if let Err(error @ (SimulationError::Plant(_) | SimulationError::NotReady { .. })) = &simulated
+    {
+        return Err(Failure::bad_input(error));
+    }
+    let (facts, planning) = planned.finish(|line| draw(&mut analysis, line)).map_err(refuse)?;
+    let plan_time = reading + planning;
     let simulated = match simulated {
         Ok(simulated) => simulated,
         Err(SimulationError::Faulted { fault, .. }) => {
             let warnings = input.machine.job_warnings();
             let run_outcome =
                 RunOutcome { latched: fault, plan_time, warnings, ..RunOutcome::default() };
-            let (machine, facts) = (&input.machine, &plan.facts);
             let mut summary =
-                conclusion::summarise(machine, facts, &run_outcome, None, Clock::Virtual);
+                conclusion::summarise(&input.machine, &facts, &run_outcome, None, Clock::Virtual);
             summary.wall = started.elapsed().as_secs_f64();
             return Ok(output::summary(&summary, arguments.json));
         }
@@ -95,16 +117,18 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
         realtime_factor: Some(time / simulated.stepping.as_secs_f64()),
         ..RunOutcome::default()
     };
-    let (machine, facts) = (&input.machine, &plan.facts);
+    let machine = &input.machine;
     let mut summary =
-        conclusion::summarise(machine, facts, &run_outcome, Some(&results), Clock::Virtual);
+        conclusion::summarise(machine, &facts, &run_outcome, Some(&results), Clock::Virtual);
     summary.report_time = examining.elapsed().as_secs_f64();
     summary.wall = started.elapsed().as_secs_f64();
     if let Some(folder) = &folder {
-        if let Err(error) = conclusion::artwork::write(folder, &plan.artwork) {
+        if let Some(Err(error)) = artwork.map(ArtworkWriter::finish) {
             summary.warnings.push(format!("cannot write {error}"));
         }
-        conclusion::write(folder, &input.machine, &plan.artwork, &mut summary, Some(&results));
+        let drawn = conclusion::artwork::read(folder, None, &mut summary.warnings);
+        let drawn = drawn.unwrap_or_default();
+        conclusion::write(folder, machine, &drawn, &mut summary, Some(&results));
     }
     Ok(output::summary(&summary, arguments.json))
 }

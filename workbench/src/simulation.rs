@@ -52,6 +52,9 @@ pub enum SimulationError {
     /// The machine cannot be simulated.
     #[error(transparent)]
     Plant(#[from] drives::plant::PlantError),
+    /// Not all of the job came.
+    #[error(transparent)]
+    BrokenOff(#[from] BrokenOff),
     /// The controller did not get ready.
     #[error("the controller did not become ready: it is {state}")]
     NotReady {
@@ -192,6 +195,36 @@ impl<'a> Stretch<'a> {
     }
 }
 
+/// Where the setpoints of a simulation come from, in order.
+pub trait SetpointSource {
+    /// Waits until the next `count` setpoints are there, or all that there are. No time of the stepping is spent here.
+    ///
+    /// # Errors
+    /// Where no more will come, though the stream has not ended.
+    fn wait(&mut self, count: usize) -> Result<(), BrokenOff>;
+
+    /// Puts the next setpoints into `setpoints`, `count` at most.
+    fn take(&mut self, count: usize, setpoints: &mut Vec<Setpoint>);
+}
+
+/// The stream of a simulation was broken off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the job was broken off while it was planned")]
+pub struct BrokenOff;
+
+/// The setpoints of a plan, made as they are asked for.
+struct OfPlan(Box<dyn Iterator<Item = Setpoint> + Send>);
+
+impl SetpointSource for OfPlan {
+    fn wait(&mut self, _count: usize) -> Result<(), BrokenOff> {
+        Ok(())
+    }
+
+    fn take(&mut self, count: usize, setpoints: &mut Vec<Setpoint>) {
+        setpoints.extend(self.0.by_ref().take(count));
+    }
+}
+
 /// Plays `plan` on a controller for `machine` and a simulated `plant`; `examine` gets every record
 /// of the job in order.
 ///
@@ -204,29 +237,33 @@ pub fn simulate(
     plant_options: PlantOptions,
     mut examine: impl FnMut(&[CycleRecord]),
 ) -> Result<Simulated, SimulationError> {
-    simulate_all(machine, plant, plan, plant_options, |stretch| {
+    let mut source = OfPlan(plan.setpoints(STREAM));
+    simulate_all(machine, plant, &mut source, plant_options, |_, stretch| {
         if !stretch.is_power_up {
             examine(stretch.records);
         }
     })
 }
 
-/// The same, from the first cycle on; `examine` gets all that went in and came out.
+/// Plays the setpoints of `source`, whose stream is number 1, from the first cycle on; `examine` gets all that went in
+/// and came out.
 ///
 /// # Errors
-/// A machine that cannot be simulated, or a controller that does not get ready.
-pub fn simulate_all(
+/// A machine that cannot be simulated, a controller that does not get ready, or a source that is broken off.
+pub fn simulate_all<S: SetpointSource>(
     machine: &Machine,
     plant: &Machine,
-    plan: &Plan,
+    source: &mut S,
     plant_options: PlantOptions,
-    mut examine: impl FnMut(&Stretch<'_>),
+    mut examine: impl FnMut(&mut S, &Stretch<'_>),
 ) -> Result<Simulated, SimulationError> {
     let mut pipeline = Pipeline::new(machine, plant, plant_options)?;
-    let enabled = pipeline.enable(machine, &mut examine);
-    pipeline.tell_powering(&mut examine);
-    enabled?;
-    let mut setpoints = plan.setpoints(STREAM);
+    {
+        let examine = &mut |stretch: &Stretch<'_>| examine(source, stretch);
+        let enabled = pipeline.enable(machine, examine);
+        pipeline.tell_powering(examine);
+        enabled?;
+    }
     let mut waiting: Vec<Setpoint> = Vec::with_capacity(DRAIN);
     // Written once, so that its pages are there before the clock runs.
     let mut records = vec![pipeline.record(); CHUNK];
@@ -238,12 +275,13 @@ pub fn simulate_all(
     while remaining > 0 {
         records.clear();
         given.clear();
+        source.wait(CHUNK * DRAIN)?;
         let began = Instant::now();
         while records.len() < CHUNK && remaining > 0 {
             waiting.clear();
             if start.is_none() {
                 let room = pipeline.controller.room().min(DRAIN);
-                waiting.extend(setpoints.by_ref().take(room));
+                source.take(room, &mut waiting);
             }
             let paused = pipeline.outputs.command.state() == ControllerState::Holding;
             // Nobody is there to answer a program's pause.
@@ -260,7 +298,8 @@ pub fn simulate_all(
             }
         }
         stepping += began.elapsed();
-        examine(&Stretch { is_power_up: false, records: &records, setpoints: &given });
+        let (records, setpoints) = (&records[..], &given[..]);
+        examine(source, &Stretch { is_power_up: false, records, setpoints });
     }
     let drives = pipeline.bridge.report(RealtimeFacts::default());
     Ok(Simulated { controller: report, drives, stepping })

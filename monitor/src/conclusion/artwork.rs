@@ -4,13 +4,13 @@ use crate::run_folder::{FileError, RunFolder};
 use messages::artwork::{Artwork, ArtworkLine};
 use messages::run_folder;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader};
-use std::path::Path;
+use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::path::{Path, PathBuf};
 
 /// Reads what has been written of it, in the run folder and then in the file `spare`, if there is one; `None` when
 /// it was never begun, or cannot be read: then with a warning. A last line that was torn when its
 /// writer was killed is left out.
-pub(super) fn read(
+pub fn read(
     folder: &RunFolder,
     spare: Option<&Path>,
     warnings: &mut Vec<String>,
@@ -44,18 +44,35 @@ fn add(path: &Path, artwork: &mut Artwork) -> io::Result<()> {
     Ok(())
 }
 
-/// Writes all of it.
-///
-/// # Errors
-/// What the operating system reports, with the path.
-pub fn write(folder: &RunFolder, artwork: &Artwork) -> Result<(), FileError> {
-    let mut text = Vec::new();
-    for stroke in &artwork.strokes {
-        let line = ArtworkLine { goes_on: false, stroke: stroke.clone() };
-        if let Ok(line) = serde_json::to_vec(&line) {
-            text.extend(line);
-            text.push(b'\n');
+/// Writes it line by line, as it becomes known. After an error nothing more is written.
+#[derive(Debug)]
+pub struct ArtworkWriter {
+    path: PathBuf,
+    file: io::Result<BufWriter<File>>,
+}
+
+impl ArtworkWriter {
+    /// Begins the artwork of a run folder.
+    pub fn create(folder: &RunFolder) -> Self {
+        let path = folder.file(run_folder::ARTWORK);
+        Self { file: File::create(&path).map(BufWriter::new), path }
+    }
+
+    /// Writes the next stroke, or a part of one.
+    pub fn add(&mut self, line: &ArtworkLine) {
+        let Ok(file) = &mut self.file else { return };
+        let written = serde_json::to_writer(&mut *file, line).map_err(io::Error::from);
+        if let Err(error) = written.and_then(|()| file.write_all(b"\n")) {
+            self.file = Err(error);
         }
     }
-    folder.write(run_folder::ARTWORK, text)
+
+    /// Ends it.
+    ///
+    /// # Errors
+    /// What the operating system has reported, with the path.
+    pub fn finish(self) -> Result<(), FileError> {
+        let written = self.file.and_then(|mut file| file.flush());
+        written.map_err(FileError::at(&self.path))
+    }
 }

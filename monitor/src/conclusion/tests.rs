@@ -5,7 +5,7 @@ use super::*;
 use crate::recording::CycleRecord;
 use crate::recording::file::Description;
 use crate::recording::file::writer::RecordingWriter;
-use messages::artwork::Stroke;
+use messages::artwork::{ArtworkLine, Stroke};
 use messages::feedback::status;
 use messages::plan::Note;
 use messages::report::refused;
@@ -330,7 +330,11 @@ fn real_time_is_claimed_and_missed_only_as_reported() {
 /// A run folder as planner and monitor leave it.
 fn folder(below: &tempfile::TempDir, records: &[CycleRecord]) -> RunFolder {
     let folder = RunFolder::create_at(below.path()).unwrap();
-    super::artwork::write(&folder, &artwork()).unwrap();
+    let mut writer = super::artwork::ArtworkWriter::create(&folder);
+    for stroke in artwork().strokes {
+        writer.add(&ArtworkLine { goes_on: false, stroke });
+    }
+    writer.finish().unwrap();
     let notes = vec![Note { line: 7, text: "here".into() }];
     let plan = serde_json::to_vec(&PlanFacts { notes, ..plan() }).unwrap();
     folder.write(run_folder::PLAN, plan).unwrap();

@@ -5,7 +5,6 @@
 //! whatever the machine did meanwhile: went on, was held, went back and resumed.
 
 use super::tool_path::{Interval, Moment};
-use messages::artwork::Artwork;
 use std::cmp::Ordering;
 
 /// A place in a job.
@@ -26,17 +25,10 @@ impl Place {
         Self { stroke: self.stroke + 1, at: 0.0 }
     }
 
-    /// The end of a job.
-    pub(super) fn end(artwork: &Artwork) -> Self {
-        Self { stroke: artwork.strokes.len() as u64 + 1, at: 0.0 }
-    }
-
-    /// Where the job is after marking `length` [m] from here on.
-    pub(super) fn after(self, length: f64, artwork: &Artwork) -> Self {
+    /// Where the job is after marking `length` [m] from here on, with strokes of these `lengths` [m] from its own on.
+    pub(super) fn after(self, length: f64, lengths: impl Iterator<Item = f64>) -> Self {
         let (mut place, mut left) = (self, length);
-        let strokes = usize::try_from(self.stroke.saturating_sub(1)).unwrap_or(usize::MAX);
-        for stroke in artwork.strokes.iter().skip(strokes) {
-            let whole = stroke.length();
+        for whole in lengths {
             if place.at + left < whole {
                 return Self { at: place.at + left, ..place };
             }
@@ -166,16 +158,13 @@ pub(super) fn is_idle(moment: &Moment) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use messages::artwork::Stroke;
 
     #[test]
     fn a_length_is_marked_across_strokes_and_dots() {
-        let line = |length: f64| Stroke { points: vec![[0.0; 3], [length, 0.0, 0.0]], line: 0 };
-        let dot = Stroke { points: vec![[0.0; 3]], line: 0 };
-        let artwork = Artwork { strokes: vec![line(2.0), dot, line(3.0)] };
+        let lengths = [2.0, 0.0, 3.0];
         let check = |from: (u64, f64), length: f64, to: (u64, f64)| {
             let from = Place { stroke: from.0, at: from.1 };
-            let found = from.after(length, &artwork);
+            let found = from.after(length, lengths.into_iter().skip(from.stroke as usize - 1));
             assert_eq!((found.stroke, found.at), to, "{from:?} {length}");
         };
         check((1, 0.5), 1.0, (1, 1.5));

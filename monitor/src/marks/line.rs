@@ -39,21 +39,26 @@ const EXPECTATION: f64 = 0.01;
 impl Line {
     /// The line of a stroke; points that repeat the one before are left out.
     pub fn new(stroke: &Stroke) -> Self {
-        let mut points: Vec<Vector3<f64>> = Vec::with_capacity(stroke.points.len());
-        let mut along = Vec::with_capacity(stroke.points.len());
-        let mut length = 0.0;
+        let count = stroke.points.len();
+        let mut line = Self { points: Vec::with_capacity(count), along: Vec::with_capacity(count) };
+        line.extend(stroke);
+        line
+    }
+
+    /// Goes on along `stroke`, which begins where the line ends.
+    pub fn extend(&mut self, stroke: &Stroke) {
+        let mut length = self.length();
         for point in stroke.points.iter().map(|&point| Vector3::from(point)) {
-            if let Some(last) = points.last() {
+            if let Some(last) = self.points.last() {
                 let step = (point - last).norm();
                 if step == 0.0 {
                     continue;
                 }
                 length += step;
             }
-            points.push(point);
-            along.push(length);
+            self.points.push(point);
+            self.along.push(length);
         }
-        Self { points, along }
     }
 
     /// Length of the line [m]; 0 for a dot.

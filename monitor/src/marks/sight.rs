@@ -117,12 +117,11 @@ impl MarkEvaluator<'_> {
 
     /// What passed between two places of the job was not recorded.
     fn hide(&mut self, from: Place, to: Place) {
-        let strokes = self.artwork.strokes.iter().zip(&mut self.strokes);
-        for (number, (stroke, state)) in (1..).zip(strokes) {
+        for (number, state) in (self.behind + 1..).zip(&mut self.strokes) {
             if number < from.stroke || number > to.stroke {
                 continue;
             }
-            let length = stroke.length();
+            let length = state.shape.length();
             let low = if number == from.stroke { from.at } else { 0.0 };
             let high = if number == to.stroke { to.at.min(length) } else { length };
             let is_dot = length == 0.0 && number < to.stroke;
@@ -173,9 +172,11 @@ impl MarkEvaluator<'_> {
         match cycles.zip(self.fastest) {
             Some((cycles, speed)) => {
                 let time = self.period.of(cycles).seconds();
-                from.after(speed * FASTEST_RATE * time, self.artwork)
+                let before = from.stroke.saturating_sub(self.behind + 1) as usize;
+                let lengths = self.strokes.iter().skip(before).map(|state| state.shape.length());
+                from.after(speed * FASTEST_RATE * time, lengths)
             }
-            None => Place::end(self.artwork),
+            None => self.end(),
         }
     }
 }

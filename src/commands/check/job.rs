@@ -1,11 +1,9 @@
 //! What a job asks of a machine: its plan, its margins to singularities, and the use of its motors.
 
-use crate::exit::Failure;
 use machine::{Machine, Motor};
+use planner::PlanFacts;
 use planner::plan::LimitUtilization;
-use planner::request::JobRequest;
 use planner::verify::margins::LeastMargin;
-use planner::{Plan, PlanFacts};
 use serde::Serialize;
 
 /// What a job comes to on a machine.
@@ -44,12 +42,8 @@ pub struct MotorUse {
 
 impl JobReport {
     /// Of a job that was planned.
-    ///
-    /// # Errors
-    /// A place that the tool cannot reach.
-    pub fn new(machine: &Machine, request: &JobRequest, plan: Plan) -> Result<Self, Failure> {
-        let margins = plan.least_margins().map_err(|error| request.refuse(&error))?;
-        Ok(Self { margins, motors: motors(machine, &plan.facts.uses), facts: plan.facts })
+    pub fn new(machine: &Machine, facts: PlanFacts, margins: Vec<LeastMargin>) -> Self {
+        Self { margins, motors: motors(machine, &facts.uses), facts }
     }
 }
 

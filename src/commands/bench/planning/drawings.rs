@@ -93,7 +93,7 @@ fn measured(
     let (mut setpoints, mut first) = (0, None);
     plan_while(machine, &job, |window| {
         first.get_or_insert_with(|| began.elapsed().as_secs_f64());
-        setpoints += window.len() as u64;
+        setpoints += window.setpoints.len() as u64;
         !leaves_early || setpoints as f64 * SETPOINT_TIME < BEGINNING
     })
     .map_err(|error| refused(&error))?;
