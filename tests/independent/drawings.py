@@ -10,7 +10,8 @@ light that really fell is compared:
   their middle.
 - DXF: with the polylines of ezdxf. The extent must be the same within 1 um, and
   marks and polylines must lie within 30 um of each other. Where no more than two ends meet in any point, the
-  number of strokes must be that of ezdxf's pieces joined.
+  number of strokes must be that of ezdxf's pieces joined. Texts, those of attributes too, are in other fonts: each must
+  have strokes near the box that ezdxf has for it, and those strokes are compared no further.
 
 Needs numpy, scipy, Pillow, resvg-py and ezdxf. Prints one line a file, and ends with 1 where something differs.
 """
@@ -33,6 +34,7 @@ PIXEL = 0.1  # mm
 NEAR = 0.03  # mm
 SAGITTA = 5e-6  # of chords, as a part of the drawing's size
 TAKEN = {"LINE", "CIRCLE", "ARC", "ELLIPSE", "LWPOLYLINE", "POLYLINE", "SPLINE"}
+TEXTS = {"TEXT", "MTEXT", "ATTRIB"}
 
 
 class Difference(Exception):
@@ -160,7 +162,7 @@ def compare_dxf(program, machine, file, folder):
     if not bounds.has_data:
         raise Skipped("it is empty")
     extents = max(bounds.size.xy) or 1.0
-    lines, kinds = [], set()
+    lines, texts, kinds = [], [], set()
     for entity in disassemble.recursive_decompose(document.modelspace()):
         layer = entity.dxf.get("layer", "0")
         if document.layers.has_entry(layer):
@@ -170,6 +172,12 @@ def compare_dxf(program, machine, file, folder):
         if entity.dxf.get("invisible", 0):
             continue
         kinds.add(entity.dxftype())
+        if entity.dxftype() in TEXTS:
+            corners = disassemble.make_primitive(entity).vertices()
+            box = np.array([(corner.x, corner.y) for corner in corners])
+            if len(box) > 0:
+                texts.append((box.min(axis=0) * scale, box.max(axis=0) * scale))
+            continue
         if entity.dxftype() not in TAKEN:
             continue
         if entity.dxftype() == "POLYLINE" and (entity.is_polygon_mesh or entity.is_poly_face_mesh):
@@ -183,14 +191,16 @@ def compare_dxf(program, machine, file, folder):
     everything = np.vstack([points for points, _ in lines])
     low, high = everything.min(axis=0), everything.max(axis=0)
     factor = SIZE / (high - low).max()
-    if not (kinds <= TAKEN | {"POINT", "TEXT", "MTEXT", "ATTDEF", "ATTRIB", "VIEWPORT"}):
-        raise Skipped("others are drawn by " + ", ".join(sorted(kinds - TAKEN)))
-    settings = ["drawing.anchor=lower_left", f"drawing.scale={float(factor)!r}", "drawing.layer=all",
-                "layers.all.mode=line", "layers.all.speed=50 mm/s"]
+    if not (kinds <= TAKEN | TEXTS | {"POINT", "ATTDEF", "VIEWPORT"}):
+        raise Skipped("others are drawn by " + ", ".join(sorted(kinds - TAKEN - TEXTS)))
+    x, y = (-low * factor).tolist()
+    settings = ["drawing.anchor=page", f'drawing.at=["{x!r} mm", "{y!r} mm"]', f"drawing.scale={float(factor)!r}",
+                "drawing.layer=all", "layers.all.mode=line", "layers.all.speed=50 mm/s", "order.by=file"]
     if sum(len(points) for points, _ in lines) > 60_000:
         raise Skipped("too large to be simulated here")
     strokes, pieces, summary = simulated(program, machine, file, settings, folder)
     lines = [((points - low) * factor, key) for points, key in lines]
+    strokes, pieces, blank = without_texts(strokes, pieces, texts, lines, low, factor)
     extent = np.vstack(strokes)
     span = np.abs(np.array([extent.min(axis=0), extent.max(axis=0)]) - [[0, 0], (high - low) * factor]).max()
     reference = sampled([pair for points, _ in lines for pair in zip(points, points[1:])], NEAR / 4)
@@ -202,11 +212,36 @@ def compare_dxf(program, machine, file, folder):
     count = len(strokes) - sum(
         np.linalg.norm(one[-1] - other[0]) < 1e-3 for one, other in zip(strokes, strokes[1:])
     )
-    told = (f"{count} curves of {'?' if right is None else right}, extent {span * 1e3:.2f} um, "
+    told = (f"{blank} texts missing of {len(texts)}, {count} curves of {'?' if right is None else right}, extent {span * 1e3:.2f} um, "
             f"stray {stray * 1e3:.1f} um, missing {missing * 1e3:.1f} um")
-    if span > 1e-3 or stray > NEAR or missing > NEAR or right not in (None, count):
+    if blank or span > 1e-3 or stray > NEAR or missing > NEAR or right not in (None, count):
         raise Difference(told)
     return told
+
+
+def without_texts(strokes, pieces, texts, lines, low, factor):
+    """What is not near the box of a text, and how many boxes nothing is near. What lies on a line is no text."""
+    if not texts:
+        return strokes, pieces, 0
+    tree = cKDTree(sampled([pair for points, _ in lines for pair in zip(points, points[1:])], NEAR / 4))
+    boxes = []
+    for lower, upper in texts:
+        lower, upper = (lower - low) * factor, (upper - low) * factor
+        around = 0.2 * (upper - lower) + min(upper - lower)
+        boxes.append((lower - around, upper + around))
+    is_found = [False] * len(boxes)
+
+    def is_text(points):
+        points = np.asarray(points)
+        if tree.query(sampled(list(zip(points, points[1:])), NEAR))[0].max() <= NEAR:
+            return False
+        near = [(lower <= points).all() and (points <= upper).all() for lower, upper in boxes]
+        is_found[:] = [one or other for one, other in zip(is_found, near)]
+        return any(near)
+
+    kept = [stroke for stroke in strokes if len(stroke) < 2 or not is_text(stroke)]
+    lit = [piece for piece in pieces if not is_text(piece)]
+    return kept, lit, is_found.count(False)
 
 
 def polylines(entity, sagitta):
