@@ -34,6 +34,17 @@ pub struct Piece {
     pub stroke: u64,
 }
 
+/// What a path is gone along for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Errand {
+    /// To mark, all of it or parts.
+    Marks,
+    /// In the dark, at the speed that the job asks for.
+    Dark,
+    /// In the dark, as fast as may be.
+    Rapid,
+}
+
 /// The motion of a piece.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Motion {
@@ -45,8 +56,8 @@ pub enum Motion {
         path: Arc<Path>,
         /// When it is where.
         law: Arc<TimeLaw>,
-        /// Whether anything is marked.
-        is_lit: bool,
+        /// What for.
+        errand: Errand,
     },
     /// The tool from one state to another in the dark.
     Flight(Arc<Flight>),

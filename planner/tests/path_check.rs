@@ -9,7 +9,7 @@ use machine::path_check::Deviation;
 use machine::{Machine, Mechanism, MechanismVisitor};
 use messages::math;
 use nalgebra::Vector3;
-use planner::trajectory::{Cursor, Motion, Reference};
+use planner::trajectory::{Cursor, Errand, Motion, Reference};
 use planner::{Job, Plan};
 
 fn machine(name: &str) -> Machine {
@@ -42,7 +42,7 @@ impl MechanismVisitor for Dense<'_> {
                 let share = f64::from(part) / f64::from(self.parts);
                 let time = (pair[0].sequence as f64 + share) * 1e-3;
                 let piece = trajectory.piece_at(time).unwrap();
-                let Motion::Path { is_lit: true, .. } = &piece.motion else { continue };
+                let Motion::Path { errand: Errand::Marks, .. } = &piece.motion else { continue };
                 let Reference::Tool(tool) = trajectory.at(time, &mut Cursor::default()) else {
                     panic!("the tool leads along a stroke")
                 };

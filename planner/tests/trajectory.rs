@@ -11,7 +11,7 @@ use messages::random::SplitMix64;
 use messages::setpoint::flags;
 use nalgebra::Vector3;
 use planner::drawing::{Action, Curve, Drawing, Power, Step};
-use planner::trajectory::{Motion, Piece, Reference, Trajectory};
+use planner::trajectory::{Errand, Motion, Piece, Reference, Trajectory};
 use planner::verify::checker::Quantity;
 use planner::{Job, MarkingSpeed, Plan, PlanError, plan};
 
@@ -200,7 +200,7 @@ fn check_motion(trajectory: &Trajectory, machine: &Machine, case: &str) {
             let over = now.jerk.norm() / limits.jerk;
             assert!(over <= 1.0005, "{name}: jerk {over} of the limit at {time}");
             assert!(now.velocity.norm() <= limits.rapid * 1.005, "{name}: {}", now.velocity);
-            if matches!(piece.motion, Motion::Path { is_lit: true, .. }) {
+            if matches!(piece.motion, Motion::Path { errand: Errand::Marks, .. }) {
                 let over = now.velocity.norm() / limits.speed;
                 // On smoothed joins with the tightest arcs of these drawings; blend.rs.
                 assert!(over <= 1.0 + 7e-3, "{name}: {over} of the marking speed at {time}");
@@ -229,7 +229,7 @@ fn check_motion(trajectory: &Trajectory, machine: &Machine, case: &str) {
 /// pieces and the rests at its dots, joined where one follows the other.
 fn lit_spans(trajectory: &Trajectory) -> Vec<[f64; 2]> {
     let may_be_lit = |piece: &&Piece| {
-        matches!(piece.motion, Motion::Path { is_lit: true, .. } | Motion::Rest(_))
+        matches!(piece.motion, Motion::Path { errand: Errand::Marks, .. } | Motion::Rest(_))
     };
     let mut spans: Vec<[f64; 2]> = Vec::new();
     for piece in trajectory.pieces.iter().filter(may_be_lit) {
@@ -277,7 +277,7 @@ fn check_laser(plan: &Plan, case: &str) {
 fn lit_lengths(trajectory: &Trajectory) -> f64 {
     let mut total = 0.0;
     for piece in &trajectory.pieces {
-        let Motion::Path { law, is_lit: true, .. } = &piece.motion else { continue };
+        let Motion::Path { law, errand: Errand::Marks, .. } = &piece.motion else { continue };
         for pair in trajectory.laser.windows(2).filter(|pair| pair[0].stroke != 0) {
             let [from, to] = [pair[0], pair[1]]
                 .map(|change| (change.time.seconds() - piece.start).clamp(0.0, piece.duration));
@@ -374,7 +374,7 @@ fn a_jump_of_curvature_is_smoothed_within_the_tolerance() {
             .pieces
             .iter()
             .find_map(|piece| match &piece.motion {
-                Motion::Path { path, is_lit: true, .. } => Some(path.clone()),
+                Motion::Path { path, errand: Errand::Marks, .. } => Some(path.clone()),
                 _ => None,
             })
             .unwrap();
@@ -449,6 +449,34 @@ fn a_mark_off_the_area_is_refused_with_its_place() {
 fn line_along_x(length: f64, machine: &Machine) -> Job {
     let from = Vector3::from(machine.home);
     job(vec![mark(Curve::Line { from, to: from + Vector3::x() * length }, Some(0.2))], machine)
+}
+
+/// What an override of rapids slows is the way from mark to mark, and neither marks nor dark lines at a speed of their own.
+#[test]
+fn only_what_is_as_fast_as_may_be_is_a_rapid() {
+    let machine = Machine::builtin();
+    let at = |x: f64| Vector3::from(machine.home) + Vector3::x() * x;
+    let dark = Power { level: 0.0, follows_speed: true };
+    let line = |from: f64, to: f64| Curve::Line { from: at(from), to: at(to) };
+    let steps = vec![
+        mark(line(0.0, 0.01), Some(0.1)),
+        step(Action::Rapid { to: at(0.04) }),
+        mark(line(0.04, 0.05), Some(0.1)),
+        step(Action::Mark { curve: line(0.05, 0.08), speed: Some(0.05), power: dark }),
+        mark(line(0.08, 0.09), Some(0.1)),
+    ];
+    let plan = plan(&machine, &job(steps, &machine)).unwrap();
+    let moving = plan.setpoints(1).filter(|setpoint| setpoint.path_velocity > 1e-3);
+    let mut seen = [0; 2];
+    for setpoint in moving {
+        let x = setpoint.tool[0] - machine.home[0];
+        let expect = x > 0.0105 && x < 0.0395;
+        let near = [0.01, 0.04].iter().any(|end| (x - end).abs() < 5e-4);
+        assert!(near || setpoint.has(flags::RAPID) == expect, "at {x}");
+        assert!(!(setpoint.laser.is_lit() && setpoint.has(flags::RAPID)), "lit at {x}");
+        seen[usize::from(setpoint.has(flags::RAPID))] += 1;
+    }
+    assert!(seen[0] > 300 && seen[1] > 50, "{seen:?}");
 }
 
 /// A motor or an axis that is too weak for a line as fast as asked marks it slower, within its limit.
@@ -531,7 +559,7 @@ fn laser_delays_are_compensated() {
         .trajectory
         .pieces
         .iter()
-        .find(|piece| matches!(piece.motion, Motion::Path { is_lit: true, .. }));
+        .find(|piece| matches!(piece.motion, Motion::Path { errand: Errand::Marks, .. }));
     let stroke = stroke.unwrap();
     let on = planned.trajectory.laser[0].time.seconds();
     let off = planned.trajectory.laser.last().unwrap();

@@ -18,7 +18,7 @@ use crate::limits::along::{AlongPath, SpeedLimit};
 use crate::limits::limit_id::LimitId;
 use crate::limits::motion_limits::{MotionLimits, Scope};
 use crate::limits::tightening::Tightening;
-use crate::trajectory::Motion;
+use crate::trajectory::{Errand, Motion};
 
 /// Configurations tried for one path, the nearest first.
 const TRIED: usize = 6;
@@ -209,7 +209,8 @@ fn straight_move<const N: usize, M: Mechanism<N>>(
         return Err(Refused::Kinematics(cause));
     }
     let duration = law.duration();
-    let motion = Motion::Path { path: Arc::new(path), law: Arc::new(law), is_lit: false };
+    let errand = Errand::Rapid;
+    let motion = Motion::Path { path: Arc::new(path), law: Arc::new(law), errand };
     Ok((duration, motion))
 }
 

@@ -13,7 +13,7 @@ use crate::joint_space::joint_move::JointMove;
 use crate::joint_space::route::{Router, still};
 use crate::limits::limit_id::LimitId;
 use crate::limits::tightening::Tightening;
-use crate::trajectory::{Motion, Piece};
+use crate::trajectory::{Errand, Motion, Piece};
 
 /// Rest before a pause [s], so that the springs of the transmission have settled.
 const PAUSE_REST: f64 = 0.1;
@@ -117,7 +117,7 @@ impl<'a, const N: usize, M: Mechanism<N>> Planning<'a, N, M> {
                 draft.bound.add(LimitId::DARK_TURN, duration, line, position);
             }
             Motion::Joints(JointMove { law: Some(law), .. })
-            | Motion::Path { law, is_lit: false, .. } => {
+            | Motion::Path { law, errand: Errand::Dark | Errand::Rapid, .. } => {
                 for part in law.binding() {
                     draft.bound.add(LimitId(part.limit), part.duration, line, [0.0; 3]);
                 }

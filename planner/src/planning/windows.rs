@@ -14,7 +14,7 @@ use crate::error::PlanError;
 use crate::geometry::contour::Demand;
 use crate::joint_space::configuration::Refused;
 use crate::law::{End, Infeasible};
-use crate::trajectory::Motion;
+use crate::trajectory::{Errand, Motion};
 
 impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
     /// Goes on along the path that is under way.
@@ -80,7 +80,7 @@ impl<const N: usize, M: Mechanism<N>> Planning<'_, N, M> {
         let motion = Motion::Path {
             path: run.path.clone(),
             law: Arc::new(law),
-            is_lit: run.contour.is_lit(),
+            errand: if run.contour.is_lit() { Errand::Marks } else { Errand::Dark },
         };
         self.push(duration, motion, stroke, draft);
         match next {

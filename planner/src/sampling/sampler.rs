@@ -17,7 +17,7 @@ use crate::joint_space::configuration::{branches, follow, keeps_margins};
 use crate::joint_space::joint_move::{JointLine, JointMove, JointsAt};
 use crate::sampling::backlash::BacklashCompensation;
 use crate::sampling::deflection::Deflection;
-use crate::trajectory::{Cursor, Motion, Piece, Reference, Trajectory};
+use crate::trajectory::{Cursor, Errand, Motion, Piece, Reference, Trajectory};
 
 /// Looks at the trajectory in a cycle; even, so that a sample lies on one.
 const STEPS: usize = 4;
@@ -519,7 +519,11 @@ impl<const N: usize, M: Mechanism<N>> Sampler<N, M> {
         setpoint.sequence = self.sequence;
         if let Some(piece) = self.trajectory.pieces.get(self.cursor.piece) {
             setpoint.line = piece.line;
-            let flies = matches!(piece.motion, Motion::Flight(_) | Motion::Joints(_));
+            let flies = match piece.motion {
+                Motion::Flight(_) | Motion::Joints(_) => true,
+                Motion::Path { errand, .. } => errand == Errand::Rapid,
+                Motion::Rest(_) => false,
+            };
             setpoint.flags |= if flies { flags::RAPID } else { 0 };
         }
         self.light(setpoint);

@@ -15,7 +15,7 @@ use messages::plan::InterpolationFacts;
 use messages::time::SETPOINT_TIME;
 
 use crate::sampling::sampler::Sampler;
-use crate::trajectory::{Motion, Piece};
+use crate::trajectory::{Errand, Motion, Piece};
 use crate::verify::checker::{LimitViolation, Quantity};
 
 /// Looks at the middle between two setpoints that follow each other, where a cubic that fits both
@@ -56,7 +56,7 @@ impl InterpolationCheck {
         let Some(before) = self.before.replace(*setpoint) else { return Ok(None) };
         let time = (before.sequence as f64 + 0.5) * SETPOINT_TIME;
         // Where light falls, and not where the source is told to begin and to end.
-        let marks = |piece: &Piece| matches!(piece.motion, Motion::Path { is_lit: true, .. });
+        let marks = |piece: &Piece| matches!(piece.motion, Motion::Path { errand: Errand::Marks, .. });
         let Some(piece) = sampler.piece_at(time).filter(|piece| marks(piece)) else {
             return Ok(None);
         };

@@ -10,7 +10,7 @@ use machine::{Machine, Mechanism, MechanismVisitor, Override, Pose};
 use messages::Setpoint;
 use nalgebra::{Matrix3, Vector3};
 use planner::geometry::attitude::turned;
-use planner::trajectory::{Motion, Reference};
+use planner::trajectory::{Errand, Motion, Reference};
 use planner::{Job, Plan, plan};
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -133,7 +133,7 @@ fn a_smooth_path_passes_every_pose_exactly_and_without_a_stop() {
             .pieces
             .iter()
             .filter_map(|piece| match &piece.motion {
-                Motion::Path { path, is_lit: true, .. } => Some(path.clone()),
+                Motion::Path { path, errand: Errand::Marks, .. } => Some(path.clone()),
                 _ => None,
             })
             .collect();
@@ -215,7 +215,7 @@ fn between_straight_lines_the_turning_rests_at_corners_only() {
             let time = plan.trajectory.end() * f64::from(index) / 200_000.0;
             let found = plan.trajectory.at(time, &mut cursor);
             let motion = plan.trajectory.piece_at(time).map(|piece| &piece.motion);
-            let (Some(tool), Some(Motion::Path { is_lit: true, .. })) = (found.tool(), motion)
+            let (Some(tool), Some(Motion::Path { errand: Errand::Marks, .. })) = (found.tool(), motion)
             else {
                 continue;
             };
