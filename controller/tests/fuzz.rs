@@ -79,7 +79,6 @@ fn play(machine: &Machine, job: &Job, doubts: u64, random: &mut SplitMix64) -> (
             planner: presence(random.below(20 * doubts) == 0),
             drives: presence(random.below(20 * doubts) == 0),
             supervisor: presence(random.below(20 * doubts) == 0),
-            ..Peers::default()
         };
         let request = match step {
             5 => Some((OperatorVerb::Enable as u32, 0.0)),

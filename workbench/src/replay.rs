@@ -56,6 +56,9 @@ pub enum ReplayError {
         /// Answers before it.
         answers: u64,
     },
+    /// Its commands do not tell what they were made of.
+    #[error("it was recorded by an earlier version, which did not record what the controller was given")]
+    Untold,
     /// Cycles are missing in it.
     #[error("cycle {cycle} follows cycle {before}: what lies between was not recorded")]
     Gap {
@@ -98,6 +101,7 @@ impl Answering {
         let cycle = feedback.cycle.0;
         let (answers, before) = self.newest;
         match command.number {
+            0 => return Err(ReplayError::Untold),
             1 if answers > 0 => self.controller = Controller::new(machine),
             number if number == answers + 1 => {}
             number if answers == 0 => {
