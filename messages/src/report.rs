@@ -107,7 +107,7 @@ sample! {
         duplicated: u64,
         /// Answers that could not be read, or were not what was asked.
         corrupted: u64,
-        /// Cycles without a measurement of their own; the one before stood in.
+        /// Cycles without a measurement of their own: the motors were taken to go on at their speed.
         bridged: u64,
         /// Largest distance of the clock of the bus from ours while it was followed [ns].
         clock_error_max: u64,
