@@ -57,7 +57,9 @@ pub enum ReplayError {
         answers: u64,
     },
     /// Its commands do not tell what they were made of.
-    #[error("it was recorded by an earlier version, which did not record what the controller was given")]
+    #[error(
+        "it was recorded by an earlier version, which did not record what the controller was given"
+    )]
     Untold,
     /// Cycles are missing in it.
     #[error("cycle {cycle} follows cycle {before}: what lies between was not recorded")]

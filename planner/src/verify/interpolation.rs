@@ -56,7 +56,8 @@ impl InterpolationCheck {
         let Some(before) = self.before.replace(*setpoint) else { return Ok(None) };
         let time = (before.sequence as f64 + 0.5) * SETPOINT_TIME;
         // Where light falls, and not where the source is told to begin and to end.
-        let marks = |piece: &Piece| matches!(piece.motion, Motion::Path { errand: Errand::Marks, .. });
+        let marks =
+            |piece: &Piece| matches!(piece.motion, Motion::Path { errand: Errand::Marks, .. });
         let Some(piece) = sampler.piece_at(time).filter(|piece| marks(piece)) else {
             return Ok(None);
         };

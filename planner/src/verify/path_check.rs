@@ -89,7 +89,9 @@ impl MechanismVisitor for Checking<'_> {
                 let share = f64::from(part) / f64::from(PARTS);
                 let time = (from.sequence as f64 + share) * SETPOINT_TIME;
                 let Some(piece) = trajectory.piece_at(time) else { continue };
-                let Motion::Path { path, law, errand: Errand::Marks } = &piece.motion else { continue };
+                let Motion::Path { path, law, errand: Errand::Marks } = &piece.motion else {
+                    continue;
+                };
                 if !open.as_mut().is_some_and(|stroke| stroke.goes_on(piece, path, law)) {
                     checks.extend(open.take().map(|stroke| self.close(stroke)).transpose()?);
                 }

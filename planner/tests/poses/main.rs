@@ -215,7 +215,8 @@ fn between_straight_lines_the_turning_rests_at_corners_only() {
             let time = plan.trajectory.end() * f64::from(index) / 200_000.0;
             let found = plan.trajectory.at(time, &mut cursor);
             let motion = plan.trajectory.piece_at(time).map(|piece| &piece.motion);
-            let (Some(tool), Some(Motion::Path { errand: Errand::Marks, .. })) = (found.tool(), motion)
+            let (Some(tool), Some(Motion::Path { errand: Errand::Marks, .. })) =
+                (found.tool(), motion)
             else {
                 continue;
             };
