@@ -6,7 +6,7 @@
 //! compare two plans few are looked at by default: more limits still cost some per cent of the time in one
 //! case of a thousand or so, which `survey` lists (see there).
 
-#![allow(missing_docs, unreachable_pub, clippy::unwrap_used)]
+#![allow(missing_docs, unreachable_pub, clippy::unwrap_used, clippy::print_stdout)]
 
 mod cases;
 mod checks;
