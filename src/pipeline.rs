@@ -13,7 +13,7 @@ pub mod job_run;
 pub mod operators;
 pub mod power_up;
 pub mod queue;
-mod refusals;
+pub(crate) mod refusals;
 pub mod services;
 pub mod serving;
 pub mod slow;

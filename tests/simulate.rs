@@ -300,3 +300,17 @@ fn the_command_tells_the_planned_time_and_how_fast_it_went() {
         assert_eq!(summary["out"], serde_json::Value::Null);
     }
 }
+
+/// Such a job never began, and the simulation waited for its end for ever.
+#[test]
+fn a_job_that_the_controller_does_not_start_is_refused() {
+    let place = support::Place::new();
+    let machine = support::source("machines").join("servo_gantry.toml");
+    let switch = "machine.inputs.x_max.at=41 um";
+    let arguments = ["simulate", "--json", "--machine", machine.to_str().unwrap(), "--set", switch];
+    let summary = place.graver(&arguments).json(2);
+    assert_eq!(
+        summary["error"]["message"],
+        "the controller refused to start the job: axis x is on its limit switch: jog it away from it"
+    );
+}

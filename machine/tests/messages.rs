@@ -384,6 +384,25 @@ fn the_contradiction_in_the_printed_motor_table_is_a_warning() {
 }
 
 #[test]
+fn a_limit_switch_within_the_travel_is_a_warning() {
+    let file = include_str!("../../machines/servo_gantry.toml");
+    let texts = |settings: &[&str]| {
+        let machine = Machine::parse("servo_gantry.toml", file, &set(settings)).unwrap();
+        machine.warnings.iter().map(|warning| warning.text.clone()).collect::<Vec<_>>()
+    };
+    let shipped = texts(&[]);
+    let changed = texts(&["inputs.x_max.at=41 um"]);
+    assert_eq!(changed.len(), shipped.len() + 1, "{changed:?}");
+    let told = changed.iter().find(|text| text.contains("limit switch")).unwrap();
+    assert_eq!(
+        told,
+        "--set machine.inputs.x_max.at=41 um: axis `x` is on this limit switch from 0.041 mm, and its \
+         `position` goes on to 400.000 mm: it stops with a fault there; move the switch beyond, or end \
+         `position` before it"
+    );
+}
+
+#[test]
 fn a_path_speed_beyond_the_motors_is_a_warning() {
     let machine = Machine::parse("corexy.toml", COREXY, &set(&["path.rapid=0.5 m/s"])).unwrap();
     let texts: Vec<&str> = machine.warnings.iter().map(|w| w.text.as_str()).collect();

@@ -471,7 +471,8 @@ fn only_what_is_as_fast_as_may_be_is_a_rapid() {
     for setpoint in moving {
         let x = setpoint.tool[0] - machine.home[0];
         let expect = x > 0.0105 && x < 0.0395;
-        let near = [0.01, 0.04].iter().any(|end| (x - end).abs() < 5e-4);
+        // The ways in and out of the marks are theirs.
+        let near = [0.01, 0.04].iter().any(|end| (x - end).abs() < 3e-3);
         assert!(near || setpoint.has(flags::RAPID) == expect, "at {x}");
         assert!(!(setpoint.laser.is_lit() && setpoint.has(flags::RAPID)), "lit at {x}");
         seen[usize::from(setpoint.has(flags::RAPID))] += 1;

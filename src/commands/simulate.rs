@@ -6,6 +6,7 @@ use self::planned_ahead::PlannedAhead;
 use crate::arguments::SimulateArguments;
 use crate::exit::{Exit, Failure};
 use crate::files::{Claim, Sources};
+use crate::pipeline::refusals;
 use crate::{inputs, output};
 use drives::PlantOptions;
 use messages::artwork::ArtworkLine;
@@ -87,6 +88,9 @@ pub fn run(arguments: &SimulateArguments) -> Result<Exit, Failure> {
     if let Err(error @ (SimulationError::Plant(_) | SimulationError::NotReady { .. })) = &simulated
     {
         return Err(Failure::bad_input(error));
+    }
+    if let Err(SimulationError::NotStarted { reply }) = &simulated {
+        return Err(Failure::bad_input(refusals::not_started(reply, &input.machine, &[])));
     }
     let (facts, planning) = planned.finish(|line| draw(&mut analysis, line)).map_err(refuse)?;
     let plan_time = reading + planning;

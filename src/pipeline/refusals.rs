@@ -5,6 +5,17 @@ use machine::{JointUnit, Machine};
 use messages::{ControllerState, MAX_AXES, OperatorReply, Refusal};
 use operator::Verb;
 
+/// Why the controller for `machine`, of which these `interlocks` are missing, does not start a job, by its `reply`.
+pub(crate) fn not_started(
+    reply: &OperatorReply,
+    machine: &Machine,
+    interlocks: &[String],
+) -> String {
+    // A job is started like one that goes on.
+    let words = words(reply, Verb::Resume, machine, interlocks).unwrap_or_default();
+    format!("the controller refused to start the job: {words}")
+}
+
 /// What `reply` of the controller for `machine`, of which these `interlocks` are missing, to `verb` says; `None` where it
 /// is no refusal.
 pub(super) fn words(

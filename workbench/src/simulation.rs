@@ -8,8 +8,8 @@ use drives::bridge::BridgeOptions;
 use drives::{Bridge, Deadlines, PlantOptions, SimulatedPlant};
 use machine::Machine;
 use messages::{
-    ControllerReport, ControllerState, DrivesReport, Fault, Nanoseconds, OperatorRequest,
-    OperatorVerb, RealtimeFacts, Setpoint,
+    ControllerReport, ControllerState, DrivesReport, Fault, Nanoseconds, OperatorReply,
+    OperatorRequest, OperatorVerb, RealtimeFacts, Setpoint,
 };
 use monitor::recording::CycleRecord;
 use monitor::summary::FaultSummary;
@@ -60,6 +60,12 @@ pub enum SimulationError {
     NotReady {
         /// Its state.
         state: &'static str,
+    },
+    /// The controller does not start the job.
+    #[error("the controller refused to start the job")]
+    NotStarted {
+        /// Its answer.
+        reply: OperatorReply,
     },
     /// The axes could not be enabled.
     #[error("the controller did not become ready: {words}")]
@@ -286,7 +292,11 @@ pub fn simulate_all<S: SetpointSource>(
             let paused = pipeline.outputs.command.state() == ControllerState::Holding;
             // Nobody is there to answer a program's pause.
             let resume = paused.then(|| request(OperatorVerb::Resume, 0.0));
+            let is_start = start.is_some();
             pipeline.cycle(&waiting, start.take().or(resume));
+            if is_start && let Some(reply) = pipeline.outputs.reply.filter(|it| it.accepted == 0) {
+                return Err(SimulationError::NotStarted { reply });
+            }
             records.push(pipeline.record());
             given.extend(waiting.iter().map(|setpoint| (pipeline.now, *setpoint)));
             remaining = remaining.saturating_sub(1);

@@ -446,7 +446,7 @@ fn a_refusal_is_written_or_at_least_reported() {
     bench.turn_until(PlannerPhase::Refused);
     let text = std::fs::read(bench.folder.path().join(run_folder::REFUSAL)).unwrap();
     let refusal: Refusal = serde_json::from_slice(&text).unwrap();
-    assert!(refusal.message.contains("of the tool"), "{}", refusal.message);
+    assert!(refusal.message.contains("make it smaller"), "{}", refusal.message);
 
     bench.offers.publish(&JobOffer::new(2, "/nowhere/at/all").unwrap()).unwrap();
     bench.service.turn().unwrap();

@@ -4,7 +4,6 @@ use super::{JobRun, Stage};
 use crate::pipeline::{refusals, slow};
 use machine::operating::InputFunction;
 use messages::OperatorReply;
-use operator::Verb;
 
 impl JobRun<'_> {
     /// Notes each interlock and warning that comes while the job is played, once, for its summary.
@@ -28,8 +27,6 @@ impl JobRun<'_> {
         let (machine, latest) = (&self.pipeline.machine, &self.pipeline.latest);
         let inputs = latest.progress.inputs;
         let missing = slow::active(machine, InputFunction::Interlock, inputs, &latest.slow);
-        // A job is started like one that goes on.
-        let words = refusals::words(reply, Verb::Resume, machine, &missing).unwrap_or_default();
-        format!("the controller refused to start the job: {words}")
+        refusals::not_started(reply, machine, &missing)
     }
 }

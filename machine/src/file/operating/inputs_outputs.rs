@@ -1,6 +1,7 @@
 //! The tables of inputs and outputs, and what they become.
 
 use super::Known;
+use crate::axis::{Axis, JointUnit};
 use crate::document::{Diagnostics, NonNegative, ProblemKind, Quantity, Span, Spanned};
 use crate::operating::{Input, InputFunction, Output, OutputFunction, Side, SimulatedSwitch};
 use crate::quantity as unit;
@@ -174,6 +175,14 @@ pub(super) fn output(
     Some(Output { name: name.value.clone(), function, is_active_low })
 }
 
+/// A place of an axis, for a person.
+fn shown(unit: JointUnit, place: f64) -> String {
+    match unit {
+        JointUnit::Length => format!("{:.3} mm", place * 1e3),
+        JointUnit::Angle => format!("{:.3} deg", place.to_degrees()),
+    }
+}
+
 impl Known<'_> {
     pub(super) fn input(
         &self,
@@ -210,6 +219,7 @@ impl Known<'_> {
                     missing(name, "side", "\"lower\"", diagnostics);
                     return None;
                 };
+                self.warn_of_travel(axis, table, side.value, simulated, diagnostics);
                 InputFunction::Limit { axis, side: side.value }
             }
             (Kind::EmergencyStop, _) => InputFunction::EmergencyStop,
@@ -220,6 +230,36 @@ impl Known<'_> {
         };
         let is_active_low = table.active.value == Level::Low;
         Some(Input { name: name.value.clone(), function, is_active_low, simulated })
+    }
+
+    /// Warns of a limit switch that the axis is on before it comes to its soft limit.
+    fn warn_of_travel(
+        &self,
+        axis: usize,
+        table: &InputTable,
+        side: Side,
+        switch: Option<SimulatedSwitch>,
+        diagnostics: &mut Diagnostics,
+    ) {
+        let (Some(at), Some(switch)) = (&table.at, switch) else { return };
+        let Axis { name, limits, .. } = &self.axes[axis];
+        let [lower, upper] = limits.position;
+        let (is_within, end) = match side {
+            Side::Lower => (switch.at > lower, lower),
+            Side::Upper => (switch.at < upper, upper),
+        };
+        if is_within {
+            let unit = self.joints[axis].unit;
+            diagnostics.warn(
+                at.span,
+                format!(
+                    "axis `{name}` is on this limit switch from {}, and its `position` goes on to {}: it stops \
+                     with a fault there; move the switch beyond, or end `position` before it",
+                    shown(unit, switch.at),
+                    shown(unit, end),
+                ),
+            );
+        }
     }
 
     /// Refuses what has no effect on an input of this function.
