@@ -397,7 +397,7 @@ fn a_limit_switch_within_the_travel_is_a_warning() {
     assert_eq!(
         told,
         "--set machine.inputs.x_max.at=41 um: axis `x` is on this limit switch from 0.041 mm, and its \
-         `position` goes on to 400.000 mm: it stops with a fault there; move the switch beyond, or end \
+         `position` goes on to 401.000 mm: it stops with a fault there; move the switch beyond, or end \
          `position` before it"
     );
 }
